@@ -1,0 +1,52 @@
+//! What can go wrong for a reason outside the numbers: the caller's input, or the machine.
+//!
+//! Trouble *in* the numbers (a body that left the finite range, a contact without a color) is not an
+//! error: it is counted in [`StepStats`](crate::stats::StepStats) and shown.
+
+use std::path::PathBuf;
+
+/// One line that names what is wrong and where.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The caller's input cannot be used: a scene file, a setting, a parameter.
+    #[error("{0}")]
+    Input(String),
+    /// A file could not be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file as the caller named it.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// No adapter, or one that cannot do what is asked.
+    #[error("{0}")]
+    Adapter(String),
+    /// The problem is larger than the adapter's buffers.
+    #[error("{0}")]
+    TooLarge(String),
+}
+
+impl Error {
+    /// An [`Error::Input`] from anything that prints.
+    pub fn input(message: impl std::fmt::Display) -> Self {
+        Self::Input(message.to_string())
+    }
+
+    /// Wraps an I/O error with the path it happened on.
+    pub fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::File { path, source }
+    }
+
+    /// Exit code of the command line: 2 for the caller's input, 3 for the machine.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) | Self::File { .. } => 2,
+            Self::Adapter(_) | Self::TooLarge(_) => 3,
+        }
+    }
+}
+
+/// The result of every fallible call of this library.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,47 @@
+//! Scenes: a world, how long a step is, and what should hold at the end.
+
+mod catalogue;
+mod file;
+
+pub use catalogue::{CATALOGUE, Entry, Parameter};
+pub use file::{SceneFile, load, schema};
+
+use glam::Vec3;
+
+use crate::error::Result;
+use crate::world::World;
+
+/// A world with everything a run needs to know about it.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name of the catalogue entry, or of the file.
+    pub name: String,
+    /// The bodies.
+    pub world: World,
+    /// Length of a step [s].
+    pub dt: f32,
+    /// Steps of a run that asks for none.
+    pub steps: u32,
+    /// Lower and upper corner of the space that no dynamic body should leave [m], if the scene has one.
+    pub container: Option<(Vec3, Vec3)>,
+}
+
+impl Scene {
+    /// Finds a scene by its catalogue name, else reads the file of that name. `parameters` are `key=value`.
+    ///
+    /// # Errors
+    /// Neither a known name nor a readable scene file; an unknown parameter or an impossible value.
+    pub fn find(name_or_path: &str, parameters: &[String]) -> Result<Self> {
+        match CATALOGUE.iter().find(|e| e.name == name_or_path) {
+            Some(entry) => entry.build(parameters),
+            None => file::load_or_suggest(name_or_path, parameters),
+        }
+    }
+
+    /// Dynamic bodies whose centre of mass is outside the container.
+    pub fn escaped(&self, world: &World) -> usize {
+        let Some((low, high)) = self.container else { return 0 };
+        let dynamic = world.bodies.iter().filter(|b| b.kind == crate::world::BodyKind::Dynamic);
+        dynamic.map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
+    }
+}

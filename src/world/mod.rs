@@ -1,0 +1,70 @@
+//! Bodies, shapes and materials: what a scene is made of. SI units, right-handed, Y up in the catalogue.
+
+mod body;
+mod shape;
+
+pub use body::{Body, BodyKind, Collider, MassProperties, Material};
+pub use shape::Shape;
+
+use glam::Vec3;
+
+/// A set of rigid bodies under one gravity.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Acceleration of every dynamic body [m/s²].
+    pub gravity: Vec3,
+    /// The bodies; a body's index here is its name everywhere else.
+    pub bodies: Vec<Body>,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl World {
+    /// An empty world with gravity 9.81 m/s² along -Y.
+    pub fn new() -> Self {
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new() }
+    }
+
+    /// Adds a body and returns its index.
+    pub fn add(&mut self, body: Body) -> usize {
+        self.bodies.push(body);
+        self.bodies.len() - 1
+    }
+
+    /// Number of dynamic bodies.
+    pub fn dynamic_count(&self) -> usize {
+        self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic).count()
+    }
+
+    /// The first body whose pose or velocity is not finite: trouble in the numbers, as data.
+    pub fn first_non_finite(&self) -> Option<usize> {
+        self.bodies.iter().position(|b| !b.is_finite())
+    }
+
+    /// Sum of the kinetic energies of the dynamic bodies [J], in f64.
+    pub fn kinetic_energy(&self) -> f64 {
+        self.bodies.iter().map(Body::kinetic_energy).sum()
+    }
+
+    /// Sum of the potential energies of the dynamic bodies [J], zero at the origin, in f64.
+    pub fn potential_energy(&self) -> f64 {
+        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
+        dynamic.map(|b| -f64::from(b.mass.mass) * self.gravity.as_dvec3().dot(b.center_of_mass().as_dvec3())).sum()
+    }
+
+    /// Linear momentum of the dynamic bodies [kg m/s], in f64.
+    pub fn linear_momentum(&self) -> glam::DVec3 {
+        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
+        dynamic.map(|b| f64::from(b.mass.mass) * b.linear_velocity.as_dvec3()).sum()
+    }
+
+    /// Angular momentum of the dynamic bodies about the origin [kg m²/s], in f64.
+    pub fn angular_momentum(&self) -> glam::DVec3 {
+        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
+        dynamic.map(Body::angular_momentum).sum()
+    }
+}

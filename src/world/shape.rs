@@ -1,0 +1,147 @@
+//! The shapes a body can carry: parry's, thinly named.
+
+use std::fmt;
+
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::{SharedShape, TriMeshFlags};
+
+use crate::error::{Error, Result};
+
+/// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
+///
+/// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; half-space, triangle mesh and height field
+/// only on fixed bodies, since they have no mass.
+#[derive(Clone)]
+pub struct Shape(pub(crate) SharedShape);
+
+impl fmt::Debug for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", self.0.shape_type())
+    }
+}
+
+impl Shape {
+    /// A ball of `radius` [m].
+    pub fn ball(radius: f32) -> Self {
+        Self(SharedShape::ball(radius))
+    }
+
+    /// A box with half extents [m] along its own axes.
+    pub fn cuboid(half_x: f32, half_y: f32, half_z: f32) -> Self {
+        Self(SharedShape::cuboid(half_x, half_y, half_z))
+    }
+
+    /// A capsule along Y: a segment of `half_height` either way, swept by `radius` [m].
+    pub fn capsule(half_height: f32, radius: f32) -> Self {
+        Self(SharedShape::capsule_y(half_height, radius))
+    }
+
+    /// A cylinder along Y [m].
+    pub fn cylinder(half_height: f32, radius: f32) -> Self {
+        Self(SharedShape::cylinder(half_height, radius))
+    }
+
+    /// A cone along Y, tip up [m].
+    pub fn cone(half_height: f32, radius: f32) -> Self {
+        Self(SharedShape::cone(half_height, radius))
+    }
+
+    /// The convex hull of `points` [m].
+    ///
+    /// # Errors
+    /// Fewer than four points, or points that span no volume.
+    pub fn convex_hull(points: &[Vec3]) -> Result<Self> {
+        let degenerate = || Error::input(format!("a convex hull of {} points that spans no volume", points.len()));
+        // Checked here, because a flat cloud makes the hull code panic rather than refuse.
+        if !spans_volume(points) {
+            return Err(degenerate());
+        }
+        SharedShape::convex_hull(points).map(Self).ok_or_else(degenerate)
+    }
+
+    /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.
+    pub fn half_space(normal: Vec3) -> Self {
+        Self(SharedShape::halfspace(normal))
+    }
+
+    /// A triangle mesh: vertices [m] and counter-clockwise triangles seen from outside.
+    ///
+    /// # Errors
+    /// No triangle, or an index that names no vertex.
+    pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
+        if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
+            return Err(Error::input(format!(
+                "mesh triangle {t:?} names a vertex beyond the last, {}",
+                vertices.len()
+            )));
+        }
+        let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
+        SharedShape::trimesh_with_flags(vertices, triangles, flags)
+            .map(Self)
+            .map_err(|e| Error::input(format!("mesh: {e}")))
+    }
+
+    /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` [m].
+    ///
+    /// # Errors
+    /// Fewer than two rows or columns, or rows of unequal length.
+    pub fn height_field(heights: &[Vec<f32>], scale: Vec3) -> Result<Self> {
+        let rows = heights.len();
+        let columns = heights.first().map_or(0, Vec::len);
+        if rows < 2 || columns < 2 || heights.iter().any(|r| r.len() != columns) {
+            return Err(Error::input("a height field needs at least 2 rows of equal length with at least 2 heights"));
+        }
+        // parry stores columns one after another.
+        let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
+        Ok(Self(SharedShape::heightfield(parry3d::utils::Array2::new(rows, columns, data), scale)))
+    }
+
+    /// Whether the shape has a finite volume, so that a body with it can have mass from density.
+    pub fn has_volume(&self) -> bool {
+        self.0.as_halfspace().is_none() && self.0.as_trimesh().is_none() && self.0.as_heightfield().is_none()
+    }
+
+    /// Half extents if this is a cuboid [m].
+    pub fn as_cuboid(&self) -> Option<Vec3> {
+        self.0.as_cuboid().map(|c| c.half_extents)
+    }
+
+    /// Radius of the smallest sphere around the shape's own origin that contains it [m]; infinite for a half-space.
+    pub fn bounding_radius(&self) -> f32 {
+        let sphere = self.0.compute_local_bounding_sphere();
+        sphere.center().length() + sphere.radius()
+    }
+
+    /// Half of the smallest side of the shape's own bounding box [m]; infinite for a half-space.
+    pub fn smallest_half_extent(&self) -> f32 {
+        if self.0.as_halfspace().is_some() {
+            return f32::INFINITY;
+        }
+        let extents = self.0.compute_local_aabb().half_extents();
+        // A flat mesh or height field is as thin as nothing: its other sides say how large it is.
+        if self.has_volume() { extents.min_element() } else { extents.max_element() }
+    }
+}
+
+/// A pose from its two parts.
+pub(crate) fn pose(position: Vec3, rotation: Quat) -> Pose {
+    Pose::from_parts(position, rotation)
+}
+
+/// Whether the points are finite and not all in one plane, relative to their extent.
+fn spans_volume(points: &[Vec3]) -> bool {
+    let Some(&origin) = points.first() else { return false };
+    let farthest = |measure: &dyn Fn(Vec3) -> f32| {
+        points
+            .iter()
+            .map(|&p| (measure(p - origin), p - origin))
+            .fold((0.0_f32, Vec3::ZERO), |best, x| if x.0 > best.0 { x } else { best })
+    };
+    let (length, edge) = farthest(&|p| p.length());
+    let axis = edge.normalize_or_zero();
+    let (width, side) = farthest(&|p| p.cross(axis).length());
+    let normal = axis.cross(side).normalize_or_zero();
+    let (height, _) = farthest(&|p| p.dot(normal).abs());
+    points.iter().all(|p| p.is_finite()) && length > 0.0 && width > 1e-5 * length && height > 1e-5 * length
+}
