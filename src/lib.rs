@@ -1,9 +1,48 @@
+//! Contact between rigid bodies: graph-colored sequential impulses on wgpu compute shaders, with a CPU reference that
+//! follows the same plan.
+//!
+//! One step is a straight line, [`Simulation::step`]:
+//!
+//! ```text
+//! detect   parry: tree over boxes -> persistent manifolds, at most 4 points   world  -> manifolds   collide
+//! color    greedy, deterministic; only bodies that can move count             pairs  -> colors      graph
+//! prepare  arms, masses, separations, carried-over impulses                   ...    -> StepProblem problem
+//! plan     substeps x (velocities, warm start, sweep, positions, relax)       config -> StepPlan    plan
+//! run      reference or GPU, the same kernels                                 in place              backend
+//! store    poses, velocities, impulses back                                   -> world, manifolds   problem
+//! ```
+//!
+//! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
+//! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
+//! to be compared with.
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod backend;
+pub mod collide;
 pub mod config;
 pub mod error;
+pub mod graph;
+pub mod kernels;
+pub mod math;
+pub mod metrics;
+pub mod plan;
+pub mod problem;
 pub mod scenes;
+pub mod simulation;
+pub mod stats;
 pub mod world;
 
+pub use backend::Backend;
+pub use backend::cpu::Reference;
+pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
 pub use error::{Error, Result};
+pub use glam;
+pub use plan::StepPlan;
+pub use problem::StepProblem;
 pub use scenes::Scene;
-pub use world::{Body, BodyKind, Material, Shape, World};
+pub use simulation::Simulation;
+pub use stats::StepStats;
+pub use world::{Body, BodyKind, MassProperties, Material, Shape, World};

@@ -1,0 +1,33 @@
+// apply_restitution: one thread makes the points of one manifold bounce that were hit fast enough.
+// Reads contacts, points, masses. Writes impulses, and bodies that can move.
+// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
+// Double: src/kernels/contact.rs.
+
+fn restitute_contact(i: u32) {
+    let contact = contacts[i];
+    var pair = load_pair(contact);
+    for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
+        let point = points[k];
+        var impulse = impulses[k];
+        let bounces = -params.restitution_threshold > point.approach_velocity && impulse.peak > 0.0;
+        let vn = dot3(relative_velocity(&pair, point), contact.normal);
+        let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
+        let sum = select(impulse.normal, larger(impulse.normal + correction, 0.0), bounces);
+        let change = sum - impulse.normal;
+        impulse.normal = sum;
+        impulse.peak = larger(impulse.peak, sum);
+        impulses[k] = impulse;
+        apply_impulse(&pair, point, contact.normal * change);
+    }
+    store_pair(contact, &pair);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn apply_restitution(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var color = pass_colors.first; color < pass_colors.end; color++) {
+        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
+            restitute_contact(i);
+        }
+        storageBarrier();
+    }
+}

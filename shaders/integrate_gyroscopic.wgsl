@@ -1,0 +1,53 @@
+// integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint,
+// and turns its inverse inertia along. Reads inertias. Writes bodies and masses; one thread a body.
+// Double: src/kernels/integrate.rs.
+
+// Solves rows x = g by Cramer's rule.
+fn solve_3x3(row_0: vec3f, row_1: vec3f, row_2: vec3f, g: vec3f) -> vec3f {
+    let c_0 = cross3(row_1, row_2);
+    let c_1 = cross3(row_2, row_0);
+    let c_2 = cross3(row_0, row_1);
+    return (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0));
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var i = id.x; i < params.inertia_count; i += groups.x * WORKGROUP) {
+        let inertia = inertias[i];
+        let k = inertia.inv_principal;
+
+        // The principal axes now.
+        let q = quat_mul(bodies[inertia.body].dq, inertia.frame);
+        let x = turned(q, vec3f(1.0, 0.0, 0.0)) + vec3f(1.0, 0.0, 0.0);
+        let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
+        let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
+
+        // Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
+        let w = bodies[inertia.body].w;
+        let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
+        var next = spin;
+        for (var step = 0u; step < 2u; step++) {
+            let m = (spin + next) * 0.5;
+            let l = inertia.principal * m;
+            let residual = (next - spin) + k * (cross3(m, l) * params.substep);
+            let f = k * (params.substep * 0.5);
+            let p = inertia.principal;
+            let row_0 = vec3f(1.0, f.x * (l.z - m.z * p.y), f.x * (m.y * p.z - l.y));
+            let row_1 = vec3f(f.y * (m.z * p.x - l.z), 1.0, f.y * (l.x - m.x * p.z));
+            let row_2 = vec3f(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), 1.0);
+            next -= solve_3x3(row_0, row_1, row_2, residual);
+        }
+        bodies[inertia.body].w = x * next.x + y * next.y + z * next.z;
+
+        // The inverse inertia in world axes.
+        let kx = x * k.x;
+        let ky = y * k.y;
+        let kz = z * k.z;
+        masses[inertia.body].inv_inertia_x = x * kx.x + y * ky.x + z * kz.x;
+        masses[inertia.body].inv_inertia_yz = vec3f(
+            x.y * kx.y + y.y * ky.y + z.y * kz.y,
+            x.z * kx.y + y.z * ky.y + z.z * kz.y,
+            x.z * kx.z + y.z * ky.z + z.z * kz.z,
+        );
+    }
+}

@@ -1,0 +1,59 @@
+// Arithmetic that gives the same bits everywhere: + - * and comparisons only, in a written order.
+// Doubles: src/math.rs.
+
+fn larger(a: f32, b: f32) -> f32 { return select(b, a, a > b); }
+
+fn smaller(a: f32, b: f32) -> f32 { return select(b, a, b > a); }
+
+fn dot3(a: vec3f, b: vec3f) -> f32 { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+fn cross3(a: vec3f, b: vec3f) -> vec3f {
+    return vec3f(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+// 1/sqrt(x) for normal positive x: a guess from the exponent, then three Newton steps (about 1 ulp).
+fn inverse_sqrt(x: f32) -> f32 {
+    let half_x = 0.5 * x;
+    var y = bitcast<f32>(0x5f375a86u - (bitcast<u32>(x) >> 1u));
+    y = y * (1.5 - half_x * y * y);
+    y = y * (1.5 - half_x * y * y);
+    y = y * (1.5 - half_x * y * y);
+    return y;
+}
+
+// 1/x, of either sign.
+fn reciprocal(x: f32) -> f32 {
+    let y = inverse_sqrt(x * x);
+    return x * (y * y);
+}
+
+fn quat_mul(a: vec4f, b: vec4f) -> vec4f {
+    return vec4f(
+        a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+        a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+        a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
+        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
+    );
+}
+
+// How far the rotation q moves the arm r: q r - r, without the cancellation of that difference.
+fn turned(q: vec4f, r: vec3f) -> vec3f {
+    let axis = q.xyz;
+    let t = cross3(axis, r);
+    return (t * q.w + cross3(axis, t)) * 2.0;
+}
+
+// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad).
+fn exp_rotation(r: vec3f) -> vec4f {
+    let u = r * 0.5;
+    let s = dot3(u, u);
+    let cosine = 1.0 + s * (-0.5 + s * (4.1666668e-2 + s * (-1.3888889e-3 + s * (2.4801587e-5 + s * -2.7557319e-7))));
+    let sinc = 1.0 + s * (-1.6666667e-1 + s * (8.3333333e-3 + s * (-1.9841270e-4 + s * (2.7557319e-6 + s * -2.5052108e-8))));
+    return vec4f(u.x * sinc, u.y * sinc, u.z * sinc, cosine);
+}
+
+// A nearly unit quaternion, closer to unit length by one Newton step.
+fn renormalized(q: vec4f) -> vec4f {
+    let s = 1.5 - 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    return vec4f(q.x * s, q.y * s, q.z * s, q.w * s);
+}

@@ -1,0 +1,37 @@
+// The rows of a StepProblem. Layout, names and units: src/problem/layout.rs, held together by tests/shaders.rs.
+
+struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
+
+struct Mass {
+    inv_inertia_x: vec3f, inv_mass: f32,
+    inv_inertia_yz: vec3f,
+    acceleration: vec3f,
+}
+
+struct Inertia { principal: vec3f, body: u32, inv_principal: vec3f, frame: vec4f }
+
+struct Contact {
+    normal: vec3f, friction: f32,
+    tangent: vec3f, restitution: f32,
+    body_a: u32, body_b: u32, first_point: u32, point_count: u32,
+}
+
+struct Point {
+    r_a: vec3f, separation: f32,
+    r_b: vec3f, normal_mass: f32,
+    tangent_mass: f32, approach_velocity: f32, radius_a: f32, radius_b: f32,
+}
+
+struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
+
+struct Softness { bias_rate: f32, mass_scale: f32, impulse_scale: f32, push_limit: f32 }
+
+struct Params {
+    substep: f32, inverse_substep: f32, restitution_threshold: f32, inertia_count: u32,
+    movable: Softness,
+    fixed: Softness,
+    body_count: u32,
+}
+
+// The colors that one dispatch sweeps, one after another.
+struct PassColors { first: u32, end: u32 }

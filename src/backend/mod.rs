@@ -1,0 +1,28 @@
+//! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
+
+pub mod cpu;
+pub mod gpu;
+
+use crate::error::Result;
+use crate::plan::Pass;
+use crate::problem::StepProblem;
+
+/// Something that can run the passes of a plan.
+pub trait Backend: Send {
+    /// `reference`, `cpu` or `gpu`.
+    fn name(&self) -> &'static str;
+
+    /// What it runs on, for people.
+    fn adapter(&self) -> String;
+
+    /// Runs the passes in order; `bodies` and `impulses` of the problem are what they leave behind.
+    ///
+    /// # Errors
+    /// The problem does not fit the device, or the device is lost.
+    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()>;
+
+    /// Bytes that one run of `problem` sends to the device and reads back.
+    fn bytes_transferred(&self, _problem: &StepProblem) -> u64 {
+        0
+    }
+}

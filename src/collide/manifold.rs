@@ -1,0 +1,206 @@
+//! A contact manifold that lives on from step to step: at most four points, chosen and matched deterministically.
+
+use glam::Vec3;
+
+/// Most points that a manifold keeps.
+pub const MAX_POINTS: usize = 4;
+
+/// One contact point, anchored on both bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ManifoldPoint {
+    /// On the surface of a, in a's frame [m].
+    pub anchor_a: Vec3,
+    /// On the surface of b, in b's frame [m].
+    pub anchor_b: Vec3,
+    /// From the centre of mass of a to the point midway between the surfaces, world axes [m].
+    pub r_a: Vec3,
+    /// From the centre of mass of b to that point [m].
+    pub r_b: Vec3,
+    /// Distance along the normal now, negative when overlapping [m].
+    pub separation: f32,
+    /// The same when the manifold was computed.
+    pub(super) computed_separation: f32,
+    /// parry's features of a and b; 0 if unknown.
+    pub features: u64,
+    /// Normal impulse of the last substep [N s].
+    pub normal_impulse: f32,
+    /// Friction impulse on b of the last substep, world axes [N s].
+    pub friction_impulse: Vec3,
+}
+
+/// The contact of two bodies over one pair of convex parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Manifold {
+    /// Unit normal from a to b, world axes.
+    pub normal: Vec3,
+    /// Which triangles or cells of a composite shape; (0, 0) for convex shapes.
+    pub parts: (u32, u32),
+    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp [m].
+    pub radius_a: f32,
+    /// Radius of curvature of b's surface where it touches [m].
+    pub radius_b: f32,
+    /// Color in the constraint graph; none until it has been given one.
+    pub color: Option<u8>,
+    points: [ManifoldPoint; MAX_POINTS],
+    count: u8,
+}
+
+impl Manifold {
+    /// A manifold of at most four of the `candidates`.
+    pub(super) fn new(normal: Vec3, parts: (u32, u32), candidates: &[ManifoldPoint]) -> Self {
+        let mut points = [ManifoldPoint::default(); MAX_POINTS];
+        let count = reduce(normal, candidates, &mut points);
+        Self { normal, parts, radius_a: 0.0, radius_b: 0.0, color: None, points, count: count as u8 }
+    }
+
+    /// Its points.
+    pub fn points(&self) -> &[ManifoldPoint] {
+        &self.points[..self.count as usize]
+    }
+
+    /// Its points, to write impulses and separations into.
+    pub fn points_mut(&mut self) -> &mut [ManifoldPoint] {
+        &mut self.points[..self.count as usize]
+    }
+
+    /// Takes over color and impulses of the same contact one step earlier: points match by feature and, where that
+    /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` [m].
+    pub(super) fn inherit(&mut self, old: &Self, distance: f32) {
+        self.color = old.color;
+        let mut taken = [false; MAX_POINTS];
+        let mut matched = [false; MAX_POINTS];
+        for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
+            let same = |o: &ManifoldPoint| o.features == point.features && point.features != 0;
+            if let Some(j) = (0..old.points().len()).find(|&j| !taken[j] && same(&old.points[j])) {
+                point.take_impulses(&old.points[j]);
+                (taken[j], matched[i]) = (true, true);
+            }
+        }
+        for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
+            if matched[i] {
+                continue;
+            }
+            let apart = |o: &ManifoldPoint| {
+                let on_a = o.anchor_a.distance_squared(point.anchor_a);
+                on_a.min(o.anchor_b.distance_squared(point.anchor_b))
+            };
+            let free = (0..old.points().len()).filter(|&j| !taken[j]);
+            let nearest = free.map(|j| (apart(&old.points[j]), j)).min_by(|x, y| x.0.total_cmp(&y.0));
+            if let Some((_, j)) = nearest.filter(|n| n.0 <= distance * distance) {
+                point.take_impulses(&old.points[j]);
+                taken[j] = true;
+            }
+        }
+    }
+}
+
+impl ManifoldPoint {
+    fn take_impulses(&mut self, old: &Self) {
+        self.normal_impulse = old.normal_impulse;
+        self.friction_impulse = old.friction_impulse;
+    }
+}
+
+/// Keeps at most four candidates: the deepest, the furthest from it, the one that spans the widest triangle with both,
+/// and the one that adds most area. Ties go to the smaller arm, so the order of arrival does not matter.
+fn reduce(normal: Vec3, candidates: &[ManifoldPoint], kept: &mut [ManifoldPoint; MAX_POINTS]) -> usize {
+    if candidates.len() <= MAX_POINTS {
+        kept[..candidates.len()].copy_from_slice(candidates);
+        return candidates.len();
+    }
+    let best = |score: &dyn Fn(&ManifoldPoint) -> f32| {
+        let order = |p: &ManifoldPoint, q: &ManifoldPoint| {
+            let (p_at, q_at) = (p.r_a.to_array(), q.r_a.to_array());
+            score(p).total_cmp(&score(q)).then_with(|| q_at.partial_cmp(&p_at).unwrap_or(std::cmp::Ordering::Equal))
+        };
+        *candidates.iter().max_by(|p, q| order(p, q)).expect("there are candidates")
+    };
+    // Twice the signed area of the triangle, seen along the normal.
+    let area = |p: Vec3, q: Vec3, r: Vec3| (q - p).cross(r - p).dot(normal);
+    let deepest = best(&|p| -p.separation);
+    let a = deepest.r_a;
+    let furthest = best(&|p| p.r_a.distance_squared(a));
+    let b = furthest.r_a;
+    let widest = best(&|p| area(a, b, p.r_a).abs());
+    let c = widest.r_a;
+    let side = area(a, b, c);
+    if side == 0.0 {
+        // All in a line: its ends carry everything.
+        kept[0] = deepest;
+        kept[1] = furthest;
+        return 2;
+    }
+    // Area gained outside the triangle: beyond the edge that the point is on the far side of.
+    let gain = |p: &ManifoldPoint| {
+        let s = side.signum();
+        let q = p.r_a;
+        (-s * area(a, b, q)).max(-s * area(b, c, q)).max(-s * area(c, a, q))
+    };
+    let last = best(&gain);
+    kept[..3].copy_from_slice(&[deepest, furthest, widest]);
+    if gain(&last) > 0.0 {
+        kept[3] = last;
+        return 4;
+    }
+    3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f32, z: f32, separation: f32) -> ManifoldPoint {
+        let at = Vec3::new(x, 0.0, z);
+        ManifoldPoint { anchor_a: at, anchor_b: at, r_a: at, separation, ..Default::default() }
+    }
+
+    fn octagon() -> Vec<ManifoldPoint> {
+        let corner = |i: i32| {
+            let (s, c) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+            point(c, s, -0.001 * i as f32)
+        };
+        (0..8).map(corner).collect()
+    }
+
+    #[test]
+    fn eight_points_become_four_that_span_nearly_all_of_their_area() {
+        let m = Manifold::new(Vec3::Y, (0, 0), &octagon());
+        assert_eq!(m.points().len(), 4);
+        assert!(m.points().iter().any(|p| p.separation == -0.007), "the deepest is kept");
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| m.points()[i].anchor_a);
+        // Deepest and furthest are a diagonal, the other two lie on its two sides.
+        let area = 0.5 * ((b - a).cross(c - a).length() + (b - a).cross(d - a).length());
+        assert!(area > 1.9, "{area} of the 2.83 of the octagon; a square has 2");
+    }
+
+    #[test]
+    fn the_choice_does_not_depend_on_the_order_of_arrival() {
+        let mut points = octagon();
+        let sorted = |m: Manifold| {
+            let mut v: Vec<_> = m.points().iter().map(|p| p.anchor_a.to_array()).collect();
+            v.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            v
+        };
+        let first = sorted(Manifold::new(Vec3::Y, (0, 0), &points));
+        for _ in 0..8 {
+            points.rotate_left(1);
+            points.swap(0, 3);
+            assert_eq!(first, sorted(Manifold::new(Vec3::Y, (0, 0), &points)));
+        }
+    }
+
+    #[test]
+    fn points_match_by_feature_then_by_position_and_never_twice() {
+        let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0), point(1.0, 0.0, 0.0)]);
+        old.points_mut()[0].features = 7;
+        old.points_mut()[0].normal_impulse = 3.0;
+        old.points_mut()[1].normal_impulse = 5.0;
+        // The first moved far but kept its feature, the second kept its place, the third is new.
+        let mut moved = [point(0.5, 0.0, 0.0), point(1.001, 0.0, 0.0), point(1.002, 0.0, 0.0)];
+        moved[0].features = 7;
+        let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);
+        new.inherit(&old, 0.01);
+        let impulses: Vec<f32> = new.points().iter().map(|p| p.normal_impulse).collect();
+        assert_eq!(impulses, [3.0, 5.0, 0.0]);
+    }
+}

@@ -1,0 +1,249 @@
+//! Collision detection: parry's tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
+//!
+//! The tree holds fattened boxes and is touched only where a collider left its own; pairs live in slots, in the order
+//! in which they were found, so that every later stage is deterministic for any number of threads.
+
+mod manifold;
+mod narrow;
+
+pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
+pub use narrow::Pair;
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, DefaultHasher};
+
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+use parry3d::math::Pose;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use rayon::prelude::*;
+
+use crate::config::SolverConfig;
+use crate::world::{Body, BodyKind, World};
+use narrow::{ColliderInfo, Margins, Moving, Scratch, Update};
+
+/// What one detection did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DetectStats {
+    /// Pairs whose boxes overlap.
+    pub pairs: usize,
+    /// Pairs whose manifolds were computed; the others were reused.
+    pub computed: usize,
+}
+
+/// Finds the contacts of a world and keeps them from step to step.
+pub struct Detector {
+    colliders: Vec<ColliderInfo>,
+    kinds: Vec<BodyKind>,
+    moving: Vec<Moving>,
+    unbounded: Vec<u32>,
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    /// Fattened box of each collider, as the tree has it.
+    fat: Vec<Aabb>,
+    pairs: Vec<Pair>,
+    slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
+    found: Vec<(u32, u32)>,
+}
+
+/// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
+const FAT: f32 = 0.1;
+
+impl Detector {
+    /// A detector for the bodies of `world`, whose number, shapes and kinds stay as they are.
+    pub fn new(world: &World) -> Self {
+        let collider = |(body, c): (usize, &crate::world::Collider)| {
+            let bounding = c.shape.bounding_radius();
+            ColliderInfo {
+                body: body as u32,
+                shape: c.shape.0.clone(),
+                local: Pose::from_parts(c.position, c.rotation),
+                size: c.shape.smallest_half_extent(),
+                reach: c.position.length() + bounding,
+                unbounded: c.shape.0.as_halfspace().is_some(),
+            }
+        };
+        let on_body =
+            |(i, b): (usize, &Body)| b.colliders.iter().map(move |c| (i, c)).map(collider).collect::<Vec<_>>();
+        let colliders: Vec<_> = world.bodies.iter().enumerate().flat_map(on_body).collect();
+        let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
+        Self {
+            colliders,
+            kinds: world.bodies.iter().map(|b| b.kind).collect(),
+            moving: Vec::new(),
+            unbounded,
+            tree: Bvh::new(),
+            workspace: BvhWorkspace::default(),
+            fat: Vec::new(),
+            pairs: Vec::new(),
+            slots: HashMap::default(),
+            found: Vec::new(),
+        }
+    }
+
+    /// The pairs whose boxes overlap, with the manifolds they touch with. The order is the same for any thread count.
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// The same, to write impulses and colors into.
+    pub fn pairs_mut(&mut self) -> &mut [Pair] {
+        &mut self.pairs
+    }
+
+    /// Brings pairs and manifolds to the poses of `world`, for a step of `dt` seconds.
+    pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32) -> DetectStats {
+        self.moving.clear();
+        self.moving.extend(world.bodies.iter().map(|b| Moving {
+            position: b.position,
+            rotation: b.rotation,
+            center: b.center_of_mass(),
+            v: b.linear_velocity,
+            w: b.angular_velocity,
+        }));
+        let margins = Margins { speculative: config.speculative_margin, recycle: config.recycle_distance, dt };
+        self.broad_phase(margins);
+        self.narrow_phase(margins)
+    }
+
+    /// Computes every manifold anew at the poses of `world`: for measuring, where reused ones would be a little off.
+    pub fn detect_anew(&mut self, world: &World, config: &SolverConfig, dt: f32) -> DetectStats {
+        self.pairs.iter_mut().for_each(Pair::invalidate);
+        self.detect(world, config, dt)
+    }
+
+    fn broad_phase(&mut self, margins: Margins) {
+        // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
+        let tight = |c: &ColliderInfo| {
+            let body = &self.moving[c.body as usize];
+            let pose = Pose::from_parts(body.position, body.rotation) * c.local;
+            let mut aabb = c.shape.compute_aabb(&pose).loosened(margins.speculative * c.size);
+            let sweep = body.v * margins.dt;
+            aabb.mins += sweep.min(glam::Vec3::ZERO);
+            aabb.maxs += sweep.max(glam::Vec3::ZERO);
+            aabb
+        };
+        if self.fat.is_empty() {
+            let fatten = |c: &ColliderInfo| if c.unbounded { empty_box() } else { tight(c).loosened(FAT * c.size) };
+            self.fat = self.colliders.iter().map(fatten).collect();
+            self.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &self.fat);
+            self.found.clear();
+            let found = &mut self.found;
+            self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+            self.find_unbounded((0..self.colliders.len() as u32).collect());
+        } else {
+            let kinds = &self.kinds;
+            let left = |(i, c): (usize, &ColliderInfo)| {
+                if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded {
+                    return None;
+                }
+                let aabb = tight(c);
+                (!self.fat[i].contains(&aabb) && is_finite(&aabb)).then_some((i as u32, aabb))
+            };
+            let moved: Vec<_> = self.colliders.par_iter().enumerate().filter_map(left).collect();
+            self.found.clear();
+            if !moved.is_empty() {
+                for (i, aabb) in &moved {
+                    let margin = FAT * self.colliders[*i as usize].size;
+                    self.tree.insert_or_update_partially(*aabb, *i, margin);
+                    self.fat[*i as usize] = aabb.loosened(margin);
+                }
+                self.tree.optimize_incremental(&mut self.workspace);
+                self.tree.refit(&mut self.workspace);
+                let found = &mut self.found;
+                self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+                self.find_unbounded(moved.iter().map(|m| m.0).collect());
+                self.drop_parted();
+            }
+        }
+        self.add_found();
+    }
+
+    /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
+    fn find_unbounded(&mut self, moved: Vec<u32>) {
+        let mut found = std::mem::take(&mut self.found);
+        for &plane in &self.unbounded {
+            let near = moved.iter().filter(|&&c| plane != c && self.touches(plane, c));
+            found.extend(near.map(|&c| (plane, c)));
+        }
+        self.found = found;
+    }
+
+    /// Whether the fattened boxes of two colliders still overlap.
+    fn touches(&self, a: u32, b: u32) -> bool {
+        let (ca, cb) = (&self.colliders[a as usize], &self.colliders[b as usize]);
+        match (ca.unbounded, cb.unbounded) {
+            (false, false) => self.fat[a as usize].intersects(&self.fat[b as usize]),
+            (true, true) => false,
+            (true, false) => self.box_reaches_plane(ca, &self.fat[b as usize]),
+            (false, true) => self.box_reaches_plane(cb, &self.fat[a as usize]),
+        }
+    }
+
+    fn box_reaches_plane(&self, plane: &ColliderInfo, aabb: &Aabb) -> bool {
+        let body = &self.moving[plane.body as usize];
+        let pose = Pose::from_parts(body.position, body.rotation) * plane.local;
+        let Some(half_space) = plane.shape.as_halfspace() else { return false };
+        let normal = pose.rotation * half_space.normal;
+        let deepest = (aabb.center() - pose.translation).dot(normal) - aabb.half_extents().dot(normal.abs());
+        deepest <= 0.0
+    }
+
+    /// Ends the pairs whose boxes came apart; the last pair takes an ended one's slot.
+    fn drop_parted(&mut self) {
+        let mut slot = 0;
+        while slot < self.pairs.len() {
+            let pair = &self.pairs[slot];
+            if self.touches(pair.collider_a, pair.collider_b) {
+                slot += 1;
+                continue;
+            }
+            self.slots.remove(&key(pair.collider_a, pair.collider_b));
+            self.pairs.swap_remove(slot);
+            if let Some(moved) = self.pairs.get(slot) {
+                self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
+            }
+        }
+    }
+
+    /// Begins the pairs that are new, of different bodies of which one can be pushed, the further reaching first.
+    fn add_found(&mut self) {
+        for &(i, j) in &self.found {
+            let (ci, cj) = (&self.colliders[i as usize], &self.colliders[j as usize]);
+            let dynamic = |c: &ColliderInfo| self.kinds[c.body as usize] == BodyKind::Dynamic;
+            if ci.body == cj.body || !(dynamic(ci) || dynamic(cj)) {
+                continue;
+            }
+            let slot = self.pairs.len() as u32;
+            if let std::collections::hash_map::Entry::Vacant(entry) = self.slots.entry(key(i, j)) {
+                entry.insert(slot);
+                let (first, second) = (i.min(j), i.max(j));
+                let swap = self.colliders[second as usize].reach > self.colliders[first as usize].reach;
+                let (a, b) = if swap { (second, first) } else { (first, second) };
+                self.pairs.push(Pair::new(a, b, &self.colliders));
+            }
+        }
+    }
+
+    fn narrow_phase(&mut self, margins: Margins) -> DetectStats {
+        let (colliders, moving) = (&self.colliders, &self.moving);
+        let update = |scratch: &mut Scratch, pair: &mut Pair| {
+            let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
+            usize::from(pair.update(colliders, a, b, margins, scratch) == Update::Computed)
+        };
+        let computed = self.pairs.par_iter_mut().with_min_len(64).map_init(Scratch::default, update).sum();
+        DetectStats { pairs: self.pairs.len(), computed }
+    }
+}
+
+fn key(i: u32, j: u32) -> (u32, u32) {
+    (i.min(j), i.max(j))
+}
+
+/// A box that overlaps nothing, far from everything.
+fn empty_box() -> Aabb {
+    Aabb::new(glam::Vec3::splat(f32::MAX / 4.0), glam::Vec3::splat(f32::MAX / 4.0))
+}
+
+fn is_finite(aabb: &Aabb) -> bool {
+    aabb.mins.is_finite() && aabb.maxs.is_finite()
+}

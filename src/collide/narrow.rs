@@ -1,0 +1,268 @@
+//! The contact of one pair of colliders: reused while they hardly moved, else asked of parry.
+
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use parry3d::shape::{SharedShape, TypedShape};
+
+use super::manifold::{Manifold, ManifoldPoint};
+
+/// A collider with what the detection asks of it all the time.
+#[derive(Clone)]
+pub(super) struct ColliderInfo {
+    pub body: u32,
+    pub shape: SharedShape,
+    /// Place in the body's frame.
+    pub local: Pose,
+    /// Half of the smallest side [m].
+    pub size: f32,
+    /// Radius around the body's origin that holds the collider [m].
+    pub reach: f32,
+    /// Half-spaces have no box to put into the tree.
+    pub unbounded: bool,
+}
+
+impl ColliderInfo {
+    fn is_composite(&self) -> bool {
+        self.shape.as_trimesh().is_some() || self.shape.as_heightfield().is_some()
+    }
+}
+
+/// Two colliders whose boxes overlap.
+#[derive(Clone, Debug)]
+pub struct Pair {
+    /// The body with the collider that reaches further.
+    pub body_a: u32,
+    /// The other body.
+    pub body_b: u32,
+    /// What they touch with.
+    pub manifolds: Vec<Manifold>,
+    pub(super) collider_a: u32,
+    pub(super) collider_b: u32,
+    /// Where the bodies were when the manifolds were computed; none if they never were.
+    computed_at: Option<[Placed; 2]>,
+    /// Distance up to which that computation looked [m].
+    looked: f32,
+}
+
+/// Where a body is: its centre of mass and rotation.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    center: Vec3,
+    rotation: Quat,
+}
+
+impl Placed {
+    fn of(body: &Moving) -> Self {
+        Self { center: body.center, rotation: body.rotation }
+    }
+
+    /// Rotation since `then`, by the shorter way.
+    fn turn_since(&self, then: &Self) -> Quat {
+        let turn = self.rotation * then.rotation.conjugate();
+        if turn.w < 0.0 { -turn } else { turn }
+    }
+}
+
+/// Pose and velocity of a body, as far as the detection needs it.
+#[derive(Clone, Copy)]
+pub(super) struct Moving {
+    pub position: Vec3,
+    pub rotation: Quat,
+    pub center: Vec3,
+    pub v: Vec3,
+    pub w: Vec3,
+}
+
+/// Settings of the detection, as lengths relative to the thinner shape.
+#[derive(Clone, Copy)]
+pub(super) struct Margins {
+    pub speculative: f32,
+    pub recycle: f32,
+    pub dt: f32,
+}
+
+/// Memory that one thread reuses from pair to pair.
+#[derive(Default)]
+pub(super) struct Scratch {
+    one: ContactManifold<(), ()>,
+    many: Vec<ContactManifold<(), ()>>,
+    candidates: Vec<ManifoldPoint>,
+    old: Vec<Manifold>,
+}
+
+/// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.1 rad.
+const RECYCLE_TURN: f32 = 0.0025;
+
+/// How a pair was brought up to date.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Update {
+    Reused,
+    Computed,
+}
+
+impl Pair {
+    pub(super) fn new(collider_a: u32, collider_b: u32, colliders: &[ColliderInfo]) -> Self {
+        let body = |c: u32| colliders[c as usize].body;
+        Self {
+            body_a: body(collider_a),
+            body_b: body(collider_b),
+            manifolds: Vec::new(),
+            collider_a,
+            collider_b,
+            computed_at: None,
+            looked: 0.0,
+        }
+    }
+
+    /// Brings the manifolds to the poses `a` and `b`.
+    pub(super) fn update(
+        &mut self,
+        colliders: &[ColliderInfo],
+        a: &Moving,
+        b: &Moving,
+        margins: Margins,
+        scratch: &mut Scratch,
+    ) -> Update {
+        let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
+        let size = ca.size.min(cb.size);
+        let approach = (b.v - a.v).length() + cb.reach * (b.w - a.w).length();
+        let base = margins.speculative * size;
+        let look = base + (approach * margins.dt).min(2.0 * size);
+
+        if let Some([a_then, b_then]) = &self.computed_at {
+            let (a_now, b_now) = (Placed::of(a), Placed::of(b));
+            let (turn_a, turn_b) = (a_now.turn_since(a_then), b_now.turn_since(b_then));
+            // How far any point of b that can touch moved as seen from a. 2 |vector part| is the angle, if small.
+            let carried = b_then.center - a_then.center;
+            let shift = (b_now.center - a_now.center) - (turn_a * carried);
+            let turn = turn_a.conjugate() * turn_b;
+            let moved = shift.length() + 2.0 * turn.xyz().length() * cb.reach;
+            let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
+            if moved < margins.recycle * size && turned < RECYCLE_TURN && look <= self.looked + 0.5 * base {
+                let drift = (b_now.center - a_now.center) - carried;
+                self.refresh(drift, turn_a, turn_b);
+                return Update::Reused;
+            }
+        }
+        self.computed_at = Some([Placed::of(a), Placed::of(b)]);
+        self.looked = look;
+        self.compute(ca, cb, a, b, look, size, scratch);
+        Update::Computed
+    }
+
+    /// Forgets when the manifolds were computed, so that the next update computes them anew.
+    pub(super) fn invalidate(&mut self) {
+        self.computed_at = None;
+    }
+
+    /// Separations of the same points at new poses: normal and arms stay, as they do from substep to substep.
+    fn refresh(&mut self, drift: Vec3, turn_a: Quat, turn_b: Quat) {
+        for manifold in &mut self.manifolds {
+            let normal = manifold.normal;
+            let (core_a, core_b) = (normal * manifold.radius_a, normal * manifold.radius_b);
+            for p in manifold.points_mut() {
+                let moved = drift + turned_arm(turn_b, p.r_b + core_b) - turned_arm(turn_a, p.r_a - core_a);
+                p.separation = p.computed_separation + moved.dot(normal);
+            }
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn compute(
+        &mut self,
+        ca: &ColliderInfo,
+        cb: &ColliderInfo,
+        a: &Moving,
+        b: &Moving,
+        look: f32,
+        size: f32,
+        scratch: &mut Scratch,
+    ) {
+        let pose_a = Pose::from_parts(a.position, a.rotation) * ca.local;
+        let pose_b = Pose::from_parts(b.position, b.rotation) * cb.local;
+        let pos12 = pose_a.inv_mul(&pose_b);
+        let Scratch { one, many, candidates, old } = scratch;
+        let found: &[ContactManifold<(), ()>] = if ca.is_composite() || cb.is_composite() {
+            many.clear();
+            // An unsupported pair (two meshes) cannot occur: both would be fixed.
+            let _ = DefaultQueryDispatcher.contact_manifolds(&pos12, &*ca.shape, &*cb.shape, look, many, &mut None);
+            many
+        } else {
+            one.clear();
+            if let (Some(box_a), Some(box_b)) = (ca.shape.as_cuboid(), cb.shape.as_cuboid()) {
+                contact_manifold_cuboid_cuboid(&pos12, box_a, box_b, look, one);
+            } else {
+                let dispatcher = DefaultQueryDispatcher;
+                let _ =
+                    dispatcher.contact_manifold_convex_convex(&pos12, &*ca.shape, &*cb.shape, None, None, look, one);
+            }
+            std::slice::from_ref(one)
+        };
+
+        std::mem::swap(&mut self.manifolds, old);
+        self.manifolds.clear();
+        for m in found {
+            candidates.clear();
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], look)));
+            if candidates.is_empty() {
+                continue;
+            }
+            let normal_a = m.subshape_pos1().map_or(m.local_n1, |pose| pose.rotation * m.local_n1);
+            // Coincident centres leave no direction: up is as good as any, and finite.
+            let normal = (pose_a.rotation * normal_a).try_normalize().unwrap_or(Vec3::Y);
+            let mut manifold = Manifold::new(normal, (m.subshape1, m.subshape2), candidates);
+            manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
+            manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
+            if let Some(o) = old.iter().find(|o| o.parts == manifold.parts) {
+                manifold.inherit(o, 0.1 * size);
+            }
+            self.manifolds.push(manifold);
+        }
+        old.clear();
+    }
+}
+
+/// A point of parry's as one of ours; none if it is not finite or too far away.
+fn candidate(
+    m: &ContactManifold<(), ()>,
+    p: &TrackedContact<()>,
+    [(ca, a), (cb, b)]: [(&ColliderInfo, &Moving); 2],
+    look: f32,
+) -> Option<ManifoldPoint> {
+    let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
+    let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
+    let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
+    // Arms to the point midway between the surfaces; differences of centres first, which are small.
+    let on_a = a.rotation * anchor_a - (a.center - a.position);
+    let on_b = b.rotation * anchor_b - (b.center - b.position);
+    let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a);
+    let usable = p.dist <= look && p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
+    usable.then(|| ManifoldPoint {
+        anchor_a,
+        anchor_b,
+        r_a: on_a + half_gap,
+        r_b: on_b - half_gap,
+        separation: p.dist,
+        computed_separation: p.dist,
+        features: u64::from(p.fid1.0) << 32 | u64::from(p.fid2.0),
+        ..ManifoldPoint::default()
+    })
+}
+
+/// How far the rotation moves the arm.
+fn turned_arm(q: Quat, r: Vec3) -> Vec3 {
+    let t = q.xyz().cross(r);
+    2.0 * (t * q.w + q.xyz().cross(t))
+}
+
+/// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) [m].
+fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
+    match c.shape.as_typed_shape() {
+        TypedShape::Ball(ball) => ball.radius,
+        TypedShape::Capsule(capsule) => capsule.radius,
+        TypedShape::Cylinder(cylinder) if normal.y.abs() < 0.1 => cylinder.radius,
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,132 @@
+//! Graph coloring: constraints are put into colors in which no body that a sweep writes occurs twice.
+//!
+//! Integers only. Only bodies that can move count, so a floor costs no color. A constraint keeps its color from step to
+//! step; a new one takes the first that is free on both of its bodies (greedy, in the order given), and the place of an
+//! ended one is free again. Constraints with one movable body have colors of their own, swept last: what rests on
+//! something fixed has the last word. A constraint that finds no color is swept alone, and counted.
+
+/// A body that no sweep writes.
+pub const IMMOVABLE: u32 = u32::MAX;
+
+/// One constraint between two bodies, either of which may be [`IMMOVABLE`], with the color it has so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// One body.
+    pub a: u32,
+    /// The other body.
+    pub b: u32,
+    /// Its color among those of its kind; none if it is new, or found none.
+    pub color: Option<u8>,
+}
+
+impl Edge {
+    fn is_fixed(&self) -> bool {
+        self.a == IMMOVABLE || self.b == IMMOVABLE
+    }
+}
+
+/// The constraints in the order in which they are swept.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Coloring {
+    /// Indices of the edges, color by color.
+    pub order: Vec<u32>,
+    /// Where each color begins in `order`, and where the last ends: one more than there are colors.
+    pub offsets: Vec<u32>,
+    /// Edges that found no color; each stands as a color of its own.
+    pub overflow: u32,
+}
+
+impl Coloring {
+    /// Number of colors, the single ones of the overflow included.
+    pub fn color_count(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+}
+
+/// Which colors each body is in.
+#[derive(Clone, Debug, Default)]
+pub struct ConstraintGraph {
+    /// One bit a color and body, for constraints of two movable bodies and for those with a fixed one.
+    used: [Vec<u64>; 2],
+}
+
+impl ConstraintGraph {
+    /// Gives every edge a color among at most `max_colors` (1 to 64) a kind, and lays them out for sweeping.
+    pub fn color(&mut self, body_count: usize, edges: &mut [Edge], max_colors: u32) -> Coloring {
+        let available = if max_colors >= 64 { u64::MAX } else { (1 << max_colors) - 1 };
+        for used in &mut self.used {
+            used.clear();
+            used.resize(body_count, 0);
+        }
+        // Those that have a color keep it, and so take their place first.
+        for edge in edges.iter_mut() {
+            if let Some(color) = edge.color {
+                if self.free(edge) & available & (1 << color) != 0 {
+                    self.take(edge, color);
+                } else {
+                    edge.color = None;
+                }
+            }
+        }
+        for edge in edges.iter_mut().filter(|e| e.color.is_none()) {
+            let free = self.free(edge) & available;
+            if free != 0 {
+                let color = free.trailing_zeros() as u8;
+                edge.color = Some(color);
+                self.take(edge, color);
+            }
+        }
+        lay_out(edges)
+    }
+
+    /// Colors in which neither body is.
+    fn free(&self, edge: &Edge) -> u64 {
+        let used = &self.used[usize::from(edge.is_fixed())];
+        let of = |body: u32| if body == IMMOVABLE { 0 } else { used[body as usize] };
+        !(of(edge.a) | of(edge.b))
+    }
+
+    fn take(&mut self, edge: &Edge, color: u8) {
+        let used = &mut self.used[usize::from(edge.is_fixed())];
+        for body in [edge.a, edge.b] {
+            if body != IMMOVABLE {
+                used[body as usize] |= 1 << color;
+            }
+        }
+    }
+}
+
+/// Sorts the edges by color: movable ones, their overflow, those with fixed bodies, their overflow.
+fn lay_out(edges: &[Edge]) -> Coloring {
+    // 64 colors and one bucket for the overflow, twice.
+    let bucket = |e: &Edge| 65 * usize::from(e.is_fixed()) + e.color.map_or(64, usize::from);
+    let mut begins = [0_u32; 131];
+    for edge in edges {
+        begins[bucket(edge) + 1] += 1;
+    }
+    for i in 0..130 {
+        begins[i + 1] += begins[i];
+    }
+    let mut offsets = Vec::new();
+    let mut overflow = 0;
+    for i in 0..130 {
+        if begins[i] == begins[i + 1] {
+            continue;
+        }
+        if i % 65 == 64 {
+            overflow += begins[i + 1] - begins[i];
+            offsets.extend(begins[i]..begins[i + 1]);
+        } else {
+            offsets.push(begins[i]);
+        }
+    }
+    offsets.push(edges.len() as u32);
+    let mut order = vec![0; edges.len()];
+    let mut next = begins;
+    for (i, edge) in edges.iter().enumerate() {
+        let place = &mut next[bucket(edge)];
+        order[*place as usize] = i as u32;
+        *place += 1;
+    }
+    Coloring { order, offsets, overflow }
+}

@@ -1,0 +1,253 @@
+//! The rows of a problem as the kernels see them: over a lane, without padding.
+
+use crate::math::{Lane, Quat, Scalar, Vec3, dot3, vec3};
+use crate::problem::{BodyRow, ContactRow, ImpulseRow, InertiaRow, MassRow, Params, PointRow, Softness};
+
+/// Double of the WGSL struct `Body`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Body<L> {
+    /// Velocity of the centre of mass.
+    pub v: Vec3<L>,
+    /// Angular velocity.
+    pub w: Vec3<L>,
+    /// Movement since the step began.
+    pub dp: Vec3<L>,
+    /// Rotation since the step began.
+    pub dq: Quat<L>,
+}
+
+/// A symmetric 3x3 matrix: the upper triangle, row by row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sym3<L> {
+    /// xx xy xz.
+    pub x: Vec3<L>,
+    /// yy yz zz.
+    pub yz: Vec3<L>,
+}
+
+impl<L: Lane> Sym3<L> {
+    /// Double of `inv_inertia_times`.
+    #[inline(always)]
+    pub fn times(self, u: Vec3<L>) -> Vec3<L> {
+        let (p, q) = (self.x, self.yz);
+        vec3(dot3(p, u), p.y * u.x + q.x * u.y + q.y * u.z, p.z * u.x + q.y * u.y + q.z * u.z)
+    }
+}
+
+/// Double of the WGSL struct `Mass`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mass<L> {
+    /// Inverse inertia, world axes.
+    pub inv_inertia: Sym3<L>,
+    /// Inverse mass.
+    pub inv_mass: L,
+    /// Gravity plus force over mass.
+    pub acceleration: Vec3<L>,
+}
+
+/// Double of the WGSL struct `Inertia`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inertia<L> {
+    /// Principal moments.
+    pub principal: Vec3<L>,
+    /// One over the moments.
+    pub inv_principal: Vec3<L>,
+    /// Rotation from the principal axes to the world when the step begins.
+    pub frame: Quat<L>,
+}
+
+/// Double of the WGSL struct `Contact`, without the indices.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact<L> {
+    /// Unit normal from a to b.
+    pub normal: Vec3<L>,
+    /// First unit tangent.
+    pub tangent: Vec3<L>,
+    /// Coulomb coefficient.
+    pub friction: L,
+    /// Restitution.
+    pub restitution: L,
+}
+
+/// Double of the WGSL struct `Point`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point<L> {
+    /// Arm of a.
+    pub r_a: Vec3<L>,
+    /// Arm of b.
+    pub r_b: Vec3<L>,
+    /// Separation when the step begins.
+    pub separation: L,
+    /// Effective mass along the normal.
+    pub normal_mass: L,
+    /// Effective mass of the stiffest tangential direction.
+    pub tangent_mass: L,
+    /// Normal velocity when the step begins.
+    pub approach_velocity: L,
+    /// Radius of curvature of a's surface.
+    pub radius_a: L,
+    /// Radius of curvature of b's surface.
+    pub radius_b: L,
+}
+
+/// Double of the WGSL struct `Impulse`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Impulse<L> {
+    /// Along the normal.
+    pub normal: L,
+    /// Along the first tangent.
+    pub tangent_1: L,
+    /// Along the second tangent.
+    pub tangent_2: L,
+    /// Largest normal impulse so far.
+    pub peak: L,
+}
+
+/// Double of the WGSL struct `Softness`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SoftnessOf<L> {
+    /// Velocity wanted per overlap.
+    pub bias_rate: L,
+    /// Share of the effective mass that acts.
+    pub mass_scale: L,
+    /// Share of the accumulated impulse that is given back.
+    pub impulse_scale: L,
+    /// Fastest that overlap is pushed out.
+    pub push_limit: L,
+}
+
+/// Double of the WGSL struct `Params`, without the counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepParams<L> {
+    /// Length of a substep.
+    pub substep: L,
+    /// One over it.
+    pub inverse_substep: L,
+    /// Approach slower than this does not bounce.
+    pub restitution_threshold: L,
+    /// Contacts of two bodies that can move.
+    pub movable: SoftnessOf<L>,
+    /// Contacts with a body that cannot.
+    pub fixed: SoftnessOf<L>,
+}
+
+/// Double of the WGSL struct `Pair`: two bodies while one thread works on them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pair<L> {
+    /// The body that the normal points away from.
+    pub a: Body<L>,
+    /// The body that the normal points to.
+    pub b: Body<L>,
+    /// Mass of a.
+    pub mass_a: Mass<L>,
+    /// Mass of b.
+    pub mass_b: Mass<L>,
+}
+
+impl<S: Scalar> Body<S> {
+    /// From storage.
+    pub fn load(r: &BodyRow) -> Self {
+        Self { v: Vec3::load(r.v), w: Vec3::load(r.w), dp: Vec3::load(r.dp), dq: Quat::load(r.dq) }
+    }
+
+    /// To storage.
+    pub fn store(&self) -> BodyRow {
+        let (v, w, dp) = (self.v.store(), self.w.store(), self.dp.store());
+        BodyRow { v, pad_v: 0.0, w, pad_w: 0.0, dp, pad_dp: 0.0, dq: self.dq.store() }
+    }
+}
+
+impl<S: Scalar> Mass<S> {
+    /// From storage.
+    pub fn load(r: &MassRow) -> Self {
+        Self {
+            inv_inertia: Sym3 { x: Vec3::load(r.inv_inertia_x), yz: Vec3::load(r.inv_inertia_yz) },
+            inv_mass: S::from_f32(r.inv_mass),
+            acceleration: Vec3::load(r.acceleration),
+        }
+    }
+
+    /// To storage.
+    pub fn store(&self) -> MassRow {
+        MassRow {
+            inv_inertia_x: self.inv_inertia.x.store(),
+            inv_inertia_yz: self.inv_inertia.yz.store(),
+            inv_mass: self.inv_mass.to_f32(),
+            acceleration: self.acceleration.store(),
+            ..MassRow::default()
+        }
+    }
+}
+
+impl<S: Scalar> Inertia<S> {
+    /// From storage.
+    pub fn load(r: &InertiaRow) -> Self {
+        Self {
+            principal: Vec3::load(r.principal),
+            inv_principal: Vec3::load(r.inv_principal),
+            frame: Quat::load(r.frame),
+        }
+    }
+}
+
+impl<S: Scalar> Contact<S> {
+    /// From storage.
+    pub fn load(r: &ContactRow) -> Self {
+        Self {
+            normal: Vec3::load(r.normal),
+            tangent: Vec3::load(r.tangent),
+            friction: S::from_f32(r.friction),
+            restitution: S::from_f32(r.restitution),
+        }
+    }
+}
+
+impl<S: Scalar> Point<S> {
+    /// From storage.
+    pub fn load(r: &PointRow) -> Self {
+        Self {
+            r_a: Vec3::load(r.r_a),
+            r_b: Vec3::load(r.r_b),
+            separation: S::from_f32(r.separation),
+            normal_mass: S::from_f32(r.normal_mass),
+            tangent_mass: S::from_f32(r.tangent_mass),
+            approach_velocity: S::from_f32(r.approach_velocity),
+            radius_a: S::from_f32(r.radius_a),
+            radius_b: S::from_f32(r.radius_b),
+        }
+    }
+}
+
+impl<S: Scalar> Impulse<S> {
+    /// From storage.
+    pub fn load(r: &ImpulseRow) -> Self {
+        let [normal, tangent_1, tangent_2, peak] = [r.normal, r.tangent_1, r.tangent_2, r.peak].map(S::from_f32);
+        Self { normal, tangent_1, tangent_2, peak }
+    }
+
+    /// To storage.
+    pub fn store(&self) -> ImpulseRow {
+        let [normal, tangent_1, tangent_2, peak] =
+            [self.normal, self.tangent_1, self.tangent_2, self.peak].map(S::to_f32);
+        ImpulseRow { normal, tangent_1, tangent_2, peak }
+    }
+}
+
+impl<S: Scalar> StepParams<S> {
+    /// From storage.
+    pub fn load(p: &Params) -> Self {
+        let softness = |s: &Softness| SoftnessOf {
+            bias_rate: S::from_f32(s.bias_rate),
+            mass_scale: S::from_f32(s.mass_scale),
+            impulse_scale: S::from_f32(s.impulse_scale),
+            push_limit: S::from_f32(s.push_limit),
+        };
+        Self {
+            substep: S::from_f32(p.substep),
+            inverse_substep: S::from_f32(p.inverse_substep),
+            restitution_threshold: S::from_f32(p.restitution_threshold),
+            movable: softness(&p.movable),
+            fixed: softness(&p.fixed),
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The rows of a [`StepProblem`](super::StepProblem): plain memory, the same in Rust and WGSL.
+//!
+//! Every struct is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/shaders.rs` compares the
+//! offset of every field by reflection.
+
+use bytemuck::{Pod, Zeroable};
+
+/// State of one body that a step changes, 64 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct BodyRow {
+    /// Velocity of the centre of mass [m/s].
+    pub v: [f32; 3],
+    pub(crate) pad_v: f32,
+    /// Angular velocity, world axes [rad/s].
+    pub w: [f32; 3],
+    pub(crate) pad_w: f32,
+    /// Movement of the centre of mass since the step began [m].
+    pub dp: [f32; 3],
+    pub(crate) pad_dp: f32,
+    /// Rotation since the step began, x y z w.
+    pub dq: [f32; 4],
+}
+
+/// How hard one body is to move, 48 B. All zero for a body that cannot be pushed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MassRow {
+    /// Inverse inertia about the centre of mass, world axes [1/(kg m²)]; xx xy xz.
+    pub inv_inertia_x: [f32; 3],
+    /// Inverse mass [1/kg].
+    pub inv_mass: f32,
+    /// Inverse inertia; yy yz zz.
+    pub inv_inertia_yz: [f32; 3],
+    pub(crate) pad: f32,
+    /// Gravity plus force over mass [m/s²].
+    pub acceleration: [f32; 3],
+    pub(crate) pad_end: f32,
+}
+
+/// Principal inertia of one body whose moments differ, 48 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct InertiaRow {
+    /// Principal moments of inertia [kg m²].
+    pub principal: [f32; 3],
+    /// Whose they are.
+    pub body: u32,
+    /// One over the moments [1/(kg m²)].
+    pub inv_principal: [f32; 3],
+    pub(crate) pad: f32,
+    /// Rotation from the principal axes to the world when the step begins, x y z w.
+    pub frame: [f32; 4],
+}
+
+/// One manifold: the contact of two bodies over up to four points with one normal, 48 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ContactRow {
+    /// Unit normal from a to b, world axes.
+    pub normal: [f32; 3],
+    /// Coulomb coefficient mu.
+    pub friction: f32,
+    /// First unit tangent; the second is normal x tangent.
+    pub tangent: [f32; 3],
+    /// Restitution.
+    pub restitution: f32,
+    /// The body that the normal points away from.
+    pub body_a: u32,
+    /// The body that the normal points to.
+    pub body_b: u32,
+    /// Where its points begin in `points` and `impulses`.
+    pub first_point: u32,
+    /// How many points it has, 1 to 4.
+    pub point_count: u32,
+}
+
+/// One contact point, 48 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PointRow {
+    /// From the centre of mass of a to the point when the step begins, world axes [m].
+    pub r_a: [f32; 3],
+    /// Separation when the step begins, negative when overlapping [m].
+    pub separation: f32,
+    /// From the centre of mass of b to the point [m].
+    pub r_b: [f32; 3],
+    /// One over the normal entry of G M⁻¹ Gᵀ [kg].
+    pub normal_mass: f32,
+    /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ [kg].
+    pub tangent_mass: f32,
+    /// Normal velocity when the step begins, negative when approaching [m/s].
+    pub approach_velocity: f32,
+    /// Radius of curvature of a's surface at the point, 0 if flat or sharp [m]: a round body turns under its contact.
+    pub radius_a: f32,
+    /// Radius of curvature of b's surface [m].
+    pub radius_b: f32,
+}
+
+/// The impulses of one point, accumulated over the substeps' sweeps, 16 B [N s].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ImpulseRow {
+    /// Along the normal, on b.
+    pub normal: f32,
+    /// Along the first tangent, on b.
+    pub tangent_1: f32,
+    /// Along the second tangent, on b.
+    pub tangent_2: f32,
+    /// Largest normal impulse so far in this step.
+    pub peak: f32,
+}
+
+/// Coefficients of a soft contact over one substep, 16 B. Derivation: [`super::softness`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Softness {
+    /// Velocity wanted per overlap [1/s].
+    pub bias_rate: f32,
+    /// Share of the effective mass that acts.
+    pub mass_scale: f32,
+    /// Share of the accumulated impulse that is given back.
+    pub impulse_scale: f32,
+    /// Fastest that overlap is pushed out [m/s].
+    pub push_limit: f32,
+}
+
+/// What is the same for every body and contact of a step, 64 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Params {
+    /// Length of a substep [s].
+    pub substep: f32,
+    /// One over the length of a substep [1/s].
+    pub inverse_substep: f32,
+    /// Approach slower than this does not bounce [m/s].
+    pub restitution_threshold: f32,
+    /// Number of rows with unequal moments of inertia.
+    pub inertia_count: u32,
+    /// Contacts of two bodies that can move.
+    pub movable: Softness,
+    /// Contacts with a body that cannot.
+    pub fixed: Softness,
+    /// Number of bodies.
+    pub body_count: u32,
+    pub(crate) pad: [u32; 3],
+}
+
+/// The colors that one dispatch sweeps, one after another.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PassColors {
+    /// First color.
+    pub first: u32,
+    /// One past the last.
+    pub end: u32,
+}

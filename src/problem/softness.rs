@@ -1,0 +1,24 @@
+//! Soft contacts: a spring and damper in the terms of a constraint.
+//!
+//! Implicit Euler on a spring k = m w² with damper c = 2 z m w, m the effective mass, asks of the velocity
+//! `u + (k / (c + h k)) s + r / (h (c + h k)) = 0`. With a1 = 2 z + h w and a2 = h w a1 that is
+//!
+//! ```text
+//! bias_rate     = k / (c + h k)   = w / a1
+//! mass_scale    = a2 / (1 + a2)
+//! impulse_scale =  1 / (1 + a2)
+//! ```
+//!
+//! and w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²): the law
+//! that `tests/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
+
+use super::layout::Softness;
+
+/// Coefficients of a contact with `frequency` [Hz] and `damping_ratio` over a substep of `h` seconds.
+pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> Softness {
+    let omega = 2.0 * std::f32::consts::PI * frequency;
+    let a1 = 2.0 * damping_ratio + h * omega;
+    let a2 = h * omega * a1;
+    let a3 = 1.0 / (1.0 + a2);
+    Softness { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3, push_limit }
+}

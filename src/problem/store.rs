@@ -1,0 +1,34 @@
+//! From rows back to bodies and manifolds.
+
+use glam::{Quat, Vec3};
+use rayon::prelude::*;
+
+use super::StepProblem;
+use super::prepare::{Prepared, tangents};
+use crate::collide::Pair;
+use crate::world::{BodyKind, World};
+
+impl Prepared {
+    /// Writes poses and velocities into the world, and impulses into the manifolds that the rows came from.
+    pub fn store(&self, problem: &StepProblem, world: &mut World, pairs: &mut [Pair]) {
+        world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies).for_each(|(body, row)| {
+            if body.kind == BodyKind::Fixed {
+                return;
+            }
+            let center = body.center_of_mass() + Vec3::from_array(row.dp);
+            body.rotation = (Quat::from_array(row.dq) * body.rotation).normalize();
+            body.position = center - body.rotation * body.mass.center;
+            body.linear_velocity = Vec3::from_array(row.v);
+            body.angular_velocity = Vec3::from_array(row.w);
+        });
+        for (&(i, k), &row) in self.contacts.iter().zip(&self.row_of) {
+            let contact = &problem.contacts[row as usize];
+            let (tangent_1, tangent_2) = tangents(contact);
+            let points = pairs[i as usize].manifolds[k as usize].points_mut();
+            for (point, impulse) in points.iter_mut().zip(&problem.impulses[contact.first_point as usize..]) {
+                point.normal_impulse = impulse.normal;
+                point.friction_impulse = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+            }
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Stepping a world: detect, color, prepare, plan, run, store.
+
+use crate::backend::Backend;
+use crate::collide::Detector;
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::graph::ConstraintGraph;
+use crate::metrics::Penetration;
+use crate::plan::StepPlan;
+use crate::problem::{Prepared, StepProblem};
+use crate::stats::{StepStats, timed};
+use crate::world::World;
+
+/// A world that moves.
+///
+/// ```
+/// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// for _ in 0..60 {
+///     simulation.step(1.0 / 60.0)?;
+/// }
+/// assert!((simulation.world.bodies[brick].position.y - 0.5).abs() < 0.01);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+pub struct Simulation {
+    /// The bodies. Poses, velocities and forces may be changed between steps; number, shapes and kinds may not.
+    pub world: World,
+    config: SolverConfig,
+    backend: Box<dyn Backend>,
+    detector: Detector,
+    graph: ConstraintGraph,
+    prepared: Prepared,
+    problem: StepProblem,
+    plan: StepPlan,
+}
+
+impl Simulation {
+    /// A simulation of `world` that has not moved yet.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
+        config.check()?;
+        Ok(Self {
+            detector: Detector::new(&world),
+            world,
+            config,
+            backend,
+            graph: ConstraintGraph::default(),
+            prepared: Prepared::default(),
+            problem: StepProblem::default(),
+            plan: StepPlan::default(),
+        })
+    }
+
+    /// Moves the world by `dt` seconds.
+    ///
+    /// # Errors
+    /// The backend cannot run the step; the world is then as it was.
+    pub fn step(&mut self, dt: f32) -> Result<StepStats> {
+        let mut stats = StepStats::default();
+        let times = &mut stats.times;
+        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt));
+        let pairs = self.detector.pairs_mut();
+        timed(&mut times.color, || {
+            self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
+        });
+        timed(&mut times.prepare, || {
+            self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
+            self.plan = StepPlan::new(&self.config, &self.problem);
+        });
+        timed(&mut times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
+        timed(&mut times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
+
+        stats.pairs = found.pairs;
+        stats.computed = found.computed;
+        stats.manifolds = self.problem.contacts.len();
+        stats.points = self.problem.points.len();
+        stats.colors = self.prepared.coloring.color_count();
+        stats.overflow = self.prepared.coloring.overflow as usize;
+        stats.dispatches = self.plan.passes.len();
+        stats.bytes_moved = self.plan.bytes_moved(&self.problem);
+        stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
+        stats.first_non_finite = self.world.first_non_finite();
+        Ok(stats)
+    }
+
+    /// Detects, colors and prepares the next step of `dt` seconds without running it: the problem as a value.
+    pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
+        self.detector.detect(&self.world, &self.config, dt);
+        let pairs = self.detector.pairs_mut();
+        self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
+        self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
+        self.plan = StepPlan::new(&self.config, &self.problem);
+        (&self.problem, &self.plan)
+    }
+
+    /// Overlap of the world as it is now, from contacts computed anew.
+    pub fn penetration(&mut self) -> Penetration {
+        self.detector.detect_anew(&self.world, &self.config, 0.0);
+        Penetration::of(self.detector.pairs())
+    }
+
+    /// Contacts and impulses of the last step.
+    pub fn pairs(&self) -> &[crate::collide::Pair] {
+        self.detector.pairs()
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &SolverConfig {
+        &self.config
+    }
+
+    /// The last step's problem, with the impulses that solved it.
+    pub fn problem(&self) -> &StepProblem {
+        &self.problem
+    }
+
+    /// The last step's plan.
+    pub fn plan(&self) -> &StepPlan {
+        &self.plan
+    }
+
+    /// What runs the steps.
+    pub fn backend(&self) -> &dyn Backend {
+        &*self.backend
+    }
+}

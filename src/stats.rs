@@ -1,0 +1,82 @@
+//! Times and counts of one step, as data.
+
+use std::time::{Duration, Instant};
+
+/// Times and counts of one step.
+#[derive(Clone, Debug, Default)]
+pub struct StepStats {
+    /// Wall time of each stage.
+    pub times: StageTimes,
+    /// Pairs of colliders whose boxes overlap.
+    pub pairs: usize,
+    /// Pairs whose manifolds were computed; the others were reused.
+    pub computed: usize,
+    /// Manifolds.
+    pub manifolds: usize,
+    /// Contact points.
+    pub points: usize,
+    /// Colors, the single ones of the overflow included.
+    pub colors: usize,
+    /// Manifolds that found no color and were swept alone.
+    pub overflow: usize,
+    /// Dispatches of the plan.
+    pub dispatches: usize,
+    /// Bytes that the kernels of the plan read and write.
+    pub bytes_moved: u64,
+    /// Bytes sent to the device and read back.
+    pub bytes_transferred: u64,
+    /// The first body whose pose or velocity is not finite, if any.
+    pub first_non_finite: Option<usize>,
+}
+
+/// Wall time of each stage of a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StageTimes {
+    /// Finding contacts.
+    pub detect: Duration,
+    /// Coloring them.
+    pub color: Duration,
+    /// Writing the rows.
+    pub prepare: Duration,
+    /// Sweeping, transfers included.
+    pub run: Duration,
+    /// Reading the rows back into the world.
+    pub store: Duration,
+}
+
+impl StageTimes {
+    /// Name and time of each stage, in order.
+    pub fn stages(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("detect", self.detect),
+            ("color", self.color),
+            ("prepare", self.prepare),
+            ("run", self.run),
+            ("store", self.store),
+        ]
+    }
+
+    /// All stages together.
+    pub fn total(&self) -> Duration {
+        self.stages().iter().map(|s| s.1).sum()
+    }
+}
+
+/// Runs `f` and adds how long it took to `time`.
+pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = f();
+    *time += start.elapsed();
+    result
+}
+
+/// The middle of some numbers, the mean of the two middle ones if they are even in number; NaN for none.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}
