@@ -1,7 +1,10 @@
 //! Scenes: a world, how long a step is, and what should hold at the end.
 
+mod boxes;
 mod catalogue;
+mod drop;
 mod file;
+mod random;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 pub use file::{SceneFile, load, schema};
