@@ -2,12 +2,13 @@
 
 mod boxes;
 mod catalogue;
+mod check;
 mod drop;
 mod file;
 mod random;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
-pub use file::{SceneFile, load, schema};
+pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
 
 use glam::Vec3;
 

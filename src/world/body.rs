@@ -2,11 +2,14 @@
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::shape::{Shape, pose};
 
 /// Who decides how a body moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum BodyKind {
     /// Never moves.
     Fixed,
