@@ -33,6 +33,14 @@ impl Error {
         Self::Input(message.to_string())
     }
 
+    /// Says where an [`Error::Input`] is: `place: message`.
+    pub(crate) fn within(self, place: impl std::fmt::Display) -> Self {
+        match self {
+            Self::Input(message) => Self::Input(format!("{place}: {message}")),
+            other => other,
+        }
+    }
+
     /// Wraps an I/O error with the path it happened on.
     pub fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();

@@ -1,19 +1,208 @@
-use super::Scene;
-use crate::error::Result;
+//! Scenes that come with the crate, by name and parameters.
+
+use super::{Scene, boxes, drop};
+use crate::error::{Error, Result};
+
+/// Most dynamic bodies a scene of the catalogue can be asked for.
+const MOST_BODIES: f64 = 4e6;
+
+/// A number that shapes a scene of the catalogue.
+#[derive(Clone, Debug)]
 pub struct Parameter {
+    /// Name, as in `name=value`.
     pub name: &'static str,
+    /// Value unless told otherwise.
     pub default: f64,
+    /// Least and greatest value.
+    pub range: (f64, f64),
+    /// Whether it must be a whole number.
+    pub whole: bool,
+    /// One line: what it is, and its unit.
     pub summary: &'static str,
 }
-pub struct Entry {
-    pub name: &'static str,
-    pub summary: &'static str,
-    pub parameters: &'static [Parameter],
-    build: fn(&[f64]) -> Result<Scene>,
-}
-impl Entry {
-    pub fn build(&self, _p: &[String]) -> Result<Scene> {
-        (self.build)(&[])
+
+impl Parameter {
+    const fn whole(name: &'static str, default: u32, range: (f64, f64), summary: &'static str) -> Self {
+        Self { name, default: default as f64, range, whole: true, summary }
+    }
+
+    const fn real(name: &'static str, default: f64, range: (f64, f64), summary: &'static str) -> Self {
+        Self { name, default, range, whole: false, summary }
+    }
+
+    fn parse(&self, text: &str) -> Result<f64> {
+        let (least, most) = self.range;
+        let fits = |x: &f64| (least..=most).contains(x) && (!self.whole || x.fract() == 0.0);
+        text.parse().ok().filter(fits).ok_or_else(|| {
+            let kind = if self.whole { "whole number" } else { "number" };
+            Error::input(format!("{} = {text:?}: must be a {kind} from {least} to {most}", self.name))
+        })
     }
 }
-pub static CATALOGUE: &[Entry] = &[];
+
+/// A scene of the catalogue.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Name, as [`Scene::find`] knows it.
+    pub name: &'static str,
+    /// One line: what it is and what should hold.
+    pub summary: &'static str,
+    /// What can be changed about it.
+    pub parameters: &'static [Parameter],
+    /// Takes one value for each parameter, in their order.
+    build: fn(&[f64]) -> Result<Scene>,
+}
+
+impl Entry {
+    /// Builds the scene. `assignments` are `key=value`; of two for one key the last counts.
+    ///
+    /// ```
+    /// # let pile = drystone::scenes::CATALOGUE.iter().find(|e| e.name == "pile").unwrap();
+    /// let scene = pile.build(&["n=64".into()])?;
+    /// assert_eq!(scene.world.dynamic_count(), 64);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// No `=`, an unknown key, or a value out of its range.
+    pub fn build(&self, assignments: &[String]) -> Result<Scene> {
+        self.values(assignments).and_then(|v| (self.build)(&v)).map_err(|e| e.within(self.name))
+    }
+
+    fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
+        let mut values: Vec<f64> = self.parameters.iter().map(|p| p.default).collect();
+        for assignment in assignments {
+            let (key, value) = assignment
+                .split_once('=')
+                .ok_or_else(|| Error::input(format!("{assignment:?}: write it as key=value")))?;
+            let index = self.parameters.iter().position(|p| p.name == key.trim()).ok_or_else(|| {
+                let known: Vec<_> = self.parameters.iter().map(|p| p.name).collect();
+                Error::input(format!("unknown parameter {key:?}; known: {}", known.join(", ")))
+            })?;
+            values[index] = self.parameters[index].parse(value.trim())?;
+        }
+        Ok(values)
+    }
+}
+
+/// Every scene that comes with the crate.
+pub static CATALOGUE: &[Entry] = &[
+    Entry {
+        name: "pile",
+        summary: "n boxes in a jittered grid fall into a container: none leaves, all come to rest, overlap stays small",
+        parameters: &[
+            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
+            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
+        ],
+        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64)),
+    },
+    Entry {
+        name: "pyramid",
+        summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
+        parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],
+        build: |v| Ok(boxes::pyramid(v[0] as usize)),
+    },
+    Entry {
+        name: "tower",
+        summary: "one stack of boxes, straight or zigzag, with a light or heavy top: it stands up to an offset of 0.2 m",
+        parameters: &[
+            Parameter::whole("n", 10, (1.0, 10_000.0), "number of boxes"),
+            Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
+            Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
+        ],
+        build: |v| Ok(boxes::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
+    },
+    Entry {
+        name: "wall",
+        summary: "a wall of bricks in running bond, half bricks at the ends of every other row: it stands",
+        parameters: &[
+            Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
+            Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
+        ],
+        build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize)),
+    },
+    Entry {
+        name: "drop",
+        summary: "one of every shape falls on a half-space, a triangle mesh and a height field: each rests where it fell",
+        parameters: &[Parameter::real("height", 2.0, (0.0, 20.0), "height of the fall [m]")],
+        build: |v| drop::drop(v[0] as f32),
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::BodyKind;
+
+    fn build(name: &str, assignments: &[&str]) -> Result<Scene> {
+        let assignments: Vec<String> = assignments.iter().map(|&a| a.to_owned()).collect();
+        CATALOGUE.iter().find(|e| e.name == name).expect("a scene of that name").build(&assignments)
+    }
+
+    fn refusal(name: &str, assignment: &str) -> String {
+        let message = build(name, &[assignment]).expect_err(assignment).to_string();
+        assert!(!message.contains('\n'), "{message}");
+        message
+    }
+
+    #[test]
+    fn every_scene_builds_with_its_defaults_and_every_mass_is_positive() {
+        for entry in CATALOGUE {
+            let scene = entry.build(&[]).expect(entry.name);
+            assert_eq!(scene.name, entry.name);
+            assert!(scene.world.dynamic_count() > 0 && scene.world.first_non_finite().is_none());
+            assert_eq!(scene.escaped(&scene.world), 0);
+            for body in &scene.world.bodies {
+                let usable = body.mass.mass > 0.0 && body.mass.principal_inertia.min_element() > 0.0;
+                assert_eq!(usable, body.kind == BodyKind::Dynamic, "{}: {body:?}", entry.name);
+            }
+        }
+    }
+
+    #[test]
+    fn summaries_are_one_line_and_defaults_fit_their_ranges() {
+        for entry in CATALOGUE {
+            assert!(!entry.summary.contains('\n') && entry.summary.len() < 120);
+            for p in entry.parameters {
+                assert_eq!(p.parse(&p.default.to_string()).expect(p.name), p.default);
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_parameter_lists_the_known_ones() {
+        assert_eq!(refusal("pile", "count=3"), "pile: unknown parameter \"count\"; known: n, jitter, seed");
+        assert_eq!(refusal("drop", "n=3"), "drop: unknown parameter \"n\"; known: height");
+    }
+
+    #[test]
+    fn an_impossible_value_is_refused_by_name_and_range() {
+        assert_eq!(refusal("pile", "n=4000001"), "pile: n = \"4000001\": must be a whole number from 1 to 4000000");
+        assert_eq!(refusal("tower", "n=2.5"), "tower: n = \"2.5\": must be a whole number from 1 to 10000");
+        for bad in ["offset=nan", "offset=inf", "offset=-0.1", "offset=", "offset=1e400", "n=0", "top_ratio=0", "n"] {
+            refusal("tower", bad);
+        }
+        assert_eq!(refusal("wall", "rows"), "wall: \"rows\": write it as key=value");
+        refusal("pyramid", "base=2801");
+        refusal("wall", "columns=1901");
+    }
+
+    #[test]
+    fn no_range_allows_more_than_four_million_bodies() {
+        let most = |name: &str, parameter: usize| {
+            CATALOGUE.iter().find(|e| e.name == name).expect("a scene").parameters[parameter].range.1
+        };
+        assert!(most("pyramid", 0) * (most("pyramid", 0) + 1.0) / 2.0 <= MOST_BODIES);
+        assert!(most("wall", 0) * (most("wall", 1) + 0.5) <= MOST_BODIES);
+    }
+
+    #[test]
+    fn parameters_reach_the_scene() {
+        assert_eq!(build("pyramid", &["base=4"]).expect("a pyramid").world.dynamic_count(), 10);
+        assert_eq!(build("wall", &["rows=2", "columns=3"]).expect("a wall").world.dynamic_count(), 7);
+        let tower = build("tower", &["n=3", "offset = 0.25", "top_ratio=10"]).expect("a tower").world.bodies;
+        assert_eq!(tower.iter().map(|b| b.position.x).collect::<Vec<_>>(), [0.0, 0.25, -0.25, 0.25]);
+        assert_eq!(tower.iter().map(|b| b.mass.mass).collect::<Vec<_>>(), [0.0, 1000.0, 1000.0, 10_000.0]);
+    }
+}

@@ -1,12 +1,285 @@
-use super::Scene;
-use crate::error::Result;
-pub struct SceneFile;
-pub fn load(_p: &std::path::Path) -> Result<Scene> {
-    todo!()
+//! Scene files: JSON, version 1. What each field means is in the types below, and in the JSON Schema made from them.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Value;
+use serde_path_to_error::Segment;
+
+use super::{CATALOGUE, Scene, check};
+use crate::error::{Error, Result};
+use crate::world::BodyKind;
+
+/// A scene as a file says it, before anything but its form is checked: version 1 of the format.
+///
+/// SI units, right-handed. Numbers are stored in single precision; lengths may be up to 1e9 m. What is left out takes
+/// its default; a key that is not listed is refused.
+///
+/// ```
+/// let text = r#"{"version": 1, "bodies": [{"shapes": [{"type": "ball", "radius": 0.5}]}]}"#;
+/// let scene = drystone::scenes::SceneFile::parse(text)?.into_scene("one ball")?;
+/// assert_eq!(scene.world.dynamic_count(), 1);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Scene")]
+pub struct SceneFile {
+    /// Version of the format: 1.
+    #[schemars(extend("const" = 1))]
+    pub version: u32,
+    /// Name of the scene; the file's name without its extension if left out.
+    pub name: Option<String>,
+    /// Acceleration of every dynamic body [m/s²].
+    #[serde(default = "defaults::gravity")]
+    pub gravity: [f64; 3],
+    /// Length of a step [s], more than 0, up to 1.
+    #[serde(default = "defaults::dt")]
+    pub dt: f64,
+    /// Steps of a run that asks for none.
+    #[serde(default = "defaults::steps")]
+    pub steps: u32,
+    /// Lower and upper corner of the space that no dynamic body should leave [m].
+    pub container: Option<[[f64; 3]; 2]>,
+    /// The bodies.
+    pub bodies: Vec<BodyFile>,
+    /// Joints come in a later version: must be empty.
+    #[serde(default)]
+    #[schemars(length(max = 0))]
+    pub joints: Vec<Value>,
 }
-pub fn schema() -> serde_json::Value {
-    todo!()
+
+/// A body of a scene file.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(title = "Body")]
+pub struct BodyFile {
+    /// Name for people; "body N" for body N, counted from 0, if left out.
+    pub name: Option<String>,
+    /// Who decides how it moves.
+    pub kind: BodyKind,
+    /// Origin of the body's frame [m].
+    pub position: [f64; 3],
+    /// Rotation of the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
+    pub rotation: [f64; 4],
+    /// Velocity of the center of mass [m/s]; zero for a fixed body.
+    pub linear_velocity: [f64; 3],
+    /// Angular velocity in world axes [rad/s]; zero for a fixed body.
+    pub angular_velocity: [f64; 3],
+    /// Density of all shapes [kg/m³], more than 0. 1000 for a dynamic body that says nothing about its mass.
+    pub density: Option<f64>,
+    /// Total mass [kg], more than 0, instead of the density.
+    pub mass: Option<f64>,
+    /// Mass, center and inertia, instead of those of the shapes.
+    pub mass_properties: Option<MassFile>,
+    /// Coulomb coefficient, 0 or more. Two bodies meet with the geometric mean of theirs.
+    pub friction: f64,
+    /// Ratio of separation to approach velocity, 0 to 1. Two bodies meet with the larger of theirs.
+    pub restitution: f64,
+    /// Shapes on the body; several make a compound.
+    pub shapes: Vec<ShapeFile>,
 }
-pub(super) fn load_or_suggest(_n: &str, _p: &[String]) -> Result<Scene> {
-    todo!()
+
+impl Default for BodyFile {
+    fn default() -> Self {
+        Self {
+            name: None,
+            kind: BodyKind::Dynamic,
+            position: [0.0; 3],
+            rotation: defaults::rotation(),
+            linear_velocity: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            density: None,
+            mass: None,
+            mass_properties: None,
+            friction: 0.5,
+            restitution: 0.0,
+            shapes: Vec::new(),
+        }
+    }
+}
+
+/// Mass, center of mass and inertia of a body, in its own frame.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Mass properties")]
+pub struct MassFile {
+    /// Mass [kg], more than 0.
+    pub mass: f64,
+    /// Center of mass [m].
+    #[serde(default)]
+    pub center: [f64; 3],
+    /// Moments of inertia about the principal axes through the center of mass [kg m²], more than 0.
+    pub principal_inertia: [f64; 3],
+    /// Rotation from the principal axes to the body's frame: a quaternion x, y, z, w.
+    #[serde(default = "defaults::rotation")]
+    pub principal_frame: [f64; 4],
+}
+
+/// A shape at a place on a body.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(title = "Shape", extend("unevaluatedProperties" = false))]
+pub struct ShapeFile {
+    /// Position in the body's frame [m].
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Rotation in the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
+    #[serde(default = "defaults::rotation")]
+    pub rotation: [f64; 4],
+    /// The shape itself. Refuses the keys that are unknown to both.
+    #[serde(flatten)]
+    pub geometry: Geometry,
+}
+
+/// A shape in its own frame. All lengths are in m and more than 0.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Geometry {
+    /// A ball.
+    Ball {
+        /// Radius.
+        radius: f64,
+    },
+    /// A box.
+    Cuboid {
+        /// Half of its sides along x, y, z.
+        half_extents: [f64; 3],
+    },
+    /// A segment along y, swept by a radius.
+    Capsule {
+        /// Half of the segment's length.
+        half_height: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// A cylinder along y.
+    Cylinder {
+        /// Half of its height.
+        half_height: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// A cone along y, tip up.
+    Cone {
+        /// Half of its height.
+        half_height: f64,
+        /// Radius of its base.
+        radius: f64,
+    },
+    /// The convex hull of points that are not all in one plane.
+    ConvexHull {
+        /// The points.
+        points: Vec<[f64; 3]>,
+    },
+    /// All points p with p · normal <= 0; on fixed bodies only.
+    HalfSpace {
+        /// Points out of the solid; of length 1 within 0.001.
+        normal: [f64; 3],
+    },
+    /// A triangle mesh; on fixed bodies only.
+    Mesh {
+        /// The vertices.
+        vertices: Vec<[f64; 3]>,
+        /// Three indices of vertices each, counted from 0, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+    /// Heights over a rectangle of the xz plane around the origin; on fixed bodies only.
+    HeightField {
+        /// Rows along z of heights along x, in units of the scale's y.
+        heights: Vec<Vec<f64>>,
+        /// Length along x, unit of the heights, length along z.
+        scale: [f64; 3],
+    },
+}
+
+mod defaults {
+    pub(super) fn gravity() -> [f64; 3] {
+        [0.0, -9.81, 0.0]
+    }
+
+    pub(super) fn dt() -> f64 {
+        1.0 / 60.0
+    }
+
+    pub(super) fn steps() -> u32 {
+        600
+    }
+
+    pub(super) fn rotation() -> [f64; 4] {
+        [0.0, 0.0, 0.0, 1.0]
+    }
+}
+
+impl SceneFile {
+    /// Reads the text of a scene file.
+    ///
+    /// # Errors
+    /// Not JSON, another version, an unknown or missing key, a value of the wrong type: one line that says where.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut json = serde_json::Deserializer::from_str(text);
+        let parsed = serde_path_to_error::deserialize(&mut json).map_err(|e| explain(text, &e));
+        parsed.and_then(|file| json.end().map(|()| file).map_err(Error::input))
+    }
+
+    /// Checks every value and builds the scene, which takes `name` if the file gives it none.
+    ///
+    /// # Errors
+    /// A value that no scene can be made of: one line with the body, the value and what it must be.
+    pub fn into_scene(self, name: &str) -> Result<Scene> {
+        check::scene(self, name)
+    }
+}
+
+/// Reads the scene file `path`.
+///
+/// # Errors
+/// The file cannot be read, or says something that no scene can be made of: one line that names the file and the place.
+pub fn load(path: &Path) -> Result<Scene> {
+    let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    SceneFile::parse(&text).and_then(|file| file.into_scene(&name)).map_err(|e| e.within(path.display()))
+}
+
+/// The JSON Schema of scene files.
+pub fn schema() -> Value {
+    schemars::schema_for!(SceneFile).to_value()
+}
+
+/// Reads a scene file, or says that there is neither a scene nor a file of that name.
+pub(super) fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
+    let path = Path::new(name_or_path);
+    if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
+        let known: Vec<_> = CATALOGUE.iter().map(|e| e.name).collect();
+        let known = known.join(", ");
+        return Err(Error::input(format!("{name_or_path:?} is neither a scene ({known}) nor a scene file")));
+    }
+    match parameters.first() {
+        Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
+        None => load(path),
+    }
+}
+
+/// One line for what serde found: where it is, with the body's name, and what.
+fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
+    // Only now is the text worth a second look; malformed text has no more to say.
+    let value: Value = serde_json::from_str(text).unwrap_or_default();
+    if let Some(version) = value.get("version").filter(|&v| *v != 1) {
+        return check::unknown_version(version);
+    }
+    let message = error.inner().to_string().replace(char::is_control, " ");
+    let mut segments = error.path().iter();
+    let place = match (segments.next(), segments.next()) {
+        (Some(Segment::Map { key }), Some(&Segment::Seq { index })) if key == "bodies" => {
+            let body = check::body_label(index, value["bodies"][index]["name"].as_str());
+            let path = error.path().to_string();
+            match path.split_once("].") {
+                Some((_, rest)) => format!("{body}: {rest}"),
+                None => body,
+            }
+        }
+        (None | Some(Segment::Unknown), _) => return Error::input(message),
+        _ => error.path().to_string(),
+    };
+    Error::input(message).within(place.replace(char::is_control, " "))
 }

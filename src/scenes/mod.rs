@@ -1,10 +1,14 @@
 //! Scenes: a world, how long a step is, and what should hold at the end.
 
+mod boxes;
 mod catalogue;
+mod check;
+mod drop;
 mod file;
+mod random;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
-pub use file::{SceneFile, load, schema};
+pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
 
 use glam::Vec3;
 

@@ -2,11 +2,14 @@
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::shape::{Shape, pose};
 
 /// Who decides how a body moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum BodyKind {
     /// Never moves.
     Fixed,
@@ -69,11 +72,12 @@ impl MassProperties {
     pub const IMMOVABLE: Self =
         Self { mass: 0.0, center: Vec3::ZERO, principal_inertia: Vec3::ZERO, principal_frame: Quat::IDENTITY };
 
-    fn from_parry(m: &ParryMass) -> Self {
+    /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.
+    fn from_parry(m: &ParryMass, density: f32) -> Self {
         Self {
-            mass: m.mass(),
+            mass: m.mass() * density,
             center: m.local_com,
-            principal_inertia: m.principal_inertia(),
+            principal_inertia: m.principal_inertia() * density,
             principal_frame: m.principal_inertia_local_frame,
         }
     }
@@ -243,10 +247,10 @@ impl Body {
             return;
         }
         let parts = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
-            let own = c.shape.0.mass_properties(self.density);
+            let own = c.shape.0.mass_properties(1.0);
             own.transform_by(&pose(c.position, c.rotation))
         });
-        self.mass = MassProperties::from_parry(&parts.sum());
+        self.mass = MassProperties::from_parry(&parts.sum(), self.density);
     }
 
     /// Centre of mass in the world [m].

@@ -1,0 +1,203 @@
+//! Scenes of boxes: piles, pyramids, towers, walls.
+
+use glam::{Quat, Vec3};
+
+use super::Scene;
+use super::random::SplitMix64;
+use crate::world::{Body, Shape, World};
+
+/// A scene at 60 steps a second.
+fn scene(name: &str, world: World, steps: u32) -> Scene {
+    Scene { name: name.to_owned(), world, dt: 1.0 / 60.0, steps, container: None }
+}
+
+/// A world with a fixed floor, 1 m thick, whose top is at y = 0.
+fn floor(half_x: f32, half_z: f32) -> World {
+    let mut world = World::new();
+    let shape = Shape::cuboid(half_x, 0.5, half_z);
+    world.add(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
+    world
+}
+
+fn unit_box() -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5))
+}
+
+/// Distance of the k-th of `n` things from their middle, in pitches.
+fn centered(k: usize, n: usize) -> f64 {
+    k as f64 - (n - 1) as f64 / 2.0
+}
+
+/// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
+pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
+    const PITCH: f64 = 1.2;
+    const CLEARANCE: f64 = 0.7;
+    const LOWEST: f64 = 0.65;
+    // Half of the shift between a layer and the next.
+    const SHIFT: f64 = 0.15;
+    let side = (n as f64).cbrt().round() as usize;
+    let layers = n.div_ceil(side * side);
+
+    let half = ((side - 1) as f64 / 2.0 * PITCH + 0.5 + SHIFT + CLEARANCE) as f32;
+    let top = (layers as f64 * PITCH) as f32 + 4.0;
+    let mut world = floor(half + 1.0, half + 1.0);
+    let (along_z, along_x) = (Shape::cuboid(0.5, top / 2.0, half + 1.0), Shape::cuboid(half, top / 2.0, 0.5));
+    for s in [half + 0.5, -half - 0.5] {
+        world.add(Body::fixed().named("wall").shape(along_z.clone()).position(s, top / 2.0, 0.0));
+        world.add(Body::fixed().named("wall").shape(along_x.clone()).position(0.0, top / 2.0, s));
+    }
+
+    let mut random = SplitMix64::new(seed);
+    let body = unit_box();
+    for i in 0..n {
+        let (column, row, layer) = (i % side, i / side % side, i / (side * side));
+        let shift = if layer % 2 == 0 { SHIFT } else { -SHIFT };
+        let x = centered(column, side) * PITCH + shift + jitter * random.symmetric();
+        let y = layer as f64 * PITCH + LOWEST + jitter * random.symmetric();
+        let z = centered(row, side) * PITCH + shift + jitter * random.symmetric();
+        let body = body.clone().position(x as f32, y as f32, z as f32).rotation(small_turn(&mut random));
+        world.add(body);
+    }
+    let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
+    Scene { container, ..scene("pile", world, 600) }
+}
+
+/// A turn by up to 0.08 rad about a random axis. Plain arithmetic in f64, so that the bits are the same everywhere.
+fn small_turn(random: &mut SplitMix64) -> Quat {
+    // Tangent of half of the largest angle.
+    const REACH: f64 = 0.04;
+    let axis = [(); 3].map(|()| random.symmetric());
+    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    let tangent = REACH * random.symmetric();
+    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+    let [x, y, z] = axis.map(|x| (x / length * tangent * cosine) as f32);
+    Quat::from_xyzw(x, y, z, cosine as f32)
+}
+
+/// Rows of boxes, each one shorter than the row below it, 0.1 m between neighbors.
+pub(super) fn pyramid(base: usize) -> Scene {
+    const PITCH: f64 = 1.1;
+    let mut world = floor(base as f32 + 10.0, 10.0);
+    let body = unit_box();
+    for row in 0..base {
+        let boxes = base - row;
+        for column in 0..boxes {
+            let x = (centered(column, boxes) * PITCH) as f32;
+            world.add(body.clone().position(x, row as f32 + 0.5, 0.0));
+        }
+    }
+    scene("pyramid", world, 300)
+}
+
+/// A stack of `n` boxes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
+pub(super) fn tower(n: usize, offset: f32, top_ratio: f32) -> Scene {
+    let mut world = floor(20.0, 20.0);
+    for i in 0..n {
+        let x = if i % 2 == 0 { offset } else { -offset };
+        let density = if i + 1 == n { 1000.0 * top_ratio } else { 1000.0 };
+        world.add(unit_box().density(density).position(x, i as f32 + 0.5, 0.0));
+    }
+    scene("tower", world, 600)
+}
+
+/// Rows of bricks of 1 x 0.5 x 0.5 m with 0.05 m between neighbors. Every other row is shifted by half a brick and ends
+/// flush in half bricks, so that every brick is held on both sides.
+pub(super) fn wall(rows: usize, columns: usize) -> Scene {
+    const GAP: f64 = 0.05;
+    const PITCH: f64 = 1.0 + GAP;
+    // Two of them and the gap between them are as long as a brick.
+    const HALF_BRICK: f64 = (1.0 - GAP) / 2.0;
+    let mut world = floor(columns as f32 * 0.6 + 10.0, 10.0);
+    let brick = |length: f64| Body::dynamic().shape(Shape::cuboid(length as f32 / 2.0, 0.25, 0.25));
+    let (whole, half) = (brick(1.0), brick(HALF_BRICK));
+    let end = (columns as f64 * PITCH - GAP - HALF_BRICK) / 2.0;
+    for row in 0..rows {
+        let mut lay = |body: &Body, x: f64| world.add(body.clone().position(x as f32, row as f32 * 0.5 + 0.25, 0.0));
+        if row % 2 == 0 {
+            (0..columns).for_each(|k| _ = lay(&whole, centered(k, columns) * PITCH));
+        } else {
+            lay(&half, -end);
+            (0..columns - 1).for_each(|k| _ = lay(&whole, centered(k, columns - 1) * PITCH));
+            lay(&half, end);
+        }
+    }
+    scene("wall", world, 600)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::BodyKind;
+
+    /// Lower and upper corner of a body with one cuboid.
+    fn bounds(body: &Body) -> (Vec3, Vec3) {
+        let half = body.colliders[0].shape.as_cuboid().expect("a cuboid");
+        let axes = glam::Mat3::from_quat(body.rotation);
+        let reach = axes.x_axis.abs() * half.x + axes.y_axis.abs() * half.y + axes.z_axis.abs() * half.z;
+        (body.position - reach, body.position + reach)
+    }
+
+    fn no_two_overlap(scene: &Scene) {
+        let boxes: Vec<_> = scene.world.bodies.iter().map(bounds).collect();
+        for (i, a) in boxes.iter().enumerate() {
+            for b in &boxes[i + 1..] {
+                let overlap = a.1.min(b.1) - a.0.max(b.0);
+                assert!(overlap.min_element() <= 1e-4, "{}: {a:?} {b:?}", scene.name);
+            }
+        }
+    }
+
+    #[test]
+    fn no_two_bodies_overlap_at_the_start() {
+        for scene in [pile(1000, 0.03, 1), pile(500, 0.04, 7), pyramid(6), tower(5, 0.2, 1.0), wall(6, 4)] {
+            no_two_overlap(&scene);
+        }
+    }
+
+    fn bits(scene: &Scene) -> Vec<u32> {
+        let numbers =
+            scene.world.bodies.iter().flat_map(|b| [b.position.extend(0.0).to_array(), b.rotation.to_array()]);
+        numbers.flatten().map(f32::to_bits).collect()
+    }
+
+    #[test]
+    fn the_same_parameters_give_the_same_bits() {
+        assert_eq!(bits(&pile(300, 0.03, 5)), bits(&pile(300, 0.03, 5)));
+        assert_ne!(bits(&pile(300, 0.03, 5)), bits(&pile(300, 0.03, 6)));
+    }
+
+    #[test]
+    fn the_bits_of_a_pile_are_pinned() {
+        let hash = bits(&pile(1000, 0.03, 1))
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+        assert_eq!(hash, 0x9dc1_022d_d8b0_f206, "{hash:#x}");
+    }
+
+    #[test]
+    fn a_pile_is_turned_and_shifted_no_further_than_promised() {
+        let scene = pile(500, 0.0, 3);
+        let boxes: Vec<_> = scene.world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic).collect();
+        assert!(boxes.iter().all(|b| b.rotation.is_normalized() && b.rotation.to_axis_angle().1 <= 0.08));
+        assert!(boxes.iter().any(|b| b.rotation.to_axis_angle().1 > 0.07));
+        // One layer is 8 x 8; the next is 0.3 m off.
+        let shift = boxes[0].position - boxes[64].position;
+        assert!((shift - Vec3::new(0.3, -1.2, 0.3)).length() < 1e-5, "{shift}");
+    }
+
+    #[test]
+    fn piles_of_every_size_have_all_their_boxes_inside_the_container() {
+        for n in [1, 2, 3, 7, 64, 100, 5000] {
+            let scene = pile(n, 0.03, 1);
+            assert_eq!((scene.world.dynamic_count(), scene.escaped(&scene.world)), (n, 0));
+        }
+    }
+
+    #[test]
+    fn every_row_of_a_wall_ends_flush() {
+        let scene = wall(2, 3);
+        let right = |row: &[Body]| row.iter().map(|b| bounds(b).1.x).fold(0.0, f32::max);
+        let bricks = &scene.world.bodies[1..];
+        assert!((right(&bricks[..3]) - right(&bricks[3..])).abs() < 1e-6);
+    }
+}
