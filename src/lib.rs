@@ -16,11 +16,13 @@
 //! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
 //! to be compared with.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod backend;
+pub mod cli;
 pub mod collide;
+pub mod compare;
 pub mod config;
 pub mod error;
 pub mod graph;
@@ -29,6 +31,7 @@ pub mod math;
 pub mod metrics;
 pub mod plan;
 pub mod problem;
+pub mod report;
 pub mod scenes;
 pub mod simulation;
 pub mod stats;

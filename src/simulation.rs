@@ -62,6 +62,22 @@ impl Simulation {
     /// # Errors
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
+        let mut stats = self.assemble(dt);
+        timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
+        let pairs = self.detector.pairs_mut();
+        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
+        stats.first_non_finite = self.world.first_non_finite();
+        Ok(stats)
+    }
+
+    /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
+    pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
+        self.assemble(dt);
+        (&self.problem, &self.plan)
+    }
+
+    /// Detects, colors, prepares and plans.
+    fn assemble(&mut self, dt: f32) -> StepStats {
         let mut stats = StepStats::default();
         let times = &mut stats.times;
         let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt));
@@ -73,9 +89,6 @@ impl Simulation {
             self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
             self.plan = StepPlan::new(&self.config, &self.problem);
         });
-        timed(&mut times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
-        timed(&mut times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
-
         stats.pairs = found.pairs;
         stats.computed = found.computed;
         stats.manifolds = self.problem.contacts.len();
@@ -85,18 +98,7 @@ impl Simulation {
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.plan.bytes_moved(&self.problem);
         stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
-        stats.first_non_finite = self.world.first_non_finite();
-        Ok(stats)
-    }
-
-    /// Detects, colors and prepares the next step of `dt` seconds without running it: the problem as a value.
-    pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
-        self.detector.detect(&self.world, &self.config, dt);
-        let pairs = self.detector.pairs_mut();
-        self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
-        self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
-        self.plan = StepPlan::new(&self.config, &self.problem);
-        (&self.problem, &self.plan)
+        stats
     }
 
     /// Overlap of the world as it is now, from contacts computed anew.

@@ -45,10 +45,6 @@ impl<S: Scalar> Reference<S> {
         for (row, body) in problem.bodies.iter_mut().zip(&self.bodies) {
             *row = body.store();
         }
-        // The gyroscopic pass turns inverse inertias along.
-        for inertia in &problem.inertias {
-            problem.masses[inertia.body as usize] = self.masses[inertia.body as usize].store();
-        }
         for (row, impulse) in problem.impulses.iter_mut().zip(&self.impulses) {
             *row = impulse.store();
         }

@@ -1,7 +1,10 @@
 //! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
 
+mod choose;
 pub mod cpu;
 pub mod gpu;
+
+pub use choose::{AUTO_GPU_BODIES, BackendChoice, choose};
 
 use crate::error::Result;
 use crate::plan::Pass;

@@ -75,6 +75,12 @@ pub(super) struct Moving {
     pub w: Vec3,
 }
 
+impl Moving {
+    fn is_finite(&self) -> bool {
+        self.center.is_finite() && self.rotation.is_finite() && self.v.is_finite() && self.w.is_finite()
+    }
+}
+
 /// Settings of the detection, as lengths relative to the thinner shape.
 #[derive(Clone, Copy)]
 pub(super) struct Margins {
@@ -125,6 +131,12 @@ impl Pair {
         margins: Margins,
         scratch: &mut Scratch,
     ) -> Update {
+        // A body that left the finite range touches nothing, so that the trouble does not spread.
+        if !(a.is_finite() && b.is_finite()) {
+            self.manifolds.clear();
+            self.invalidate();
+            return Update::Computed;
+        }
         let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
         let size = ca.size.min(cb.size);
         let approach = (b.v - a.v).length() + cb.reach * (b.w - a.w).length();

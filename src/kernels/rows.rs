@@ -166,17 +166,6 @@ impl<S: Scalar> Mass<S> {
             acceleration: Vec3::load(r.acceleration),
         }
     }
-
-    /// To storage.
-    pub fn store(&self) -> MassRow {
-        MassRow {
-            inv_inertia_x: self.inv_inertia.x.store(),
-            inv_inertia_yz: self.inv_inertia.yz.store(),
-            inv_mass: self.inv_mass.to_f32(),
-            acceleration: self.acceleration.store(),
-            ..MassRow::default()
-        }
-    }
 }
 
 impl<S: Scalar> Inertia<S> {

@@ -1,0 +1,140 @@
+//! Which adapters there are, and which one is taken.
+
+use std::fmt;
+
+use crate::error::{Error, Result};
+
+/// What a person needs to know of an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterSummary {
+    /// Its own name.
+    pub name: String,
+    /// Vulkan, Metal, Dx12 or Gl.
+    pub api: String,
+    /// Driver and version.
+    pub driver: String,
+    /// Discrete, integrated, virtual, or software running on the processor.
+    pub kind: &'static str,
+    /// Whether it runs on hardware of its own.
+    pub hardware: bool,
+    /// Whether it takes SPIR-V, so that exact mode works.
+    pub exact: bool,
+    /// Largest buffer that a kernel can be given [B].
+    pub buffer_limit: u64,
+}
+
+impl fmt::Display for AdapterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, {}; {})", self.name, self.api, self.kind, self.driver)
+    }
+}
+
+/// Which adapter to open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// The one with the most hardware: discrete, integrated, virtual, then software.
+    Best,
+    /// The best that is not software.
+    Hardware,
+}
+
+/// What to tell a person who has no adapter.
+const INSTALL: &str = "install a graphics driver, or the software one: `apt-get install mesa-vulkan-drivers` on Debian and Ubuntu, \
+    `dnf install mesa-vulkan-drivers` on Fedora, `pacman -S vulkan-swrast` on Arch";
+
+/// Adapters that can run the kernels, the one with the most hardware first.
+///
+/// The variable `DRYSTONE_ADAPTER` narrows them to those whose name, API or driver contains it; `none` hides all.
+pub fn adapters() -> Vec<AdapterSummary> {
+    found().into_iter().map(|(_, summary)| summary).collect()
+}
+
+pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSummary)> {
+    let mut all = found();
+    if choice == AdapterChoice::Hardware {
+        all.retain(|(_, s)| s.hardware);
+    }
+    let wanted = std::env::var("DRYSTONE_ADAPTER").ok();
+    let looked_for = match &wanted {
+        Some(name) => format!("one that DRYSTONE_ADAPTER={name} names, for "),
+        None => String::new(),
+    };
+    let nothing = || {
+        Error::Adapter(format!(
+            "no adapter found; looked for {looked_for}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}"
+        ))
+    };
+    if all.is_empty() { Err(nothing()) } else { Ok(all.swap_remove(0)) }
+}
+
+fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
+    let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
+    // OpenGL only where there is nothing better: its loaders are noisy on machines without a display.
+    for backends in [wgpu::Backends::PRIMARY, wgpu::Backends::SECONDARY] {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends,
+            flags: wgpu::InstanceFlags::empty(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        let all = pollster::block_on(instance.enumerate_adapters(backends));
+        let mut usable: Vec<_> = all.into_iter().filter(can_compute).map(|a| (summarize(&a), a)).collect();
+        usable.retain(|(s, _)| s.to_string().to_lowercase().contains(&wanted));
+        usable.sort_by_key(|(_, a)| rank(a.get_info().device_type));
+        if !usable.is_empty() {
+            return usable.into_iter().map(|(s, a)| (a, s)).collect();
+        }
+    }
+    Vec::new()
+}
+
+fn can_compute(adapter: &wgpu::Adapter) -> bool {
+    adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+        && adapter.limits().max_storage_buffers_per_shader_stage >= 8
+}
+
+fn rank(kind: wgpu::DeviceType) -> u8 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
+    let info = adapter.get_info();
+    let vulkan = info.backend == wgpu::Backend::Vulkan;
+    AdapterSummary {
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "unknown kind",
+        },
+        hardware: info.device_type != wgpu::DeviceType::Cpu,
+        exact: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
+        buffer_limit: adapter.limits().max_storage_buffer_binding_size,
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        api: format!("{:?}", info.backend),
+        name: info.name,
+    }
+}
+
+pub(super) fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
+    let offered = adapter.limits();
+    let descriptor = wgpu::DeviceDescriptor {
+        label: Some("drystone"),
+        required_features: if exact { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() },
+        // What WebGPU promises everywhere, with buffers as large as they come.
+        required_limits: wgpu::Limits {
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_buffer_size: offered.max_buffer_size,
+            ..wgpu::Limits::default()
+        },
+        ..Default::default()
+    };
+    pollster::block_on(adapter.request_device(&descriptor))
+        .map_err(|e| Error::Adapter(format!("{}: {e}", adapter.get_info().name)))
+}

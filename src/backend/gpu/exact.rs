@@ -1,0 +1,91 @@
+//! Exact mode: SPIR-V that says of every sum and product that it must be computed as written.
+//!
+//! Plain WGSL leaves drivers free to reassociate and to fuse: software Vulkan turns `v + (x y - z w)` into
+//! `(v + x y) - z w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every
+//! arithmetic result it does not, at the same speed, and the GPU agrees with the reference to the last bit. naga writes
+//! no such decoration, so it is added to the words that naga wrote.
+
+/// Words of a SPIR-V header.
+const HEADER: usize = 5;
+const OP_DECORATE: u32 = 71;
+const OP_MEMBER_DECORATE: u32 = 72;
+const NO_CONTRACTION: u32 = 42;
+
+/// Whether an instruction computes with floats: negate, add, sub, mul, div, rem, mod, vector and matrix products, dot.
+fn is_arithmetic(opcode: u32) -> bool {
+    matches!(opcode, 127 | 129 | 131 | 133 | 136 | 140 | 141 | 142..=148)
+}
+
+/// The same module, with every arithmetic result decorated.
+pub(super) fn without_contraction(words: &[u32]) -> Vec<u32> {
+    let mut decorations = Vec::new();
+    let mut annotations_begin = None;
+    let mut at = HEADER;
+    while at < words.len() {
+        let (length, opcode) = ((words[at] >> 16) as usize, words[at] & 0xffff);
+        if matches!(opcode, OP_DECORATE | OP_MEMBER_DECORATE) {
+            annotations_begin.get_or_insert(at);
+        }
+        if is_arithmetic(opcode) {
+            decorations.extend([3 << 16 | OP_DECORATE, words[at + 2], NO_CONTRACTION]);
+        }
+        at += length.max(1);
+    }
+    // Annotations stand together, and every kernel has some: its bindings.
+    let split = annotations_begin.unwrap_or(words.len());
+    [&words[..split], &decorations, &words[split..]].concat()
+}
+
+/// A shader module of SPIR-V that wgpu hands to the driver as it is.
+#[allow(unsafe_code)]
+pub(super) fn shader_module(device: &wgpu::Device, entry_point: &str, spirv: &[u32]) -> wgpu::ShaderModule {
+    let entry_points =
+        [wgpu::PassthroughShaderEntryPoint { name: entry_point.into(), workgroup_size: (super::WORKGROUP, 1, 1) }];
+    let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
+        label: Some(entry_point),
+        entry_points: (&entry_points[..]).into(),
+        spirv: Some(spirv.into()),
+        ..Default::default()
+    };
+    // SAFETY: the words are naga's own, written from a module that it validated; only decorations were added to them.
+    unsafe { device.create_shader_module_passthrough(descriptor) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sum_and_product_is_decorated_and_nothing_else_changes() {
+        // Header; OpDecorate %9 0; OpFAdd %1 %2 %3 %4; OpIAdd; OpFMul.
+        let words = [
+            7,
+            7,
+            7,
+            7,
+            7,
+            3 << 16 | 71,
+            9,
+            0,
+            5 << 16 | 129,
+            1,
+            2,
+            3,
+            4,
+            5 << 16 | 128,
+            1,
+            5,
+            3,
+            4,
+            5 << 16 | 133,
+            1,
+            6,
+            3,
+            4,
+        ];
+        let exact = without_contraction(&words);
+        assert_eq!(exact[..5], words[..5]);
+        assert_eq!(exact[5..11], [3 << 16 | 71, 2, 42, 3 << 16 | 71, 6, 42]);
+        assert_eq!(exact[11..], words[5..]);
+    }
+}

@@ -1,0 +1,137 @@
+//! From WGSL to what a pipeline needs: a shader is a list of parts, its layout what its entry point uses.
+
+use naga::back::spv;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+
+use super::exact;
+use crate::error::{Error, Result};
+use crate::plan::Kernel;
+
+/// Name of each binding, which is also a field of `StepProblem`; the place in this list is its number.
+pub const BINDINGS: [&str; 9] =
+    ["params", "pass_colors", "bodies", "masses", "inertias", "contacts", "points", "impulses", "colors"];
+/// How many of them, the first, are uniforms.
+pub const UNIFORMS: usize = 2;
+/// The colors of a pass, at an offset of their own for each.
+pub const PASS_COLORS: u32 = 1;
+/// State, read back.
+pub const BODIES: u32 = 2;
+/// Impulses, read back.
+pub const IMPULSES: u32 = 7;
+/// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
+pub const WORKGROUP: u32 = 64;
+
+const TYPES: &str = include_str!("../../../shaders/lib/types.wgsl");
+const BINDINGS_WGSL: &str = include_str!("../../../shaders/lib/bindings.wgsl");
+const MATH: &str = include_str!("../../../shaders/lib/math.wgsl");
+const CONTACT: &str = include_str!("../../../shaders/lib/contact.wgsl");
+
+/// The WGSL of a kernel: the parts it is made of, one after another.
+pub fn source(kernel: Kernel) -> String {
+    let body = match kernel {
+        Kernel::IntegrateVelocities => include_str!("../../../shaders/integrate_velocities.wgsl"),
+        Kernel::IntegrateGyroscopic => include_str!("../../../shaders/integrate_gyroscopic.wgsl"),
+        Kernel::WarmStart(_) => include_str!("../../../shaders/warm_start.wgsl"),
+        Kernel::SolveContacts(_) => include_str!("../../../shaders/solve_contacts.wgsl"),
+        Kernel::IntegratePositions => include_str!("../../../shaders/integrate_positions.wgsl"),
+        Kernel::ApplyRestitution(_) => include_str!("../../../shaders/apply_restitution.wgsl"),
+    };
+    let contact = if kernel.rules().is_some() { CONTACT } else { "" };
+    [TYPES, BINDINGS_WGSL, MATH, contact, body].join("\n")
+}
+
+/// The overrides of a kernel.
+pub fn constants(kernel: Kernel) -> Vec<(&'static str, f64)> {
+    let as_number = |b: bool| if b { 1.0 } else { 0.0 };
+    kernel.rules().map_or_else(Vec::new, |r| {
+        vec![("BIASED", as_number(r.biased)), ("FRICTION", as_number(r.friction)), ("ROUND", as_number(r.round))]
+    })
+}
+
+/// A kernel as naga understands it, its overrides resolved.
+pub struct Reflected {
+    /// The module.
+    pub module: naga::Module,
+    /// What naga found out about it.
+    pub info: ModuleInfo,
+    /// Bindings that the entry point uses, ascending.
+    pub bindings: Vec<u32>,
+    entry_point: String,
+}
+
+impl Reflected {
+    /// Parses and validates with no capability beyond plain WebGPU.
+    ///
+    /// # Errors
+    /// The WGSL is wrong: a defect of this crate, reported with naga's own words.
+    pub fn new(source: &str, entry_point: &str, constants: &[(&str, f64)]) -> Result<Self> {
+        let wrong = |e: &dyn std::fmt::Display| Error::Adapter(format!("shader {entry_point}: {e}"));
+        let parsed = naga::front::wgsl::parse_str(source).map_err(|e| wrong(&e.emit_to_string(source)))?;
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        let valid = validator.validate(&parsed).map_err(|e| wrong(&e.emit_to_string(source)))?;
+        let mut values = naga::back::PipelineConstants::default();
+        values.extend(constants.iter().map(|&(name, value)| (name.to_owned(), value)));
+        let stage = Some((naga::ShaderStage::Compute, entry_point));
+        let (module, info) = naga::back::pipeline_constants::process_overrides(&parsed, &valid, stage, &values)
+            .map_err(|e| wrong(&e))?;
+        let (module, info) = (module.into_owned(), info.into_owned());
+        let used = info.get_entry_point(0);
+        let mut bindings: Vec<u32> = module
+            .global_variables
+            .iter()
+            .filter(|(handle, _)| !used[*handle].is_empty())
+            .filter_map(|(_, variable)| variable.binding.as_ref().map(|b| b.binding))
+            .collect();
+        bindings.sort_unstable();
+        Ok(Self { module, info, bindings, entry_point: entry_point.to_owned() })
+    }
+
+    /// SPIR-V in which no result may be reassociated or fused.
+    ///
+    /// # Errors
+    /// naga cannot write it.
+    pub fn exact_spirv(&self) -> Result<Vec<u32>> {
+        // wgpu numbers the bindings of a layout consecutively.
+        let place = |(at, &binding): (usize, &u32)| {
+            let info = spv::BindingInfo { descriptor_set: 0, binding: at as u32, binding_array_size: None };
+            (naga::ResourceBinding { group: 0, binding }, info)
+        };
+        let options = spv::Options {
+            lang_version: (1, 3),
+            flags: spv::WriterFlags::empty(),
+            binding_map: self.bindings.iter().enumerate().map(place).collect(),
+            ..Default::default()
+        };
+        let pipeline =
+            spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: self.entry_point.clone() };
+        let words = spv::write_vec(&self.module, &self.info, &options, Some(&pipeline));
+        let words = words.map_err(|e| Error::Adapter(format!("shader {}: {e}", self.entry_point)))?;
+        Ok(exact::without_contraction(&words))
+    }
+}
+
+/// The bind group layout of a kernel.
+pub(super) fn layout(device: &wgpu::Device, reflected: &Reflected) -> wgpu::BindGroupLayout {
+    let entry = |&binding: &u32| {
+        let global = |(_, v): &(_, &naga::GlobalVariable)| v.binding.as_ref().is_some_and(|b| b.binding == binding);
+        let (_, variable) = reflected.module.global_variables.iter().find(global).expect("reflected from this module");
+        let kind = match variable.space {
+            naga::AddressSpace::Storage { access } => {
+                wgpu::BufferBindingType::Storage { read_only: !access.contains(naga::StorageAccess::STORE) }
+            }
+            _ => wgpu::BufferBindingType::Uniform,
+        };
+        wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: kind,
+                has_dynamic_offset: binding == PASS_COLORS,
+                min_binding_size: None,
+            },
+            count: None,
+        }
+    };
+    let entries: Vec<_> = reflected.bindings.iter().map(entry).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}

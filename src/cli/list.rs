@@ -1,0 +1,95 @@
+//! `drystone scenes` and `drystone adapters`.
+
+use clap::Args;
+use comfy_table::{Table, presets};
+
+use super::print_json;
+use crate::backend::gpu::adapters;
+use crate::error::Result;
+use crate::scenes::{CATALOGUE, schema};
+
+/// Arguments of `drystone scenes`.
+#[derive(Args)]
+pub struct ScenesArgs {
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Print the JSON Schema of scene files instead.
+    #[arg(long)]
+    schema: bool,
+}
+
+impl ScenesArgs {
+    /// Lists the catalogue.
+    pub fn run(&self) -> Result<()> {
+        if self.schema {
+            println!("{}", serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
+            return Ok(());
+        }
+        if self.json {
+            let parameter = |p: &crate::scenes::Parameter| serde_json::json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
+            let scene = |e: &crate::scenes::Entry| {
+                let parameters: Vec<_> = e.parameters.iter().map(parameter).collect();
+                serde_json::json!({"name": e.name, "summary": e.summary, "parameters": parameters})
+            };
+            print_json(&serde_json::json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
+            return Ok(());
+        }
+        for entry in CATALOGUE {
+            println!("{}\n    {}", entry.name, entry.summary);
+            for p in entry.parameters {
+                println!("    -p {}={}  {}", p.name, p.default, p.summary);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Arguments of `drystone adapters`.
+#[derive(Args)]
+pub struct AdaptersArgs {
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl AdaptersArgs {
+    /// Lists the adapters, the one that `gpu` takes first.
+    pub fn run(&self) -> Result<()> {
+        let found = adapters();
+        if self.json {
+            let adapter = |a: &crate::backend::gpu::AdapterSummary| {
+                serde_json::json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
+                    "hardware": a.hardware, "exact": a.exact, "buffer_limit": a.buffer_limit})
+            };
+            print_json(&serde_json::json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
+            return Ok(());
+        }
+        if found.is_empty() {
+            println!("none; everything runs on the CPU");
+            return Ok(());
+        }
+        let mut table = Table::new();
+        table.load_preset(presets::NOTHING).set_header([
+            "name",
+            "api",
+            "kind",
+            "driver",
+            "exact mode",
+            "largest buffer",
+        ]);
+        for a in found {
+            let exact = if a.exact { "yes" } else { "no" };
+            table.add_row([
+                a.name,
+                a.api,
+                a.kind.into(),
+                a.driver,
+                exact.into(),
+                format!("{} MiB", a.buffer_limit >> 20),
+            ]);
+        }
+        println!("{table}");
+        Ok(())
+    }
+}

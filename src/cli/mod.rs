@@ -1,0 +1,137 @@
+//! The command line: parse, one library call, print.
+
+mod compare;
+mod list;
+mod run;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::scenes::Scene;
+
+/// Contact between rigid bodies: run scenes, compare backends.
+#[derive(Parser)]
+#[command(name = "drystone", version, about, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scene and report on it.
+    Run(run::RunArgs),
+    /// Run a scene on two backends and show how far apart they are.
+    Compare(compare::CompareArgs),
+    /// List the scenes of the catalogue with their parameters.
+    Scenes(list::ScenesArgs),
+    /// List the adapters that can run the shaders.
+    Adapters(list::AdaptersArgs),
+}
+
+/// A scene, and how to solve it.
+#[derive(Args)]
+struct SceneArgs {
+    /// Name of a scene of the catalogue, or path of a scene file.
+    scene: String,
+    /// Parameter of the scene, as key=value; may be given several times.
+    #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
+    parameter: Vec<String>,
+    /// Steps; the scene says how many if this does not.
+    #[arg(long)]
+    steps: Option<u32>,
+    /// Length of a step in seconds; the scene says if this does not.
+    #[arg(long, value_name = "SECONDS")]
+    dt: Option<f32>,
+    /// Substeps of a step.
+    #[arg(long)]
+    substeps: Option<u32>,
+    /// Biased sweeps of a substep.
+    #[arg(long)]
+    iterations: Option<u32>,
+    /// Relax sweeps of a substep.
+    #[arg(long)]
+    relax: Option<u32>,
+    /// Any setting of the solver, as key=value; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Settings from a TOML file, before --set and the others.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Threads for everything that runs on the CPU; 0 is one a core.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl SceneArgs {
+    /// The scene with its step length, and the settings.
+    fn load(&self) -> Result<(Scene, SolverConfig)> {
+        let mut config = match &self.config {
+            Some(path) => SolverConfig::from_toml_file(path)?,
+            None => SolverConfig::default(),
+        };
+        for assignment in &self.set {
+            config.set(assignment)?;
+        }
+        for (name, value) in [("substeps", self.substeps), ("iterations", self.iterations), ("relax", self.relax)] {
+            if let Some(value) = value {
+                config.set(&format!("{name}={value}"))?;
+            }
+        }
+        let mut scene = Scene::find(&self.scene, &self.parameter)?;
+        if let Some(dt) = self.dt {
+            if !(dt > 0.0 && dt <= 1.0) {
+                return Err(crate::Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));
+            }
+            scene.dt = dt;
+        }
+        scene.steps = self.steps.unwrap_or(scene.steps);
+        Ok((scene, config))
+    }
+
+    /// Sets the number of threads, once for the process; 0 keeps one a core, or `unless_told`.
+    fn set_threads(&self, unless_told: usize) {
+        let threads = if self.threads == 0 { unless_told } else { self.threads };
+        // Fails only if it was set before, which nothing does.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+}
+
+/// A progress bar on a terminal, nothing elsewhere.
+fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
+    if quiet {
+        return indicatif::ProgressBar::hidden();
+    }
+    let style = "{bar:40} step {pos}/{len}  {per_sec}  {eta} left";
+    let style = indicatif::ProgressStyle::with_template(style).expect("a fixed template");
+    indicatif::ProgressBar::new(steps.into()).with_style(style)
+}
+
+/// Prints a value as JSON on one line.
+fn print_json(value: &impl serde::Serialize) {
+    println!("{}", serde_json::to_string(value).expect("reports serialize"));
+}
+
+/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter.
+pub fn main() -> std::process::ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Run(args) => args.run(),
+        Command::Compare(args) => args.run(),
+        Command::Scenes(args) => args.run(),
+        Command::Adapters(args) => args.run(),
+    };
+    match result {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("drystone: {e}");
+            e.exit_code().into()
+        }
+    }
+}

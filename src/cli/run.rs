@@ -1,0 +1,82 @@
+//! `drystone run`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+
+use super::{SceneArgs, print_json, progress};
+use crate::backend::{BackendChoice, choose};
+use crate::error::{Error, Result};
+use crate::report::{RunReport, Trajectory};
+use crate::simulation::Simulation;
+
+/// Arguments of `drystone run`.
+#[derive(Args)]
+pub struct RunArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// What runs the sweeps.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendChoice,
+    /// Ask the GPU for the reference's results to the last bit.
+    #[arg(long)]
+    exact: bool,
+    /// Write poses and velocities of the bodies that can move, as CSV.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write every K-th step.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+}
+
+impl RunArgs {
+    /// Runs the scene and prints the report.
+    pub fn run(&self) -> Result<()> {
+        let (scene, config) = self.scene.load()?;
+        self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
+        let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
+        eprintln!("{why}");
+        let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
+        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let mut report = RunReport::new(&scene, &simulation);
+        let bar = progress(scene.steps, self.scene.json);
+        for step in 0..=scene.steps {
+            if step > 0 {
+                report.add(&simulation.step(scene.dt)?);
+                bar.inc(1);
+            }
+            if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {
+                trajectory.write(step, scene.dt, &simulation.world)?;
+            }
+        }
+        bar.finish_and_clear();
+        if let Some(trajectory) = trajectory {
+            trajectory.finish()?;
+        }
+        report.measure(&scene, &mut simulation);
+        if self.scene.json {
+            print_json(&report);
+        } else {
+            print_table(&report);
+        }
+        match &report.first_non_finite {
+            Some(body) => {
+                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn print_table(report: &RunReport) {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    for (what, value) in report.rows() {
+        table.add_row([what, value]);
+    }
+    if let Some(column) = table.column_mut(0) {
+        column.set_cell_alignment(CellAlignment::Left);
+    }
+    println!("{table}");
+}

@@ -1,0 +1,153 @@
+//! Two backends on the same scene, step by step: how far apart they are, and where that began.
+
+use crate::backend::Backend;
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::plan::{Pass, StepPlan};
+use crate::problem::StepProblem;
+use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::world::World;
+
+/// How far two worlds are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Difference {
+    /// Bodies of which any number differs in any bit.
+    pub bodies: usize,
+    /// Largest difference of a coordinate of a position [m].
+    pub position: f64,
+    /// Largest difference of a component of a rotation.
+    pub rotation: f64,
+    /// Largest difference of a component of a velocity [m/s].
+    pub velocity: f64,
+    /// Largest difference of a component of an angular velocity [rad/s].
+    pub angular_velocity: f64,
+}
+
+impl Difference {
+    /// Between two worlds with the same bodies. NaN on one side only makes a difference of infinity.
+    pub fn between(a: &World, b: &World) -> Self {
+        let mut all = Self::default();
+        for (a, b) in a.bodies.iter().zip(&b.bodies) {
+            let mut differs = false;
+            let mut widen = |largest: &mut f64, x: &[f32], y: &[f32]| {
+                for (x, y) in x.iter().zip(y) {
+                    differs |= x.to_bits() != y.to_bits();
+                    *largest = largest.max(distance(*x, *y));
+                }
+            };
+            widen(&mut all.position, &a.position.to_array(), &b.position.to_array());
+            widen(&mut all.rotation, &a.rotation.to_array(), &b.rotation.to_array());
+            widen(&mut all.velocity, &a.linear_velocity.to_array(), &b.linear_velocity.to_array());
+            widen(&mut all.angular_velocity, &a.angular_velocity.to_array(), &b.angular_velocity.to_array());
+            all.bodies += usize::from(differs);
+        }
+        all
+    }
+}
+
+fn distance(x: f32, y: f32) -> f64 {
+    let d = (f64::from(x) - f64::from(y)).abs();
+    if d.is_nan() && x.to_bits() != y.to_bits() {
+        f64::INFINITY
+    } else if d.is_nan() {
+        0.0
+    } else {
+        d
+    }
+}
+
+/// Where two backends first disagree on one problem.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct FirstDifference {
+    /// Step, from 1.
+    pub step: u32,
+    /// Pass of that step's plan, from 0, and how many there are.
+    pub pass: usize,
+    /// Passes in the plan.
+    pub passes: usize,
+    /// Its kernel.
+    pub kernel: String,
+}
+
+/// What a comparison found.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Comparison {
+    /// After each step.
+    pub steps: Vec<Difference>,
+    /// Where it began, if anywhere.
+    pub first: Option<FirstDifference>,
+}
+
+/// Runs `scene` on two backends for `steps` steps, each from its own results, and calls `after_step` after each.
+///
+/// # Errors
+/// A backend cannot run.
+pub fn compare(
+    scene: &Scene,
+    config: &SolverConfig,
+    open: &mut dyn FnMut(usize) -> Result<Box<dyn Backend>>,
+    steps: u32,
+    mut after_step: impl FnMut(),
+) -> Result<Comparison> {
+    let mut simulations = [
+        Simulation::new(scene.world.clone(), config.clone(), open(0)?)?,
+        Simulation::new(scene.world.clone(), config.clone(), open(1)?)?,
+    ];
+    let mut comparison = Comparison::default();
+    for _ in 0..steps {
+        for simulation in &mut simulations {
+            simulation.step(scene.dt)?;
+        }
+        comparison.steps.push(Difference::between(&simulations[0].world, &simulations[1].world));
+        after_step();
+    }
+    // Found again on a simulation of its own, so that the two above stay free of it.
+    if let Some(step) = comparison.steps.iter().position(|d| d.bodies > 0) {
+        let mut again = Simulation::new(scene.world.clone(), config.clone(), open(0)?)?;
+        for _ in 0..step {
+            again.step(scene.dt)?;
+        }
+        let (problem, plan) = again.next_problem(scene.dt);
+        let mut backends = [open(0)?, open(1)?];
+        if let Some(pass) = first_difference(problem, plan, &mut backends)? {
+            let kernel = plan.passes[pass].kernel.to_string();
+            comparison.first = Some(FirstDifference { step: step as u32 + 1, pass, passes: plan.passes.len(), kernel });
+        }
+    }
+    Ok(comparison)
+}
+
+/// The first pass after which two backends disagree on `problem` in any bit of bodies or impulses; by bisection.
+///
+/// # Errors
+/// A backend cannot run.
+pub fn first_difference(
+    problem: &StepProblem,
+    plan: &StepPlan,
+    backends: &mut [Box<dyn Backend>; 2],
+) -> Result<Option<usize>> {
+    let mut agree_after = |passes: &[Pass]| -> Result<bool> {
+        let mut results = [problem.clone(), problem.clone()];
+        for (result, backend) in results.iter_mut().zip(backends.iter_mut()) {
+            backend.run(result, passes)?;
+        }
+        let [a, b] = results;
+        let bytes = |p: &StepProblem| {
+            let bodies: &[u8] = bytemuck::cast_slice(&p.bodies);
+            let impulses: &[u8] = bytemuck::cast_slice(&p.impulses);
+            (bodies.to_vec(), impulses.to_vec())
+        };
+        Ok(bytes(&a) == bytes(&b))
+    };
+    if agree_after(&plan.passes)? {
+        return Ok(None);
+    }
+    // They agree after the first `good` passes and disagree after the first `bad`.
+    let (mut good, mut bad) = (0, plan.passes.len());
+    while bad - good > 1 {
+        let middle = (good + bad) / 2;
+        if agree_after(&plan.passes[..middle])? { good = middle } else { bad = middle }
+    }
+    Ok(Some(bad - 1))
+}

@@ -1,0 +1,282 @@
+//! What a run was and what it came to: rows for people, JSON for programs, CSV of the motion.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::config::SolverConfig;
+use crate::error::{Error, Result};
+use crate::metrics::{fastest, rms_speed};
+use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::stats::{StepStats, median};
+use crate::world::{BodyKind, World};
+
+/// Report of one run; its fields are the keys of the JSON object.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunReport {
+    /// Name of the scene.
+    pub scene: String,
+    /// `reference`, `cpu` or `gpu`.
+    pub backend: String,
+    /// What it ran on.
+    pub adapter: String,
+    /// Dynamic bodies.
+    pub bodies: usize,
+    /// Steps that were run.
+    pub steps: u32,
+    /// Length of a step [s].
+    pub dt: f32,
+    /// Settings.
+    pub config: SolverConfig,
+    /// Wall time of each step [ms].
+    pub step_ms: Vec<f64>,
+    /// Wall time of each stage, median and least over the steps [ms].
+    pub stage_ms: Vec<StageRow>,
+    /// Manifolds of the last step.
+    pub manifolds: usize,
+    /// Contact points of the last step.
+    pub points: usize,
+    /// Colors of the last step.
+    pub colors: usize,
+    /// Most manifolds of any step that found no color and were swept alone.
+    pub overflow: usize,
+    /// Share of the pairs of the last step whose manifolds were reused.
+    pub reused: f64,
+    /// Dispatches of the last step.
+    pub dispatches: usize,
+    /// Bytes that the kernels of the last step read and wrote.
+    pub bytes_moved: u64,
+    /// Bytes that the last step sent to the device and read back.
+    pub bytes_transferred: u64,
+    /// Deepest overlap at the end [m].
+    pub penetration_max: f64,
+    /// Mean overlap at the end [m].
+    pub penetration_mean: f64,
+    /// Speed of the fastest body at the end [m/s].
+    pub speed_max: f64,
+    /// Which body that is.
+    pub fastest: String,
+    /// Root mean square speed at the end [m/s].
+    pub speed_rms: f64,
+    /// Kinetic energy at the end [J].
+    pub kinetic_energy: f64,
+    /// Kinetic and potential energy gained since the start [J].
+    pub energy_gained: f64,
+    /// Bodies outside the container at the end; none if the scene has no container.
+    pub escaped: Option<usize>,
+    /// Bodies whose pose or velocity is not finite.
+    pub non_finite: usize,
+    /// The first such body.
+    pub first_non_finite: Option<String>,
+    #[serde(skip)]
+    stage_times: Vec<[f64; 5]>,
+    #[serde(skip)]
+    energy_before: f64,
+}
+
+/// Time of one stage over a run [ms].
+#[derive(Clone, Debug, Serialize)]
+pub struct StageRow {
+    /// Name of the stage.
+    pub stage: &'static str,
+    /// Median over the steps.
+    pub median: f64,
+    /// Least over the steps.
+    pub min: f64,
+}
+
+impl RunReport {
+    /// The report of a run that has not begun.
+    pub fn new(scene: &Scene, simulation: &Simulation) -> Self {
+        Self {
+            scene: scene.name.clone(),
+            backend: simulation.backend().name().into(),
+            adapter: simulation.backend().adapter(),
+            bodies: scene.world.dynamic_count(),
+            steps: 0,
+            dt: scene.dt,
+            config: simulation.config().clone(),
+            step_ms: Vec::new(),
+            stage_ms: Vec::new(),
+            manifolds: 0,
+            points: 0,
+            colors: 0,
+            overflow: 0,
+            reused: 0.0,
+            dispatches: 0,
+            bytes_moved: 0,
+            bytes_transferred: 0,
+            penetration_max: 0.0,
+            penetration_mean: 0.0,
+            speed_max: 0.0,
+            fastest: String::new(),
+            speed_rms: 0.0,
+            kinetic_energy: 0.0,
+            energy_gained: 0.0,
+            escaped: None,
+            non_finite: 0,
+            first_non_finite: None,
+            stage_times: Vec::new(),
+            energy_before: energy(&scene.world),
+        }
+    }
+
+    /// Takes in one step.
+    pub fn add(&mut self, stats: &StepStats) {
+        let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+        self.steps += 1;
+        self.step_ms.push(ms(stats.times.total()));
+        self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
+        self.manifolds = stats.manifolds;
+        self.points = stats.points;
+        self.colors = stats.colors;
+        self.overflow = self.overflow.max(stats.overflow);
+        self.reused = 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64;
+        self.dispatches = stats.dispatches;
+        self.bytes_moved = stats.bytes_moved;
+        self.bytes_transferred = stats.bytes_transferred;
+    }
+
+    /// Measures how the run ended.
+    pub fn measure(&mut self, scene: &Scene, simulation: &mut Simulation) {
+        let names = StepStats::default().times.stages().map(|s| s.0);
+        self.stage_ms = (0..names.len())
+            .map(|i| {
+                let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
+                let min = times.iter().copied().fold(f64::INFINITY, f64::min);
+                StageRow { stage: names[i], median: median(&times), min }
+            })
+            .filter(|row| row.min.is_finite())
+            .collect();
+        let penetration = simulation.penetration();
+        let world = &simulation.world;
+        let (speed, body) = fastest(world);
+        self.penetration_max = penetration.max;
+        self.penetration_mean = penetration.mean;
+        self.speed_max = speed;
+        self.fastest = body_name(world, body);
+        self.speed_rms = rms_speed(world);
+        self.kinetic_energy = world.kinetic_energy();
+        self.energy_gained = energy(world) - self.energy_before;
+        self.escaped = scene.container.map(|_| scene.escaped(world));
+        self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
+        self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
+    }
+
+    /// The report as names and values for people.
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let mut rows = Vec::new();
+        let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
+        let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
+        row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
+        row("backend", format!("{}: {}", self.backend, self.adapter));
+        row(
+            "steps",
+            format!("{} of {:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps", self.steps, self.dt * 1e3),
+        );
+        row(
+            "contacts",
+            format!(
+                "{} manifolds, {} points, {} colors, {:.0} % reused",
+                self.manifolds,
+                self.points,
+                self.colors,
+                100.0 * self.reused
+            ),
+        );
+        if self.overflow > 0 {
+            row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
+        }
+        let least = self.step_ms.iter().copied().fold(f64::INFINITY, f64::min);
+        if least.is_finite() {
+            row("ms a step", format!("{:.3} median, {least:.3} least", median(&self.step_ms)));
+        }
+        for stage in &self.stage_ms {
+            row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
+        }
+        row(
+            "penetration",
+            format!("{:.3} mm deepest, {:.3} mm mean", self.penetration_max * 1e3, self.penetration_mean * 1e3),
+        );
+        row(
+            "speed",
+            format!(
+                "{:.3} mm/s rms, {:.3} mm/s fastest ({})",
+                self.speed_rms * 1e3,
+                self.speed_max * 1e3,
+                self.fastest
+            ),
+        );
+        row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
+        if let Some(escaped) = self.escaped {
+            row("container", format!("{escaped} bodies outside"));
+        }
+        if let Some(body) = &self.first_non_finite {
+            row("non-finite", format!("{} bodies, first {body}", self.non_finite));
+        }
+        rows
+    }
+}
+
+fn energy(world: &World) -> f64 {
+    world.kinetic_energy() + world.potential_energy()
+}
+
+/// A body's own name and its index.
+fn body_name(world: &World, index: usize) -> String {
+    match world.bodies.get(index) {
+        Some(body) if !body.name.is_empty() => format!("{index} {:?}", body.name),
+        _ => index.to_string(),
+    }
+}
+
+/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes.
+pub struct Trajectory {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl Trajectory {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn create(path: &Path) -> Result<Self> {
+        let file = File::create(path).map_err(Error::file(path))?;
+        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(file) };
+        let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
+        let written = trajectory.writer.write_record(header.split(' '));
+        trajectory.check(written)?;
+        Ok(trajectory)
+    }
+
+    /// Writes the bodies that can move.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
+        for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
+            let (p, q) = (body.center_of_mass(), body.rotation);
+            let (v, w) = (body.linear_velocity, body.angular_velocity);
+            let row =
+                (step, f64::from(step) * f64::from(dt), i, p.to_array(), q.to_array(), v.to_array(), w.to_array());
+            let written = self.writer.serialize(row);
+            self.check(written)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(mut self) -> Result<()> {
+        self.writer.flush().map_err(Error::file(&self.path))
+    }
+
+    fn check(&self, written: csv::Result<()>) -> Result<()> {
+        written.map_err(|e| Error::file(&self.path)(e.into()))
+    }
+}
