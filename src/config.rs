@@ -82,7 +82,7 @@ pub struct SolverConfig {
 impl Default for SolverConfig {
     fn default() -> Self {
         Self {
-            substeps: 4,
+            substeps: 8,
             iterations: 1,
             relax: 1,
             contact_frequency: 0.125,
@@ -95,7 +95,7 @@ impl Default for SolverConfig {
             restitution_threshold: 1.0,
             gyroscopic: true,
             speculative_margin: 0.04,
-            recycle_distance: 0.002,
+            recycle_distance: 0.02,
             fuse_colors_below: 256,
             max_colors: 64,
         }

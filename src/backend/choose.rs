@@ -47,7 +47,7 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
                 let why = format!("gpu: {dynamic_bodies} dynamic bodies and {}", gpu.adapter());
                 Ok((Box::new(gpu), why))
             }
-            Err(e) => Ok(reference(format!("cpu: no hardware GPU ({e})"))),
+            Err(_) => Ok(reference("cpu: no hardware GPU found (drystone adapters lists what there is)".into())),
         },
     }
 }
