@@ -5,32 +5,19 @@
 
 fn solve_contact(i: u32) {
     let contact = contacts[i];
-    let end = contact.first_point + contact.point_count;
-    var pair = load_pair(contact);
-    let softness = pair_softness(&pair);
-
-    // All normals first, then friction within the cone they span.
-    for (var k = contact.first_point; k < end; k++) {
-        var impulse = impulses[k];
-        solve_normal(&pair, contact, points[k], softness, &impulse);
-        impulses[k] = impulse;
-    }
-    if FRICTION {
-        let tangent_2 = cross3(contact.normal, contact.tangent);
-        for (var k = contact.first_point; k < end; k++) {
-            var impulse = impulses[k];
-            solve_friction(&pair, contact, tangent_2, points[k], &impulse);
-            impulses[k] = impulse;
-        }
-    }
-    store_pair(contact, &pair);
+    var pair = load_pair(contact.body_a, contact.body_b);
+    if FRICTION != FRICTION_NONE && FRICTION_FIRST { sweep_friction(&pair, contact); }
+    sweep_normals(&pair, contact);
+    if FRICTION != FRICTION_NONE && !FRICTION_FIRST { sweep_friction(&pair, contact); }
+    store_pair(contact.body_a, contact.body_b, &pair);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn solve_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let converged = is_converged();
     for (var color = pass_colors.first; color < pass_colors.end; color++) {
         for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
-            solve_contact(i);
+            if !converged { solve_contact(i); }
         }
         storageBarrier();
     }

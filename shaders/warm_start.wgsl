@@ -6,16 +6,25 @@
 fn warm_start_contact(i: u32) {
     let contact = contacts[i];
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    var pair = load_pair(contact);
-    for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
+    let end = contact.first_point + contact.point_count;
+    var pair = load_pair(contact.body_a, contact.body_b);
+    for (var k = contact.first_point; k < end; k++) {
         let impulse = impulses[k];
         var p = contact.normal * impulse.normal;
-        if FRICTION {
+        if FRICTION != FRICTION_NONE && !PATCH {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
-        apply_impulse(&pair, points[k], p);
+        apply_impulse(&pair, points[k].r_a, points[k].r_b, p);
     }
-    store_pair(contact, &pair);
+    if FRICTION != FRICTION_NONE && PATCH {
+        let impulse = impulses[end];
+        let twist = contact.normal * impulse.normal;
+        pair.a.w -= inv_inertia_times(pair.mass_a, twist);
+        pair.b.w += inv_inertia_times(pair.mass_b, twist);
+        let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+        apply_impulse(&pair, points[end].r_a, points[end].r_b, p);
+    }
+    store_pair(contact.body_a, contact.body_b, &pair);
 }
 
 @compute @workgroup_size(WORKGROUP)

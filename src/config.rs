@@ -13,9 +13,60 @@ use crate::error::{Error, Result};
 pub enum FrictionRule {
     /// No tangential impulse. Taken by itself where every contact of a scene has mu = 0.
     None,
+    /// One direction a point: that of its slip when the step begins. What lies still creeps.
+    Slip,
+    /// Two orthogonal directions, each limited by itself: up to 41 % too strong between them.
+    Box,
     /// Tangential impulse inside the disc of radius mu times the normal impulse: Coulomb's cone, exactly.
     #[default]
     Disc,
+}
+
+/// Where friction acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionAt {
+    /// At every contact point, limited by that point's normal impulse.
+    #[default]
+    Points,
+    /// Once a manifold: at the middle of its points and as a twist about the normal, limited by their sum. Cheaper.
+    Manifold,
+}
+
+/// Whether a manifold solves its normals or its friction first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionOrder {
+    /// Normals, then friction within the cone that they span: the order of the course sheet.
+    #[default]
+    NormalsFirst,
+    /// Friction within the cone of the sweep before, then normals, which have the last word.
+    FrictionFirst,
+}
+
+/// What is kept non-negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clamping {
+    /// Every single correction; impulses start at zero in each substep. A correction that pushed too far can never be
+    /// taken back: misaligned stacks fall.
+    PerCorrection,
+    /// The sum of the corrections.
+    #[default]
+    Accumulated,
+}
+
+/// How overlap that is there already is removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stabilization {
+    /// Not at all: it drifts.
+    None,
+    /// By a target velocity, a share of the overlap a substep (Baumgarte), beyond a slop and up to a limit.
+    Baumgarte,
+    /// By a damped spring integrated implicitly; relax sweeps take its velocity out again.
+    #[default]
+    Soft,
 }
 
 /// Which sweeps of a substep solve friction.
@@ -46,6 +97,19 @@ pub struct SolverConfig {
     pub iterations: u32,
     /// Sweeps without bias a substep, after the positions moved: they take out the velocity that the bias put in.
     pub relax: u32,
+    /// What is kept non-negative.
+    pub clamping: Clamping,
+    /// How overlap is removed.
+    pub stabilization: Stabilization,
+    /// Share of the overlap that Baumgarte stabilization removes in a substep, 0 to 1.
+    pub baumgarte: f32,
+    /// Overlap that Baumgarte stabilization leaves alone [m].
+    pub slop: f32,
+    /// Every correction is multiplied by this: under-relaxed below 1, over-relaxed up to 2. 1 is safe everywhere.
+    pub relaxation: f32,
+    /// Sweeps of a substep end when no correction changes a relative velocity by more than this [m/s]; 0 sweeps on.
+    /// `iterations` and `relax` are then the most that are done.
+    pub tolerance: f32,
     /// Contact stiffness: frequency of the undamped contact spring times the substep length, so that it is 30 Hz for
     /// 4 substeps at 60 steps a second. More sinks less (as its square) and rattles more; 0.125 is quiet everywhere it
     /// was measured, 0.25 is the largest that is safe. Source: Catto, "Solver2D", 2024; the factor of Box2D 3.1.
@@ -58,8 +122,16 @@ pub struct SolverConfig {
     pub push_limit: f32,
     /// Friction rule.
     pub friction: FrictionRule,
+    /// Where friction acts.
+    pub friction_at: FrictionAt,
+    /// Whether normals or friction come first in a manifold.
+    pub friction_order: FrictionOrder,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
+    /// Joint stiffness: frequency of the undamped joint spring times the substep length.
+    pub joint_frequency: f32,
+    /// Damping ratio of the joint spring.
+    pub joint_damping: f32,
     /// Whether a step starts from the impulses of the step before.
     pub warm_start: bool,
     /// Approach slower than this does not bounce [m/s].
@@ -85,12 +157,22 @@ impl Default for SolverConfig {
             substeps: 8,
             iterations: 1,
             relax: 1,
+            clamping: Clamping::Accumulated,
+            stabilization: Stabilization::Soft,
+            baumgarte: 0.2,
+            slop: 0.001,
+            relaxation: 1.0,
+            tolerance: 0.0,
             contact_frequency: 0.125,
             contact_damping: 10.0,
             fixed_contact_frequency_ratio: 2.0,
             push_limit: 3.0,
             friction: FrictionRule::Disc,
+            friction_at: FrictionAt::Points,
+            friction_order: FrictionOrder::NormalsFirst,
             friction_sweeps: FrictionSweeps::Relax,
+            joint_frequency: 0.25,
+            joint_damping: 2.0,
             warm_start: true,
             restitution_threshold: 1.0,
             gyroscopic: true,
@@ -135,16 +217,38 @@ impl SolverConfig {
         let changed: Self = table
             .try_into()
             .map_err(|e: toml::de::Error| Error::input(format!("--set {assignment}: {}", first_line(&e))))?;
-        changed.check().map_err(|e| Error::input(format!("--set {assignment}: {e}")))?;
+        changed.check_ranges().map_err(|e| Error::input(format!("--set {assignment}: {e}")))?;
         *self = changed;
         Ok(())
     }
 
-    /// Refuses values that no step can be made of.
+    /// Refuses values that no step can be made of, and settings that contradict each other.
     ///
     /// # Errors
-    /// One line that names the setting, its value and its range.
+    /// One line that names the settings, their values and what to do.
     pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        if self.stabilization != Stabilization::Soft && self.relax > 0 {
+            let (rule, relax) = (word(&self.stabilization), self.relax);
+            return Err(Error::input(format!(
+                "stabilization = {rule} with relax = {relax}: relax sweeps belong to soft contacts; set relax=0"
+            )));
+        }
+        if self.clamping == Clamping::PerCorrection && self.stabilization == Stabilization::Soft {
+            return Err(Error::input(
+                "clamping = per-correction with stabilization = soft: a soft contact acts on the accumulated impulse; \
+                 set stabilization=baumgarte or none",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Refuses values out of their range, one by one.
+    fn check_ranges(&self) -> Result<()> {
+        if self.tolerance > 0.0 && self.iterations == 0 {
+            let tolerance = self.tolerance;
+            return Err(Error::input(format!("tolerance = {tolerance} with iterations = 0: no sweep would be tested")));
+        }
         let refuse =
             |name: &str, value: f64, range: &str| Err(Error::input(format!("{name} = {value}: must be {range}")));
         for (name, value) in [("substeps", self.substeps), ("iterations", self.iterations)] {
@@ -159,6 +263,12 @@ impl SolverConfig {
             return refuse("max_colors", self.max_colors.into(), "1 to 64");
         }
         for (name, value, least, most) in [
+            ("baumgarte", self.baumgarte, 0.0, 1.0),
+            ("slop", self.slop, 0.0, 1e3),
+            ("relaxation", self.relaxation, 1e-3, 2.0),
+            ("tolerance", self.tolerance, 0.0, 1e3),
+            ("joint_frequency", self.joint_frequency, 1e-6, 0.5),
+            ("joint_damping", self.joint_damping, 0.0, 1e6),
             ("contact_frequency", self.contact_frequency, 1e-6, 0.5),
             ("contact_damping", self.contact_damping, 0.0, 1e6),
             ("fixed_contact_frequency_ratio", self.fixed_contact_frequency_ratio, 1e-3, 1e3),
@@ -173,6 +283,11 @@ impl SolverConfig {
         }
         Ok(())
     }
+}
+
+/// A rule by the word that names it in files.
+fn word(rule: &impl Serialize) -> String {
+    serde_json::to_value(rule).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 fn one_line(place: &dyn std::fmt::Display, e: &toml::de::Error) -> String {

@@ -48,4 +48,4 @@ pub use problem::StepProblem;
 pub use scenes::Scene;
 pub use simulation::Simulation;
 pub use stats::StepStats;
-pub use world::{Body, BodyKind, MassProperties, Material, Shape, World};
+pub use world::{BallJoint, Body, BodyKind, MassProperties, Material, Shape, World};

@@ -2,14 +2,17 @@
 //!
 //! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm stands here
 //! and nowhere else. What a scene lacks is absent from its plan: without friction no kernel has friction, without
-//! restitution there is no pass for it, without unequal moments of inertia no gyroscopic pass.
+//! restitution there is no pass for it, without unequal moments of inertia no gyroscopic pass, without joints none of theirs.
 
 use std::fmt;
 use std::ops::Range;
 
-use crate::config::{FrictionSweeps, SolverConfig};
-use crate::kernels::contact::Rules;
-use crate::problem::{BodyRow, ContactRow, ImpulseRow, InertiaRow, MassRow, PointRow, StepProblem};
+use crate::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, SolverConfig};
+use crate::kernels::Rules;
+use crate::problem::{
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
+    StepProblem,
+};
 
 /// One of the compute shaders, with its rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,13 +21,24 @@ pub enum Kernel {
     IntegrateVelocities,
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic,
-    /// Impulses that the manifolds carry; over colors.
+    /// Forgets impulses; over points.
+    ClearImpulses,
+    /// Impulses that the joints carry; over joint colors.
+    WarmStartJoints,
+    /// Impulses that the manifolds carry; over contact colors.
     WarmStart(Rules),
-    /// One sweep; over colors.
+    /// Counts a sweep, and decides whether it is still needed; `first` of its kind in a substep always is.
+    BeginSweep {
+        /// Whether it is the first.
+        first: bool,
+    },
+    /// One sweep of the joints; over joint colors.
+    SolveJoints(Rules),
+    /// One sweep of the contacts; over contact colors.
     SolveContacts(Rules),
     /// Poses; over bodies.
     IntegratePositions,
-    /// Bounces; over colors.
+    /// Bounces; over contact colors.
     ApplyRestitution(Rules),
 }
 
@@ -34,17 +48,24 @@ impl Kernel {
         match self {
             Self::IntegrateVelocities => "integrate_velocities",
             Self::IntegrateGyroscopic => "integrate_gyroscopic",
+            Self::ClearImpulses => "clear_impulses",
+            Self::WarmStartJoints => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
+            Self::BeginSweep { .. } => "begin_sweep",
+            Self::SolveJoints(_) => "solve_joints",
             Self::SolveContacts(_) => "solve_contacts",
             Self::IntegratePositions => "integrate_positions",
             Self::ApplyRestitution(_) => "apply_restitution",
         }
     }
 
-    /// Rules of a kernel over colors; none for one over bodies.
+    /// Rules of a kernel that sweeps constraints, or none.
     pub fn rules(self) -> Option<Rules> {
         match self {
-            Self::WarmStart(rules) | Self::SolveContacts(rules) | Self::ApplyRestitution(rules) => Some(rules),
+            Self::WarmStart(rules)
+            | Self::SolveJoints(rules)
+            | Self::SolveContacts(rules)
+            | Self::ApplyRestitution(rules) => Some(rules),
             _ => None,
         }
     }
@@ -53,10 +74,24 @@ impl Kernel {
 impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.name())?;
-        if let Some(rules) = self.rules() {
-            let named = [(rules.biased, "biased"), (rules.friction, "friction"), (rules.round, "round")];
+        if let Some(r) = self.rules() {
+            let friction = match r.friction {
+                FrictionRule::None => "",
+                FrictionRule::Slip => "slip friction",
+                FrictionRule::Box => "box friction",
+                FrictionRule::Disc => "disc friction",
+            };
+            let named = [
+                (r.biased, "biased"),
+                (r.friction != FrictionRule::None, friction),
+                (r.patch, "per manifold"),
+                (r.friction_first, "first"),
+                (!r.accumulated, "clamped per correction"),
+                (r.round, "round"),
+                (r.measured, "measured"),
+            ];
             let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
-            write!(f, "({})", on.join(" "))?;
+            write!(f, "({})", on.join(", "))?;
         }
         Ok(())
     }
@@ -82,14 +117,22 @@ impl StepPlan {
     /// The plan of `problem` under `config`: in each substep velocities, warm start, biased sweeps, positions, relax
     /// sweeps; bounces at the end.
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
-        let groups = color_groups(&problem.colors, config.fuse_colors_below);
-        let friction = problem.has_friction();
-        let round = problem.has_round_shapes();
-        let rules = |biased, friction| Rules { biased, friction, round };
+        let groups = |colors| color_groups(&problem.colors, colors, config.fuse_colors_below);
+        let (contacts, joints) = (groups(problem.contact_colors()), groups(problem.joint_colors()));
+        let friction = if problem.has_friction() { config.friction } else { FrictionRule::None };
+        let shared = Rules {
+            friction,
+            patch: friction != FrictionRule::None && config.friction_at == FrictionAt::Manifold,
+            friction_first: config.friction_order == FrictionOrder::FrictionFirst,
+            accumulated: config.clamping == Clamping::Accumulated,
+            round: problem.has_round_shapes(),
+            measured: config.tolerance > 0.0,
+            biased: false,
+        };
         // Friction needs some sweep to happen in.
         let relax_only = config.friction_sweeps == FrictionSweeps::Relax && config.relax > 0;
-        let biased = Kernel::SolveContacts(rules(true, friction && !relax_only));
-        let relax = Kernel::SolveContacts(rules(false, friction));
+        let biased_friction = if relax_only { FrictionRule::None } else { friction };
+        let biased = Rules { biased: true, friction: biased_friction, ..shared };
 
         let mut plan = Self::default();
         for _ in 0..config.substeps {
@@ -97,19 +140,32 @@ impl StepPlan {
             if !problem.inertias.is_empty() {
                 plan.over_bodies(Kernel::IntegrateGyroscopic);
             }
-            plan.over_colors(Kernel::WarmStart(Rules { friction, ..Rules::default() }), &groups);
-            for _ in 0..config.iterations {
-                plan.over_colors(biased, &groups);
+            plan.over_colors(Kernel::WarmStartJoints, &joints);
+            if shared.accumulated {
+                plan.over_colors(Kernel::WarmStart(shared.of_warm_start()), &contacts);
+            } else {
+                plan.over_bodies(Kernel::ClearImpulses);
             }
+            plan.sweeps(config.iterations, biased, &joints, &contacts);
             plan.over_bodies(Kernel::IntegratePositions);
-            for _ in 0..config.relax {
-                plan.over_colors(relax, &groups);
-            }
+            plan.sweeps(config.relax, shared, &joints, &contacts);
         }
         if problem.has_restitution() {
-            plan.over_colors(Kernel::ApplyRestitution(Rules::default()), &groups);
+            let rules = Rules { patch: shared.patch, ..Rules::default() };
+            plan.over_colors(Kernel::ApplyRestitution(rules), &contacts);
         }
         plan
+    }
+
+    /// Sweeps in the order of the course sheet: joints, then contacts.
+    fn sweeps(&mut self, count: u32, rules: Rules, joints: &[Range<u32>], contacts: &[Range<u32>]) {
+        for sweep in 0..count {
+            if rules.measured {
+                self.over_bodies(Kernel::BeginSweep { first: sweep == 0 });
+            }
+            self.over_colors(Kernel::SolveJoints(rules.of_joints()), joints);
+            self.over_colors(Kernel::SolveContacts(rules), contacts);
+        }
     }
 
     fn over_bodies(&mut self, kernel: Kernel) {
@@ -133,39 +189,38 @@ impl Pass {
         const MASS: usize = size_of::<MassRow>();
         // Velocities are the half of a body that a sweep writes.
         const VELOCITIES: usize = BODY / 2;
+        const PAIR: usize = 2 * (BODY + MASS + VELOCITIES);
+        const IMPULSE: usize = size_of::<ImpulseRow>();
+        let rows = problem.rows_of(&self.colors);
         let bytes = match self.kernel {
             Kernel::IntegrateVelocities => problem.bodies.len() * (VELOCITIES + MASS / 3),
             Kernel::IntegratePositions => problem.bodies.len() * (BODY + BODY / 2),
             Kernel::IntegrateGyroscopic => problem.inertias.len() * (size_of::<InertiaRow>() + BODY + MASS),
-            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                let contacts = contact_range(&problem.colors, &self.colors);
-                let rows = &problem.contacts[contacts];
-                let points: usize = rows.iter().map(|c| c.point_count as usize).sum();
-                let pair = 2 * (BODY + MASS + VELOCITIES);
-                let writes_impulses = !matches!(self.kernel, Kernel::WarmStart(_));
-                let impulses = size_of::<ImpulseRow>() * if writes_impulses { 2 } else { 1 };
-                let sweeps = if self.kernel.rules().is_some_and(|r| r.friction && writes_impulses) { 2 } else { 1 };
-                rows.len() * (size_of::<ContactRow>() + pair) + points * sweeps * (size_of::<PointRow>() + impulses)
+            Kernel::ClearImpulses => problem.impulses.len() * 2 * IMPULSE,
+            Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
+            Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
+            Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
+                let contacts = &problem.contacts[rows];
+                let points: usize = contacts.iter().map(|c| c.point_count as usize).sum();
+                let patches = if rules.patch { contacts.len() } else { 0 };
+                let writes = !matches!(self.kernel, Kernel::WarmStart(_));
+                let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
+                // Friction at points goes over them a second time; per manifold it adds one row.
+                let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
+                contacts.len() * (size_of::<ContactRow>() + PAIR) + (points + again + patches) * once
             }
         };
         bytes as u64
     }
 }
 
-/// The contacts of some neighbouring colors.
-pub fn contact_range(offsets: &[u32], colors: &Range<u32>) -> Range<usize> {
-    if colors.is_empty() {
-        return 0..0;
-    }
-    offsets[colors.start as usize] as usize..offsets[colors.end as usize] as usize
-}
-
-/// Colors of at least `fuse_below` contacts stand alone; neighbouring smaller ones go together.
-fn color_groups(offsets: &[u32], fuse_below: u32) -> Vec<Range<u32>> {
+/// Colors of at least `fuse_below` rows stand alone; neighboring smaller ones go together.
+fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Range<u32>> {
     let mut groups: Vec<Range<u32>> = Vec::new();
     let mut last_is_small = false;
-    for (color, ends) in (0..).zip(offsets.windows(2)) {
-        let small = ends[1] - ends[0] < fuse_below;
+    for color in colors {
+        let small = offsets[color as usize + 1] - offsets[color as usize] < fuse_below;
         match groups.last_mut() {
             Some(group) if small && last_is_small => group.end = color + 1,
             _ => groups.push(color..color + 1),
@@ -201,9 +256,9 @@ mod tests {
     #[test]
     fn small_neighbouring_colors_share_a_pass_and_large_ones_do_not() {
         let offsets = [0, 500, 900, 950, 960, 1500, 1510];
-        assert_eq!(color_groups(&offsets, 256), [0..1, 1..2, 2..4, 4..5, 5..6]);
-        assert_eq!(color_groups(&offsets, 0).len(), 6);
-        assert!(color_groups(&[0], 256).is_empty());
-        assert!(color_groups(&[], 256).is_empty());
+        assert_eq!(color_groups(&offsets, 0..6, 256), [0..1, 1..2, 2..4, 4..5, 5..6]);
+        assert_eq!(color_groups(&offsets, 0..6, 0).len(), 6);
+        assert_eq!(color_groups(&offsets, 2..3, 256), [2..3]);
+        assert!(color_groups(&[0], 0..0, 256).is_empty());
     }
 }

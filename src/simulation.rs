@@ -33,6 +33,7 @@ pub struct Simulation {
     backend: Box<dyn Backend>,
     detector: Detector,
     graph: ConstraintGraph,
+    joint_graph: ConstraintGraph,
     prepared: Prepared,
     problem: StepProblem,
     plan: StepPlan,
@@ -51,6 +52,7 @@ impl Simulation {
             config,
             backend,
             graph: ConstraintGraph::default(),
+            joint_graph: ConstraintGraph::default(),
             prepared: Prepared::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
@@ -66,6 +68,8 @@ impl Simulation {
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
         let pairs = self.detector.pairs_mut();
         timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
+        stats.sweeps = self.problem.convergence.sweeps;
+        stats.planned_sweeps = self.problem.convergence.planned;
         stats.first_non_finite = self.world.first_non_finite();
         Ok(stats)
     }
@@ -84,6 +88,7 @@ impl Simulation {
         let pairs = self.detector.pairs_mut();
         timed(&mut times.color, || {
             self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
+            self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
             self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
@@ -92,7 +97,8 @@ impl Simulation {
         stats.pairs = found.pairs;
         stats.computed = found.computed;
         stats.manifolds = self.problem.contacts.len();
-        stats.points = self.problem.points.len();
+        stats.points = self.problem.contacts.iter().map(|c| c.point_count as usize).sum();
+        stats.joints = self.problem.joints.len();
         stats.colors = self.prepared.coloring.color_count();
         stats.overflow = self.prepared.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();
@@ -110,6 +116,11 @@ impl Simulation {
     /// Contacts and impulses of the last step.
     pub fn pairs(&self) -> &[crate::collide::Pair] {
         self.detector.pairs()
+    }
+
+    /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].
+    pub fn joint_impulses(&self) -> &[glam::Vec3] {
+        self.prepared.joint_impulses()
     }
 
     /// The settings.

@@ -19,6 +19,12 @@ pub struct StepStats {
     pub colors: usize,
     /// Manifolds that found no color and were swept alone.
     pub overflow: usize,
+    /// Joints.
+    pub joints: usize,
+    /// Sweeps that were done, where the settings have a tolerance; else 0.
+    pub sweeps: u32,
+    /// Sweeps that the plan held, where the settings have a tolerance; else 0.
+    pub planned_sweeps: u32,
     /// Dispatches of the plan.
     pub dispatches: usize,
     /// Bytes that the kernels of the plan read and write.

@@ -9,5 +9,8 @@
 @group(0) @binding(6) var<storage, read> points: array<Point>;
 @group(0) @binding(7) var<storage, read_write> impulses: array<Impulse>;
 @group(0) @binding(8) var<storage, read> colors: array<u32>;
+@group(0) @binding(9) var<storage, read> joints: array<Joint>;
+@group(0) @binding(10) var<storage, read_write> joint_impulses: array<JointImpulse>;
+@group(0) @binding(11) var<storage, read_write> convergence: Convergence;
 
 const WORKGROUP: u32 = 64u;

@@ -14,13 +14,20 @@ struct Contact {
     normal: vec3f, friction: f32,
     tangent: vec3f, restitution: f32,
     body_a: u32, body_b: u32, first_point: u32, point_count: u32,
+    radius_a: f32, radius_b: f32,
 }
 
 struct Point {
     r_a: vec3f, separation: f32,
     r_b: vec3f, normal_mass: f32,
-    tangent_mass: f32, approach_velocity: f32, radius_a: f32, radius_b: f32,
+    tangent_mass: f32, approach_velocity: f32, slip_1: f32, slip_2: f32,
 }
+
+struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f }
+
+struct JointImpulse { linear: vec3f }
+
+struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
 struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
 
@@ -30,7 +37,9 @@ struct Params {
     substep: f32, inverse_substep: f32, restitution_threshold: f32, inertia_count: u32,
     movable: Softness,
     fixed: Softness,
-    body_count: u32,
+    joint: Softness,
+    body_count: u32, point_count: u32, slop: f32, relaxation: f32,
+    tolerance: f32,
 }
 
 // The colors that one dispatch sweeps, one after another.

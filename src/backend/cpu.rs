@@ -2,12 +2,13 @@
 
 use super::Backend;
 use crate::error::Result;
-use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
+use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
-use crate::kernels::{Body, Contact, Impulse, Inertia, Mass, Pair, Point, StepParams};
-use crate::math::Scalar;
-use crate::plan::{Kernel, Pass, contact_range};
-use crate::problem::StepProblem;
+use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::{Body, Contact, Impulse, Inertia, Joint, Mass, Pair, Point, Rules, StepParams};
+use crate::math::{Scalar, Vec3};
+use crate::plan::{Kernel, Pass};
+use crate::problem::{ConvergenceRow, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 #[derive(Debug, Default)]
@@ -19,6 +20,9 @@ pub struct Reference<S> {
     contacts: Vec<Contact<S>>,
     points: Vec<Point<S>>,
     impulses: Vec<Impulse<S>>,
+    joints: Vec<Joint<S>>,
+    joint_impulses: Vec<Vec3<S>>,
+    convergence: ConvergenceRow,
 }
 
 impl<S: Scalar> Reference<S> {
@@ -39,6 +43,9 @@ impl<S: Scalar> Reference<S> {
         refill(&problem.contacts, &mut self.contacts, Contact::load);
         refill(&problem.points, &mut self.points, Point::load);
         refill(&problem.impulses, &mut self.impulses, Impulse::load);
+        refill(&problem.joints, &mut self.joints, Joint::load);
+        refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
+        self.convergence = problem.convergence;
     }
 
     fn store(&self, problem: &mut StepProblem) {
@@ -48,6 +55,10 @@ impl<S: Scalar> Reference<S> {
         for (row, impulse) in problem.impulses.iter_mut().zip(&self.impulses) {
             *row = impulse.store();
         }
+        for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
+            row.linear = impulse.store();
+        }
+        problem.convergence = self.convergence;
     }
 
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
@@ -69,42 +80,105 @@ impl<S: Scalar> Reference<S> {
                     integrate_positions(params, body);
                 }
             }
-            Kernel::WarmStart(rules) => self.over_contacts(problem, pass, |_, pair, contact, points, impulses| {
-                warm_start(rules, pair, contact, points, impulses);
+            Kernel::ClearImpulses => self.impulses.iter_mut().for_each(clear_impulse),
+            Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
+            Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
+                warm_start_joint(pair, joint, *impulse);
             }),
-            Kernel::SolveContacts(rules) => {
-                self.over_contacts(problem, pass, |params, pair, contact, points, impulses| {
-                    solve_contact(rules, params, pair, contact, points, impulses);
+            Kernel::SolveJoints(rules) => {
+                if !self.is_converged(rules) {
+                    self.over_joints(problem, pass, |params, pair, joint, impulse| {
+                        solve_joint(rules, params, pair, joint, impulse);
+                    });
+                }
+            }
+            Kernel::WarmStart(rules) => {
+                self.over_contacts(rules, problem, pass, |_, pair, contact, points, impulses| {
+                    warm_start(rules, pair, contact, points, impulses);
                 });
             }
-            Kernel::ApplyRestitution(_) => self.over_contacts(problem, pass, restitute_contact),
+            Kernel::SolveContacts(rules) => {
+                if !self.is_converged(rules) {
+                    self.over_contacts(rules, problem, pass, |params, pair, contact, points, impulses| {
+                        solve_contact(rules, params, pair, contact, points, impulses);
+                    });
+                }
+            }
+            Kernel::ApplyRestitution(rules) => {
+                self.over_contacts(rules, problem, pass, |params, pair, contact, points, impulses| {
+                    restitute_contact(rules, params, pair, contact, points, impulses);
+                });
+            }
         }
     }
 
-    /// One manifold after another: its two bodies in, the kernel, the velocities of those that can move out.
+    /// One manifold after another.
     fn over_contacts(
         &mut self,
+        rules: Rules,
         problem: &StepProblem,
         pass: &Pass,
         kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Contact<S>, &[Point<S>], &mut [Impulse<S>]),
     ) {
-        for i in contact_range(&problem.colors, &pass.colors) {
+        for i in problem.rows_of(&pass.colors) {
             let row = &problem.contacts[i];
-            let (a, b) = (row.body_a as usize, row.body_b as usize);
-            let points = row.first_point as usize..(row.first_point + row.point_count) as usize;
-            let (mass_a, mass_b) = (self.masses[a], self.masses[b]);
-            let mut pair = Pair { a: self.bodies[a], b: self.bodies[b], mass_a, mass_b };
-            let impulses = &mut self.impulses[points.clone()];
-            kernel(&self.params, &mut pair, &self.contacts[i], &self.points[points], impulses);
-            let zero = S::constant(0.0);
-            if mass_a.inv_mass > zero {
-                (self.bodies[a].v, self.bodies[a].w) = (pair.a.v, pair.a.w);
-            }
-            if mass_b.inv_mass > zero {
-                (self.bodies[b].v, self.bodies[b].w) = (pair.b.v, pair.b.w);
-            }
+            let bodies = [row.body_a as usize, row.body_b as usize];
+            let mut pair = self.load_pair(bodies);
+            let first = row.first_point as usize;
+            let rows = first..first + row.point_count as usize + usize::from(rules.patch);
+            let (points, impulses) = (&self.points[rows.clone()], &mut self.impulses[rows]);
+            kernel(&self.params, &mut pair, &self.contacts[i], points, impulses);
+            self.store_pair(bodies, &pair);
         }
     }
+
+    /// One joint after another.
+    fn over_joints(
+        &mut self,
+        problem: &StepProblem,
+        pass: &Pass,
+        kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Joint<S>, &mut Vec3<S>),
+    ) {
+        for i in problem.rows_of(&pass.colors) {
+            let row = &problem.joints[i];
+            let bodies = [row.body_a as usize, row.body_b as usize];
+            let mut pair = self.load_pair(bodies);
+            kernel(&self.params, &mut pair, &self.joints[i], &mut self.joint_impulses[i]);
+            self.store_pair(bodies, &pair);
+        }
+    }
+
+    fn load_pair(&self, [a, b]: [usize; 2]) -> Pair<S> {
+        let (mass_a, mass_b) = (self.masses[a], self.masses[b]);
+        Pair { a: self.bodies[a], b: self.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
+    }
+
+    /// A body that cannot move is never written.
+    fn store_pair(&mut self, [a, b]: [usize; 2], pair: &Pair<S>) {
+        let zero = S::constant(0.0);
+        if pair.mass_a.inv_mass > zero {
+            (self.bodies[a].v, self.bodies[a].w) = (pair.a.v, pair.a.w);
+        }
+        if pair.mass_b.inv_mass > zero {
+            (self.bodies[b].v, self.bodies[b].w) = (pair.b.v, pair.b.w);
+        }
+        if pair.moving > zero {
+            self.convergence.moving = 1;
+        }
+    }
+
+    fn is_converged(&self, rules: Rules) -> bool {
+        rules.measured && self.convergence.done != 0
+    }
+}
+
+/// Decides whether the sweep that follows is still needed, and counts. Kernel `begin_sweep`.
+fn begin_sweep(first: bool, convergence: &mut ConvergenceRow) {
+    let done = !first && (convergence.done != 0 || convergence.moving == 0);
+    convergence.done = u32::from(done);
+    convergence.sweeps += u32::from(!done);
+    convergence.planned += 1;
+    convergence.moving = 0;
 }
 
 impl<S: Scalar> Backend for Reference<S> {

@@ -39,6 +39,10 @@ pub struct Manifold {
     pub radius_a: f32,
     /// Radius of curvature of b's surface where it touches [m].
     pub radius_b: f32,
+    /// Impulse of the twist about the normal, with friction per manifold [N m s].
+    pub twist_impulse: f32,
+    /// Friction impulse on b, with friction per manifold, world axes [N s].
+    pub friction_impulse: Vec3,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
     points: [ManifoldPoint; MAX_POINTS],
@@ -50,7 +54,17 @@ impl Manifold {
     pub(super) fn new(normal: Vec3, parts: (u32, u32), candidates: &[ManifoldPoint]) -> Self {
         let mut points = [ManifoldPoint::default(); MAX_POINTS];
         let count = reduce(normal, candidates, &mut points);
-        Self { normal, parts, radius_a: 0.0, radius_b: 0.0, color: None, points, count: count as u8 }
+        Self {
+            normal,
+            parts,
+            radius_a: 0.0,
+            radius_b: 0.0,
+            twist_impulse: 0.0,
+            friction_impulse: Vec3::ZERO,
+            color: None,
+            points,
+            count: count as u8,
+        }
     }
 
     /// Its points.
@@ -67,6 +81,8 @@ impl Manifold {
     /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` [m].
     pub(super) fn inherit(&mut self, old: &Self, distance: f32) {
         self.color = old.color;
+        self.twist_impulse = old.twist_impulse;
+        self.friction_impulse = old.friction_impulse;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {

@@ -9,7 +9,7 @@ mod narrow;
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
 pub use narrow::Pair;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -43,6 +43,8 @@ pub struct Detector {
     pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
+    /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
+    jointed: HashSet<(u32, u32)>,
 }
 
 /// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
@@ -77,6 +79,12 @@ impl Detector {
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
+            jointed: world
+                .joints
+                .iter()
+                .filter(|j| !j.collide)
+                .filter_map(|j| Some(key(j.body_a as u32, j.body_b? as u32)))
+                .collect(),
         }
     }
 
@@ -210,7 +218,8 @@ impl Detector {
         for &(i, j) in &self.found {
             let (ci, cj) = (&self.colliders[i as usize], &self.colliders[j as usize]);
             let dynamic = |c: &ColliderInfo| self.kinds[c.body as usize] == BodyKind::Dynamic;
-            if ci.body == cj.body || !(dynamic(ci) || dynamic(cj)) {
+            let apart = ci.body == cj.body || self.jointed.contains(&key(ci.body, cj.body));
+            if apart || !(dynamic(ci) || dynamic(cj)) {
                 continue;
             }
             let slot = self.pairs.len() as u32;

@@ -1,49 +1,26 @@
-//! What happens at one manifold. Doubles of `shaders/lib/contact.wgsl`, `warm_start`, `solve_contacts` and
-//! `apply_restitution`.
+//! What happens at one manifold. Doubles of `shaders/lib/contact.wgsl`, `shaders/lib/sweep.wgsl` and of the kernels
+//! `clear_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
 //! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share
-//! the lanes of fuller ones.
+//! the lanes of fuller ones. With friction per manifold the last of `points` and `impulses` is the patch.
 
+use super::Rules;
+use super::friction::{solve_friction, solve_twist};
+use super::pair::{apply_impulse, note_correction, relative_movement, relative_velocity};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
-use crate::math::{Lane, Vec3, cross3, dot3, larger, turned};
-
-/// The rules of one kernel: the overrides of `shaders/lib/contact.wgsl`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Rules {
-    /// Whether overlap is pushed out.
-    pub biased: bool,
-    /// Whether friction acts.
-    pub friction: bool,
-    /// Whether any surface is round.
-    pub round: bool,
-}
-
-#[inline(always)]
-fn apply_impulse<L: Lane>(pair: &mut Pair<L>, point: &Point<L>, p: Vec3<L>) {
-    pair.a.v -= p * pair.mass_a.inv_mass;
-    pair.a.w -= pair.mass_a.inv_inertia.times(cross3(point.r_a, p));
-    pair.b.v += p * pair.mass_b.inv_mass;
-    pair.b.w += pair.mass_b.inv_inertia.times(cross3(point.r_b, p));
-}
-
-/// Velocity of b relative to a at the point.
-#[inline(always)]
-pub fn relative_velocity<L: Lane>(pair: &Pair<L>, point: &Point<L>) -> Vec3<L> {
-    (pair.b.v + cross3(pair.b.w, point.r_b)) - (pair.a.v + cross3(pair.a.w, point.r_a))
-}
+use crate::config::FrictionRule;
+use crate::math::{Lane, cross3, dot3, larger, smaller};
 
 /// Separation now: what it was when the step began, and what the bodies moved since.
 #[inline(always)]
-pub fn current_separation<L: Lane>(rules: Rules, pair: &Pair<L>, point: &Point<L>, normal: Vec3<L>) -> L {
+pub fn current_separation<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<L>, point: &Point<L>) -> L {
     let (mut arm_a, mut arm_b) = (point.r_a, point.r_b);
     // A round surface turns under its contact: what is carried along is the centre of its curvature.
     if rules.round {
-        arm_a -= normal * point.radius_a;
-        arm_b += normal * point.radius_b;
+        arm_a -= contact.normal * contact.radius_a;
+        arm_b += contact.normal * contact.radius_b;
     }
-    let moved_b = pair.b.dp + turned(pair.b.dq, arm_b);
-    let moved_a = pair.a.dp + turned(pair.a.dq, arm_a);
-    point.separation + dot3(moved_b - moved_a, normal)
+    point.separation + dot3(relative_movement(pair, arm_a, arm_b), contact.normal)
 }
 
 #[inline(always)]
@@ -59,7 +36,14 @@ fn pair_softness<L: Lane>(params: &StepParams<L>, pair: &Pair<L>) -> SoftnessOf<
     }
 }
 
-/// Non-penetration: the sum of the impulses pushes, never pulls.
+/// The impulse pushes, never pulls: the sum of the corrections, or each by itself.
+#[inline(always)]
+fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
+    let zero = L::constant(0.0);
+    if rules.accumulated { larger(sum + correction, zero) } else { sum + larger(correction, zero) }
+}
+
+/// Non-penetration at one point.
 #[inline(always)]
 fn solve_normal<L: Lane>(
     rules: Rules,
@@ -71,46 +55,27 @@ fn solve_normal<L: Lane>(
     impulse: &mut Impulse<L>,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let s = current_separation(rules, pair, point, contact.normal);
+    let s = current_separation(rules, pair, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s.gt(zero);
-    let pushed = larger(softness.bias_rate * s, -softness.push_limit);
+    let pushed = larger(softness.bias_rate * smaller(s + params.slop, zero), -softness.push_limit);
     let bias = L::select(if rules.biased { pushed } else { zero }, s * params.inverse_substep, apart);
     let mass_scale = L::select(if rules.biased { softness.mass_scale } else { one }, one, apart);
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
-    let vn = dot3(relative_velocity(pair, point), contact.normal);
+    let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
     let correction = -(point.normal_mass * mass_scale * (vn + bias)) - impulse_scale * impulse.normal;
-    let sum = larger(impulse.normal + correction, zero);
+    let sum = clamp_normal(rules, impulse.normal, params.relaxation * correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
     impulse.peak = larger(impulse.peak, sum);
-    apply_impulse(pair, point, contact.normal * change);
+    note_correction(rules, params, pair, change, point.normal_mass);
+    apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
 }
 
-/// Coulomb friction: the sum of the tangential impulses stays in the disc of radius mu times the normal impulse.
-///
-/// The step along both tangents has one length, one over the larger eigenvalue of the tangential block: with a matrix
-/// step the clamped point slips in a wrong direction unless that block is isotropic.
+/// Forgets the impulse of one point. Kernel `clear_impulses`.
 #[inline(always)]
-fn solve_friction<L: Lane>(
-    pair: &mut Pair<L>,
-    contact: &Contact<L>,
-    tangent_2: Vec3<L>,
-    point: &Point<L>,
-    impulse: &mut Impulse<L>,
-) {
-    let u = relative_velocity(pair, point);
-    let y_1 = impulse.tangent_1 - point.tangent_mass * dot3(u, contact.tangent);
-    let y_2 = impulse.tangent_2 - point.tangent_mass * dot3(u, tangent_2);
-    let radius = contact.friction * impulse.normal;
-    let length_squared = y_1 * y_1 + y_2 * y_2;
-    let scale = L::select(L::constant(1.0), radius * length_squared.inverse_sqrt(), length_squared.gt(radius * radius));
-    let sum_1 = y_1 * scale;
-    let sum_2 = y_2 * scale;
-    let change = contact.tangent * (sum_1 - impulse.tangent_1) + tangent_2 * (sum_2 - impulse.tangent_2);
-    impulse.tangent_1 = sum_1;
-    impulse.tangent_2 = sum_2;
-    apply_impulse(pair, point, change);
+pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
+    *impulse = Impulse { peak: impulse.peak, ..Impulse::default() };
 }
 
 /// Applies the impulses that a manifold already carries. Kernel `warm_start`.
@@ -123,16 +88,25 @@ pub fn warm_start<L: Lane>(
     impulses: &[Impulse<L>],
 ) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
+    let (points, patch) = points.split_at(rules.contact_points(points.len()));
     for (point, impulse) in points.iter().zip(impulses) {
         let mut p = contact.normal * impulse.normal;
-        if rules.friction {
+        if rules.friction != FrictionRule::None && !rules.patch {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
-        apply_impulse(pair, point, p);
+        apply_impulse(pair, point.r_a, point.r_b, p);
+    }
+    if rules.friction != FrictionRule::None && rules.patch {
+        let impulse = &impulses[points.len()];
+        let twist = contact.normal * impulse.normal;
+        pair.a.w -= pair.mass_a.inv_inertia.times(twist);
+        pair.b.w += pair.mass_b.inv_inertia.times(twist);
+        let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+        apply_impulse(pair, patch[0].r_a, patch[0].r_b, p);
     }
 }
 
-/// Sweeps one manifold: all normals first, then friction within the cone they span. Kernel `solve_contacts`.
+/// Sweeps one manifold. Kernel `solve_contacts`.
 #[inline(always)]
 pub fn solve_contact<L: Lane>(
     rules: Rules,
@@ -142,14 +116,42 @@ pub fn solve_contact<L: Lane>(
     points: &[Point<L>],
     impulses: &mut [Impulse<L>],
 ) {
+    let has_friction = rules.friction != FrictionRule::None;
+    if has_friction && rules.friction_first {
+        sweep_friction(rules, params, pair, contact, points, impulses);
+    }
     let softness = pair_softness(params, pair);
-    for (point, impulse) in points.iter().zip(impulses.iter_mut()) {
+    let contact_points = rules.contact_points(points.len());
+    for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
         solve_normal(rules, params, &softness, pair, contact, point, impulse);
     }
-    if rules.friction {
-        let tangent_2 = cross3(contact.normal, contact.tangent);
+    if has_friction && !rules.friction_first {
+        sweep_friction(rules, params, pair, contact, points, impulses);
+    }
+}
+
+#[inline(always)]
+fn sweep_friction<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    points: &[Point<L>],
+    impulses: &mut [Impulse<L>],
+) {
+    if rules.patch {
+        let (points, patch) = points.split_at(rules.contact_points(points.len()));
+        let (impulses, patch_impulse) = impulses.split_at_mut(points.len());
+        let (mut pressed, mut lever) = (L::constant(0.0), L::constant(0.0));
         for (point, impulse) in points.iter().zip(impulses) {
-            solve_friction(pair, contact, tangent_2, point, impulse);
+            pressed = pressed + impulse.normal;
+            lever = lever + impulse.normal * point.slip_1;
+        }
+        solve_twist(params, pair, contact, &patch[0], lever, &mut patch_impulse[0]);
+        solve_friction(rules, params, pair, contact, &patch[0], pressed, &mut patch_impulse[0]);
+    } else {
+        for (point, impulse) in points.iter().zip(impulses) {
+            solve_friction(rules, params, pair, contact, point, impulse.normal, impulse);
         }
     }
 }
@@ -157,6 +159,7 @@ pub fn solve_contact<L: Lane>(
 /// Makes the points bounce that were hit fast enough. Kernel `apply_restitution`.
 #[inline(always)]
 pub fn restitute_contact<L: Lane>(
+    rules: Rules,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
@@ -164,15 +167,16 @@ pub fn restitute_contact<L: Lane>(
     impulses: &mut [Impulse<L>],
 ) {
     let zero = L::constant(0.0);
-    for (point, impulse) in points.iter().zip(impulses) {
+    let contact_points = rules.contact_points(points.len());
+    for (point, impulse) in points[..contact_points].iter().zip(impulses) {
         let hit = (-params.restitution_threshold).gt(point.approach_velocity);
         let bounces = L::and(hit, impulse.peak.gt(zero));
-        let vn = dot3(relative_velocity(pair, point), contact.normal);
+        let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
         let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
         let sum = L::select(impulse.normal, larger(impulse.normal + correction, zero), bounces);
         let change = sum - impulse.normal;
         impulse.normal = sum;
         impulse.peak = larger(impulse.peak, sum);
-        apply_impulse(pair, point, contact.normal * change);
+        apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
     }
 }

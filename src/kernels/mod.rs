@@ -1,10 +1,68 @@
 //! The Rust doubles of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
 //!
-//! `contact` is the double of `shaders/lib/contact.wgsl` and of the kernels that sweep manifolds, `integrate` of those
-//! that go over bodies. Branches on data are `select`s; branches on rules are plain `if`s, as overrides are in WGSL.
+//! `pair`, `contact`, `friction` and `joint` are the doubles of the parts of that name in `shaders/lib` and of the kernels
+//! that sweep constraints, `integrate` of those that go over bodies. Branches on data are `select`s; branches on rules are
+//! plain `if`s, as overrides are in WGSL.
 
 pub mod contact;
+pub mod friction;
 pub mod integrate;
+pub mod joint;
+pub mod pair;
 mod rows;
 
-pub use rows::{Body, Contact, Impulse, Inertia, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+pub use rows::{Body, Contact, Impulse, Inertia, Joint, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+
+use crate::config::FrictionRule;
+
+/// The rules of one kernel: the overrides of the shaders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rules {
+    /// Whether overlap and gaps are removed.
+    pub biased: bool,
+    /// How friction is modelled.
+    pub friction: FrictionRule,
+    /// Whether friction acts once a manifold.
+    pub patch: bool,
+    /// Whether friction comes before the normals.
+    pub friction_first: bool,
+    /// Whether the sum of the normal impulses is clamped, and not every correction.
+    pub accumulated: bool,
+    /// Whether any surface is round.
+    pub round: bool,
+    /// Whether corrections are held against the tolerance.
+    pub measured: bool,
+}
+
+impl Default for Rules {
+    /// Relax sweeps of flat, frictionless contacts.
+    fn default() -> Self {
+        Self {
+            biased: false,
+            friction: FrictionRule::None,
+            patch: false,
+            friction_first: false,
+            accumulated: true,
+            round: false,
+            measured: false,
+        }
+    }
+}
+
+impl Rules {
+    /// What a warm start asks of them: where friction acts, and nothing else.
+    pub fn of_warm_start(self) -> Self {
+        Self { friction: self.friction, patch: self.patch, ..Self::default() }
+    }
+
+    /// What joints ask of them.
+    pub fn of_joints(self) -> Self {
+        Self { biased: self.biased, measured: self.measured, ..Self::default() }
+    }
+
+    /// How many of a manifold's rows are contact points; the patch is not.
+    #[inline(always)]
+    pub fn contact_points(self, rows: usize) -> usize {
+        if self.patch { rows - 1 } else { rows }
+    }
+}

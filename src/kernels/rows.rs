@@ -1,7 +1,7 @@
 //! The rows of a problem as the kernels see them: over a lane, without padding.
 
 use crate::math::{Lane, Quat, Scalar, Vec3, dot3, vec3};
-use crate::problem::{BodyRow, ContactRow, ImpulseRow, InertiaRow, MassRow, Params, PointRow, Softness};
+use crate::problem::{BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, Params, PointRow, Softness};
 
 /// Double of the WGSL struct `Body`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,6 +67,10 @@ pub struct Contact<L> {
     pub friction: L,
     /// Restitution.
     pub restitution: L,
+    /// Radius of curvature of a's surface.
+    pub radius_a: L,
+    /// Radius of curvature of b's surface.
+    pub radius_b: L,
 }
 
 /// Double of the WGSL struct `Point`.
@@ -78,16 +82,27 @@ pub struct Point<L> {
     pub r_b: Vec3<L>,
     /// Separation when the step begins.
     pub separation: L,
-    /// Effective mass along the normal.
+    /// Effective mass along the normal; of a patch, about it.
     pub normal_mass: L,
-    /// Effective mass of the stiffest tangential direction.
+    /// Effective mass of the tangential step.
     pub tangent_mass: L,
     /// Normal velocity when the step begins.
     pub approach_velocity: L,
-    /// Radius of curvature of a's surface.
-    pub radius_a: L,
-    /// Radius of curvature of b's surface.
-    pub radius_b: L,
+    /// Slip direction along the first tangent; with friction per manifold, distance from the patch.
+    pub slip_1: L,
+    /// Slip direction along the second tangent.
+    pub slip_2: L,
+}
+
+/// Double of the WGSL struct `Joint`, without the indices.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Joint<L> {
+    /// Arm of a when the step begins.
+    pub r_a: Vec3<L>,
+    /// Arm of b when the step begins.
+    pub r_b: Vec3<L>,
+    /// Anchor of b less anchor of a when the step begins.
+    pub gap: Vec3<L>,
 }
 
 /// Double of the WGSL struct `Impulse`.
@@ -129,6 +144,14 @@ pub struct StepParams<L> {
     pub movable: SoftnessOf<L>,
     /// Contacts with a body that cannot.
     pub fixed: SoftnessOf<L>,
+    /// Joints.
+    pub joint: SoftnessOf<L>,
+    /// Overlap that is left alone.
+    pub slop: L,
+    /// What every correction is multiplied by.
+    pub relaxation: L,
+    /// Corrections that change a relative velocity by less count as none.
+    pub tolerance: L,
 }
 
 /// Double of the WGSL struct `Pair`: two bodies while one thread works on them.
@@ -142,6 +165,8 @@ pub struct Pair<L> {
     pub mass_a: Mass<L>,
     /// Mass of b.
     pub mass_b: Mass<L>,
+    /// 1 once a correction was above the tolerance.
+    pub moving: L,
 }
 
 impl<S: Scalar> Body<S> {
@@ -182,28 +207,27 @@ impl<S: Scalar> Inertia<S> {
 impl<S: Scalar> Contact<S> {
     /// From storage.
     pub fn load(r: &ContactRow) -> Self {
-        Self {
-            normal: Vec3::load(r.normal),
-            tangent: Vec3::load(r.tangent),
-            friction: S::from_f32(r.friction),
-            restitution: S::from_f32(r.restitution),
-        }
+        let [friction, restitution, radius_a, radius_b] =
+            [r.friction, r.restitution, r.radius_a, r.radius_b].map(S::from_f32);
+        let (normal, tangent) = (Vec3::load(r.normal), Vec3::load(r.tangent));
+        Self { normal, tangent, friction, restitution, radius_a, radius_b }
     }
 }
 
 impl<S: Scalar> Point<S> {
     /// From storage.
     pub fn load(r: &PointRow) -> Self {
-        Self {
-            r_a: Vec3::load(r.r_a),
-            r_b: Vec3::load(r.r_b),
-            separation: S::from_f32(r.separation),
-            normal_mass: S::from_f32(r.normal_mass),
-            tangent_mass: S::from_f32(r.tangent_mass),
-            approach_velocity: S::from_f32(r.approach_velocity),
-            radius_a: S::from_f32(r.radius_a),
-            radius_b: S::from_f32(r.radius_b),
-        }
+        let [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2] =
+            [r.separation, r.normal_mass, r.tangent_mass, r.approach_velocity, r.slip_1, r.slip_2].map(S::from_f32);
+        let (r_a, r_b) = (Vec3::load(r.r_a), Vec3::load(r.r_b));
+        Self { r_a, r_b, separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 }
+    }
+}
+
+impl<S: Scalar> Joint<S> {
+    /// From storage.
+    pub fn load(r: &JointRow) -> Self {
+        Self { r_a: Vec3::load(r.r_a), r_b: Vec3::load(r.r_b), gap: Vec3::load(r.gap) }
     }
 }
 
@@ -237,6 +261,10 @@ impl<S: Scalar> StepParams<S> {
             restitution_threshold: S::from_f32(p.restitution_threshold),
             movable: softness(&p.movable),
             fixed: softness(&p.fixed),
+            joint: softness(&p.joint),
+            slop: S::from_f32(p.slop),
+            relaxation: S::from_f32(p.relaxation),
+            tolerance: S::from_f32(p.tolerance),
         }
     }
 }

@@ -22,6 +22,12 @@ pub struct BodyRow {
     pub dq: [f32; 4],
 }
 
+impl BodyRow {
+    /// A body that does not move.
+    pub const AT_REST: Self =
+        Self { v: [0.0; 3], pad_v: 0.0, w: [0.0; 3], pad_w: 0.0, dp: [0.0; 3], pad_dp: 0.0, dq: [0.0, 0.0, 0.0, 1.0] };
+}
+
 /// How hard one body is to move, 48 B. All zero for a body that cannot be pushed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -53,7 +59,7 @@ pub struct InertiaRow {
     pub frame: [f32; 4],
 }
 
-/// One manifold: the contact of two bodies over up to four points with one normal, 48 B.
+/// One manifold: the contact of two bodies over up to four points with one normal, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ContactRow {
@@ -71,8 +77,14 @@ pub struct ContactRow {
     pub body_b: u32,
     /// Where its points begin in `points` and `impulses`.
     pub first_point: u32,
-    /// How many points it has, 1 to 4.
+    /// How many points it has, 1 to 4. With friction per manifold one more row follows them, the patch: its arms are those
+    /// of their middle, its normal mass is that of the twist about the normal, its normal impulse the twist's.
     pub point_count: u32,
+    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp [m]: a round body turns under its contact.
+    pub radius_a: f32,
+    /// Radius of curvature of b's surface [m].
+    pub radius_b: f32,
+    pub(crate) pad: [f32; 2],
 }
 
 /// One contact point, 48 B.
@@ -87,14 +99,55 @@ pub struct PointRow {
     pub r_b: [f32; 3],
     /// One over the normal entry of G M⁻¹ Gᵀ [kg].
     pub normal_mass: f32,
-    /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ [kg].
+    /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ; with one slip direction, one over the
+    /// entry of that direction [kg].
     pub tangent_mass: f32,
     /// Normal velocity when the step begins, negative when approaching [m/s].
     pub approach_velocity: f32,
-    /// Radius of curvature of a's surface at the point, 0 if flat or sharp [m]: a round body turns under its contact.
-    pub radius_a: f32,
-    /// Radius of curvature of b's surface [m].
-    pub radius_b: f32,
+    /// Component of the slip direction along the first tangent; with friction per manifold, distance from the patch [m].
+    pub slip_1: f32,
+    /// Component of the slip direction along the second tangent.
+    pub slip_2: f32,
+}
+
+/// One ball joint: the anchors of two bodies coincide, 48 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct JointRow {
+    /// From the centre of mass of a to its anchor when the step begins, world axes [m].
+    pub r_a: [f32; 3],
+    /// One body.
+    pub body_a: u32,
+    /// From the centre of mass of b to its anchor [m].
+    pub r_b: [f32; 3],
+    /// The other body.
+    pub body_b: u32,
+    /// Anchor of b less anchor of a when the step begins [m].
+    pub gap: [f32; 3],
+    pub(crate) pad: f32,
+}
+
+/// The impulse of one joint on its body b, accumulated, 16 B [N s].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct JointImpulseRow {
+    /// World axes.
+    pub linear: [f32; 3],
+    pub(crate) pad: f32,
+}
+
+/// Whether sweeps still move anything, 16 B. Written by the sweeps of a step that has a tolerance.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct ConvergenceRow {
+    /// 1 if a correction of this sweep was above the tolerance.
+    pub moving: u32,
+    /// 1 if the remaining sweeps of this substep are skipped.
+    pub done: u32,
+    /// Sweeps that were not skipped, over the whole step.
+    pub sweeps: u32,
+    /// Sweeps that the plan holds, over the whole step.
+    pub planned: u32,
 }
 
 /// The impulses of one point, accumulated over the substeps' sweeps, 16 B [N s].
@@ -125,7 +178,14 @@ pub struct Softness {
     pub push_limit: f32,
 }
 
-/// What is the same for every body and contact of a step, 64 B.
+impl Softness {
+    /// A rigid constraint with a target velocity of `bias_rate` times the overlap.
+    pub fn rigid(bias_rate: f32, push_limit: f32) -> Self {
+        Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
+    }
+}
+
+/// What is the same for every body and contact of a step, 96 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
@@ -141,8 +201,18 @@ pub struct Params {
     pub movable: Softness,
     /// Contacts with a body that cannot.
     pub fixed: Softness,
+    /// Joints.
+    pub joint: Softness,
     /// Number of bodies.
     pub body_count: u32,
+    /// Number of points, patches included.
+    pub point_count: u32,
+    /// Overlap that is left alone [m].
+    pub slop: f32,
+    /// What every correction is multiplied by.
+    pub relaxation: f32,
+    /// Corrections that change a relative velocity by less count as none [m/s].
+    pub tolerance: f32,
     pub(crate) pad: [u32; 3],
 }
 

@@ -5,10 +5,16 @@ mod prepare;
 pub mod softness;
 mod store;
 
-pub use layout::{BodyRow, ContactRow, ImpulseRow, InertiaRow, MassRow, Params, PassColors, PointRow, Softness};
+pub use layout::{
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
+    PassColors, PointRow, Softness,
+};
 pub use prepare::Prepared;
 
-/// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`).
+use std::ops::Range;
+
+/// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
+/// `joint_impulses`, `convergence`).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepProblem {
     /// The same for all.
@@ -25,14 +31,35 @@ pub struct StepProblem {
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
-    /// Where each color begins in `contacts`, and where the last ends.
+    /// Where each color begins in `contacts`, and where the last ends; then the same for `joints`.
     pub colors: Vec<u32>,
+    /// Which of `colors` is the first of the joints.
+    pub first_joint_color: u32,
+    /// Ball joints in color order.
+    pub joints: Vec<JointRow>,
+    /// Impulses of the joints.
+    pub joint_impulses: Vec<JointImpulseRow>,
+    /// Whether the sweeps still move anything.
+    pub convergence: ConvergenceRow,
 }
 
 impl StepProblem {
-    /// Number of colors.
-    pub fn color_count(&self) -> u32 {
-        self.colors.len().saturating_sub(1) as u32
+    /// Colors of the contacts.
+    pub fn contact_colors(&self) -> Range<u32> {
+        0..self.first_joint_color.saturating_sub(1)
+    }
+
+    /// Colors of the joints.
+    pub fn joint_colors(&self) -> Range<u32> {
+        self.first_joint_color..(self.colors.len() as u32).saturating_sub(1).max(self.first_joint_color)
+    }
+
+    /// The contacts, or joints, of some neighboring colors.
+    pub fn rows_of(&self, colors: &Range<u32>) -> Range<usize> {
+        if colors.is_empty() {
+            return 0..0;
+        }
+        self.colors[colors.start as usize] as usize..self.colors[colors.end as usize] as usize
     }
 
     /// Whether any contact has friction.
@@ -47,6 +74,6 @@ impl StepProblem {
 
     /// Whether any contact is made by a round surface, whose radius its rows carry.
     pub fn has_round_shapes(&self) -> bool {
-        self.points.iter().any(|p| p.radius_a > 0.0 || p.radius_b > 0.0)
+        self.contacts.iter().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
     }
 }

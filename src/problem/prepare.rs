@@ -1,15 +1,18 @@
 //! From bodies and manifolds to rows: arms, effective masses, impulses carried over.
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::StepProblem;
-use super::layout::{BodyRow, ContactRow, ImpulseRow, InertiaRow, MassRow, Params, PointRow};
+use super::layout::{
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
+    Softness,
+};
 use super::softness::softness;
 use crate::collide::{Manifold, ManifoldPoint, Pair};
-use crate::config::{FrictionRule, SolverConfig};
+use crate::config::{FrictionAt, FrictionRule, SolverConfig, Stabilization};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
-use crate::world::{Body, BodyKind, World};
+use crate::world::{BallJoint, Body, BodyKind, World};
 
 /// Which manifold each row came from: what `store` needs to give the impulses back.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +22,14 @@ pub struct Prepared {
     /// Where each row's contact stands in `contacts`, and where the contact's row is.
     pub(super) row_of: Vec<u32>,
     edges: Vec<Edge>,
-    /// The coloring of this step.
+    /// The coloring of this step's contacts.
     pub coloring: Coloring,
+    /// Whether every manifold has a row for friction of its own.
+    pub(super) patches: bool,
+    joint_edges: Vec<Edge>,
+    pub(super) joint_coloring: Coloring,
+    /// Impulse of each joint at the end of the step before.
+    pub(super) joint_impulses: Vec<Vec3>,
 }
 
 /// Contacts that one task prepares.
@@ -50,24 +59,84 @@ impl Prepared {
         }
     }
 
+    /// Impulse of each joint on its body b at the end of the last step, world axes [N s].
+    pub fn joint_impulses(&self) -> &[Vec3] {
+        &self.joint_impulses
+    }
+
+    /// Gives every joint of the world a color; joints and contacts share none.
+    pub fn color_joints(&mut self, world: &World, graph: &mut ConstraintGraph, max_colors: u32) {
+        let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
+        self.joint_edges.truncate(world.joints.len());
+        let fresh = &world.joints[self.joint_edges.len()..];
+        let edge = |j: &BallJoint| Edge { a: movable(j.body_a), b: j.body_b.map_or(IMMOVABLE, movable), color: None };
+        self.joint_edges.extend(fresh.iter().map(edge));
+        self.joint_coloring = graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
+        self.joint_impulses.resize(world.joints.len(), Vec3::ZERO);
+    }
+
     /// Writes the rows of a step of `dt` seconds into `problem`.
-    pub fn prepare(&self, world: &World, pairs: &[Pair], config: &SolverConfig, dt: f32, problem: &mut StepProblem) {
+    pub fn prepare(
+        &mut self,
+        world: &World,
+        pairs: &[Pair],
+        config: &SolverConfig,
+        dt: f32,
+        problem: &mut StepProblem,
+    ) {
         prepare_bodies(world, config, problem);
         let h = dt / config.substeps as f32;
-        let hertz = config.contact_frequency / h;
-        let soft = |ratio: f32| softness(hertz * ratio, config.contact_damping, h, config.push_limit);
         problem.params = Params {
             substep: h,
             inverse_substep: 1.0 / h,
             restitution_threshold: config.restitution_threshold,
             inertia_count: problem.inertias.len() as u32,
-            movable: soft(1.0),
-            fixed: soft(config.fixed_contact_frequency_ratio),
+            movable: contact_softness(config, h, 1.0),
+            fixed: contact_softness(config, h, config.fixed_contact_frequency_ratio),
+            joint: joint_softness(config, h),
             body_count: problem.bodies.len() as u32,
+            slop: if config.stabilization == Stabilization::Baumgarte { config.slop } else { 0.0 },
+            relaxation: config.relaxation,
+            tolerance: config.tolerance,
             ..Params::default()
         };
+        problem.convergence = ConvergenceRow::default();
         problem.colors.clone_from(&self.coloring.offsets);
+        problem.first_joint_color = problem.colors.len() as u32;
+        if !world.joints.is_empty() {
+            problem.colors.extend(&self.joint_coloring.offsets);
+        }
+        self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
+        self.prepare_joints(world, problem);
         self.prepare_contacts(world, pairs, config, problem);
+        problem.params.point_count = problem.points.len() as u32;
+    }
+
+    fn prepare_joints(&self, world: &World, problem: &mut StepProblem) {
+        problem.joints.clear();
+        problem.joint_impulses.clear();
+        let world_row = world.bodies.len() as u32;
+        for &i in &self.joint_coloring.order {
+            let joint = &world.joints[i as usize];
+            let [anchor_a, anchor_b] = world.anchors(joint);
+            let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
+            problem.joints.push(JointRow {
+                r_a: arm(joint.body_a, anchor_a),
+                body_a: joint.body_a as u32,
+                r_b: joint.body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
+                body_b: joint.body_b.map_or(world_row, |b| b as u32),
+                gap: (anchor_b - anchor_a).to_array(),
+                ..JointRow::default()
+            });
+            let linear = self.joint_impulses[i as usize].to_array();
+            problem.joint_impulses.push(JointImpulseRow { linear, ..JointImpulseRow::default() });
+        }
+        // The world, as a body that nothing moves.
+        if world.joints.iter().any(|j| j.body_b.is_none()) {
+            problem.bodies.push(BodyRow::AT_REST);
+            problem.masses.push(MassRow::default());
+            problem.params.body_count += 1;
+        }
     }
 
     fn prepare_contacts(&self, world: &World, pairs: &[Pair], config: &SolverConfig, problem: &mut StepProblem) {
@@ -78,11 +147,12 @@ impl Prepared {
             (pair, &pair.manifolds[k as usize])
         };
         problem.contacts.resize(order.len(), ContactRow::default());
+        let patch = self.patches;
         let mut total = 0;
         for (row, &contact) in problem.contacts.iter_mut().zip(order) {
             row.first_point = total;
             row.point_count = source(contact).1.points().len() as u32;
-            total += row.point_count;
+            total += row.point_count + u32::from(patch);
         }
         problem.points.resize(total as usize, PointRow::default());
         problem.impulses.resize(total as usize, ImpulseRow::default());
@@ -91,7 +161,7 @@ impl Prepared {
         let (mut points, mut impulses) = (&mut problem.points[..], &mut problem.impulses[..]);
         let mut chunks = Vec::with_capacity(order.len().div_ceil(CHUNK));
         for (rows, order) in problem.contacts.chunks_mut(CHUNK).zip(order.chunks(CHUNK)) {
-            let count = rows.iter().map(|r| r.point_count as usize).sum();
+            let count = rows.iter().map(|r| r.point_count as usize + usize::from(patch)).sum();
             let (own_points, own_impulses);
             (own_points, points) = points.split_at_mut(count);
             (own_impulses, impulses) = impulses.split_at_mut(count);
@@ -105,13 +175,40 @@ impl Prepared {
                 let bodies = [pair.body_a, pair.body_b].map(|i| &world.bodies[i as usize]);
                 prepare_header(row, pair, manifold, bodies, config);
                 let inverse = [pair.body_a, pair.body_b].map(|i| InverseMass::of(&masses[i as usize]));
-                for p in manifold.points() {
-                    points[next] = prepare_point(row, p, manifold, bodies, &inverse);
-                    impulses[next] = if config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
-                    next += 1;
+                let effective = EffectiveMass { inverse: &inverse, row };
+                let end = next + manifold.points().len();
+                for (p, (point, impulse)) in
+                    manifold.points().iter().zip(points[next..].iter_mut().zip(&mut impulses[next..]))
+                {
+                    *point = prepare_point(&effective, p, bodies, config.friction);
+                    *impulse = if config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
                 }
+                if patch {
+                    points[end] = prepare_patch(&effective, &mut points[next..end]);
+                    impulses[end] =
+                        if config.warm_start { carried_over_patch(row, manifold) } else { ImpulseRow::default() };
+                }
+                next = end + usize::from(patch);
             }
         });
+    }
+}
+
+/// How overlap is removed, for contacts of `ratio` times the frequency.
+fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
+    match config.stabilization {
+        Stabilization::Soft => {
+            softness(config.contact_frequency / h * ratio, config.contact_damping, h, config.push_limit)
+        }
+        Stabilization::Baumgarte => Softness::rigid(config.baumgarte / h, config.push_limit),
+        Stabilization::None => Softness::rigid(0.0, config.push_limit),
+    }
+}
+
+fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
+    match config.stabilization {
+        Stabilization::Soft => softness(config.joint_frequency / h, config.joint_damping, h, config.push_limit),
+        _ => contact_softness(config, h, 1.0),
     }
 }
 
@@ -119,15 +216,7 @@ fn prepare_bodies(world: &World, config: &SolverConfig, problem: &mut StepProble
     let state = |b: &Body| {
         let moves = b.kind != BodyKind::Fixed;
         let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
-        BodyRow {
-            v: velocity(b.linear_velocity),
-            pad_v: 0.0,
-            w: velocity(b.angular_velocity),
-            pad_w: 0.0,
-            dp: [0.0; 3],
-            pad_dp: 0.0,
-            dq: [0.0, 0.0, 0.0, 1.0],
-        }
+        BodyRow { v: velocity(b.linear_velocity), w: velocity(b.angular_velocity), ..BodyRow::AT_REST }
     };
     world.bodies.par_iter().with_min_len(CHUNK).map(state).collect_into_vec(&mut problem.bodies);
     let mass = |b: &Body| {
@@ -166,6 +255,8 @@ fn prepare_header(row: &mut ContactRow, pair: &Pair, manifold: &Manifold, [a, b]
     row.restitution = material.restitution;
     row.body_a = pair.body_a;
     row.body_b = pair.body_b;
+    row.radius_a = manifold.radius_a;
+    row.radius_b = manifold.radius_b;
 }
 
 fn carried_over(row: &ContactRow, p: &ManifoldPoint) -> ImpulseRow {
@@ -186,6 +277,16 @@ pub(super) fn tangents(row: &ContactRow) -> (Vec3, Vec3) {
     (tangent_1, Vec3::from_array(row.normal).cross(tangent_1))
 }
 
+fn carried_over_patch(row: &ContactRow, manifold: &Manifold) -> ImpulseRow {
+    let (tangent_1, tangent_2) = tangents(row);
+    ImpulseRow {
+        normal: manifold.twist_impulse,
+        tangent_1: manifold.friction_impulse.dot(tangent_1),
+        tangent_2: manifold.friction_impulse.dot(tangent_2),
+        peak: 0.0,
+    }
+}
+
 /// Inverse mass and inertia of one body.
 struct InverseMass {
     mass: f32,
@@ -204,32 +305,86 @@ impl InverseMass {
     }
 }
 
-fn prepare_point(
-    row: &ContactRow,
-    p: &ManifoldPoint,
-    manifold: &Manifold,
-    [a, b]: [&Body; 2],
-    [inverse_a, inverse_b]: &[InverseMass; 2],
-) -> PointRow {
-    let normal = manifold.normal;
-    let (tangent_1, tangent_2) = tangents(row);
+/// G M⁻¹ Gᵀ of the points of one manifold.
+struct EffectiveMass<'a> {
+    inverse: &'a [InverseMass; 2],
+    row: &'a ContactRow,
+}
+
+impl EffectiveMass<'_> {
+    /// One over the normal entry at arms `r_a`, `r_b`; 0 if nothing can move.
+    fn normal(&self, r_a: Vec3, r_b: Vec3) -> f32 {
+        let n = Vec3::from_array(self.row.normal);
+        inverse_or_zero(self.entry(r_a, r_b, n, n))
+    }
+
+    /// One over the largest eigenvalue of the tangential block.
+    fn tangent(&self, r_a: Vec3, r_b: Vec3) -> f32 {
+        let (t_1, t_2) = tangents(self.row);
+        let (s_11, s_22, s_12) =
+            (self.entry(r_a, r_b, t_1, t_1), self.entry(r_a, r_b, t_2, t_2), self.entry(r_a, r_b, t_1, t_2));
+        inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
+    }
+
+    /// One over the entry of the tangential direction `d`.
+    fn along(&self, r_a: Vec3, r_b: Vec3, d: Vec3) -> f32 {
+        inverse_or_zero(self.entry(r_a, r_b, d, d))
+    }
+
+    /// One over the inverse inertia about the normal.
+    fn twist(&self) -> f32 {
+        let n = Vec3::from_array(self.row.normal);
+        inverse_or_zero(self.inverse.iter().map(|i| n.dot(i.inertia * n)).sum())
+    }
+
+    fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
+        let [a, b] = self.inverse;
+        a.entry(r_a, d, e) + b.entry(r_b, d, e)
+    }
+}
+
+fn prepare_point(effective: &EffectiveMass, p: &ManifoldPoint, [a, b]: [&Body; 2], rule: FrictionRule) -> PointRow {
     let (r_a, r_b) = (p.r_a, p.r_b);
-    let entry = |d: Vec3, e: Vec3| inverse_a.entry(r_a, d, e) + inverse_b.entry(r_b, d, e);
-    let (s_11, s_22, s_12) = (entry(tangent_1, tangent_1), entry(tangent_2, tangent_2), entry(tangent_1, tangent_2));
-    let largest = 0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt());
     let velocity = |body: &Body, r: Vec3| match body.kind {
         BodyKind::Fixed => Vec3::ZERO,
         _ => body.linear_velocity + body.angular_velocity.cross(r),
+    };
+    let u = velocity(b, r_b) - velocity(a, r_a);
+    let (tangent_1, tangent_2) = tangents(effective.row);
+    // A point that does not slip yet takes the first tangent.
+    let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
+    let tangent_mass = match rule {
+        FrictionRule::None => 0.0,
+        FrictionRule::Slip => effective.along(r_a, r_b, tangent_1 * slip.x + tangent_2 * slip.y),
+        FrictionRule::Box | FrictionRule::Disc => effective.tangent(r_a, r_b),
     };
     PointRow {
         r_a: r_a.to_array(),
         separation: p.separation,
         r_b: r_b.to_array(),
-        normal_mass: inverse_or_zero(entry(normal, normal)),
-        tangent_mass: inverse_or_zero(largest),
-        approach_velocity: (velocity(b, r_b) - velocity(a, r_a)).dot(normal),
-        radius_a: manifold.radius_a,
-        radius_b: manifold.radius_b,
+        normal_mass: effective.normal(r_a, r_b),
+        tangent_mass,
+        approach_velocity: u.dot(Vec3::from_array(effective.row.normal)),
+        slip_1: slip.x,
+        slip_2: slip.y,
+    }
+}
+
+/// The row that stands for the friction of all `points`, which learn how far from it they are.
+fn prepare_patch(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
+    let middle = |arm: fn(&PointRow) -> [f32; 3]| {
+        points.iter().map(|p| Vec3::from_array(arm(p))).sum::<Vec3>() / points.len() as f32
+    };
+    let (r_a, r_b) = (middle(|p| p.r_a), middle(|p| p.r_b));
+    for p in points.iter_mut() {
+        p.slip_1 = Vec3::from_array(p.r_a).distance(r_a);
+    }
+    PointRow {
+        r_a: r_a.to_array(),
+        r_b: r_b.to_array(),
+        normal_mass: effective.twist(),
+        tangent_mass: effective.tangent(r_a, r_b),
+        ..PointRow::default()
     }
 }
 

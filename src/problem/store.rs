@@ -3,14 +3,14 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::StepProblem;
 use super::prepare::{Prepared, tangents};
+use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
 use crate::world::{BodyKind, World};
 
 impl Prepared {
     /// Writes poses and velocities into the world, and impulses into the manifolds that the rows came from.
-    pub fn store(&self, problem: &StepProblem, world: &mut World, pairs: &mut [Pair]) {
+    pub fn store(&mut self, problem: &StepProblem, world: &mut World, pairs: &mut [Pair]) {
         world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies).for_each(|(body, row)| {
             if body.kind == BodyKind::Fixed {
                 return;
@@ -21,13 +21,23 @@ impl Prepared {
             body.linear_velocity = Vec3::from_array(row.v);
             body.angular_velocity = Vec3::from_array(row.w);
         });
+        for (&i, row) in self.joint_coloring.order.iter().zip(&problem.joint_impulses) {
+            self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
+        }
         for (&(i, k), &row) in self.contacts.iter().zip(&self.row_of) {
             let contact = &problem.contacts[row as usize];
             let (tangent_1, tangent_2) = tangents(contact);
-            let points = pairs[i as usize].manifolds[k as usize].points_mut();
-            for (point, impulse) in points.iter_mut().zip(&problem.impulses[contact.first_point as usize..]) {
+            let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+            let manifold = &mut pairs[i as usize].manifolds[k as usize];
+            let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
+            for (point, impulse) in manifold.points_mut().iter_mut().zip(&problem.impulses[first..end]) {
                 point.normal_impulse = impulse.normal;
-                point.friction_impulse = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+                point.friction_impulse = friction(impulse);
+            }
+            // With friction per manifold the row after the points is the patch's.
+            if self.patches {
+                manifold.twist_impulse = problem.impulses[end].normal;
+                manifold.friction_impulse = friction(&problem.impulses[end]);
             }
         }
     }

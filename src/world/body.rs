@@ -263,6 +263,16 @@ impl Body {
         self.linear_velocity + self.angular_velocity.cross(p - self.center_of_mass())
     }
 
+    /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds.
+    pub fn move_to(&mut self, position: Vec3, rotation: Quat, dt: f32) {
+        let center = position + rotation * self.mass.center;
+        self.linear_velocity = (center - self.center_of_mass()) / dt;
+        let turn = rotation * self.rotation.inverse();
+        // The shorter way round.
+        let turn = if turn.w < 0.0 { -turn } else { turn };
+        self.angular_velocity = turn.normalize().to_scaled_axis() / dt;
+    }
+
     /// Kinetic energy [J], in f64; zero for a body without mass.
     pub fn kinetic_energy(&self) -> f64 {
         let v = self.linear_velocity.as_dvec3();

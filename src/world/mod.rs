@@ -1,9 +1,11 @@
 //! Bodies, shapes and materials: what a scene is made of. SI units, right-handed, Y up in the catalogue.
 
 mod body;
+mod joint;
 mod shape;
 
 pub use body::{Body, BodyKind, Collider, MassProperties, Material};
+pub use joint::BallJoint;
 pub use shape::Shape;
 
 use glam::Vec3;
@@ -15,6 +17,8 @@ pub struct World {
     pub gravity: Vec3,
     /// The bodies; a body's index here is its name everywhere else.
     pub bodies: Vec<Body>,
+    /// Ball joints between them.
+    pub joints: Vec<BallJoint>,
 }
 
 impl Default for World {
@@ -26,13 +30,39 @@ impl Default for World {
 impl World {
     /// An empty world with gravity 9.81 m/s² along -Y.
     pub fn new() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new() }
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new(), joints: Vec::new() }
     }
 
     /// Adds a body and returns its index.
     pub fn add(&mut self, body: Body) -> usize {
         self.bodies.push(body);
         self.bodies.len() - 1
+    }
+
+    /// Adds a joint and returns its index.
+    ///
+    /// # Panics
+    /// A body that it names is not there yet.
+    pub fn join(&mut self, joint: BallJoint) -> usize {
+        let bodies = self.bodies.len();
+        assert!(
+            joint.body_a < bodies && joint.body_b.is_none_or(|b| b < bodies),
+            "a joint names a body beyond {bodies}"
+        );
+        self.joints.push(joint);
+        self.joints.len() - 1
+    }
+
+    /// Where the two anchors of a joint are in the world [m].
+    pub fn anchors(&self, joint: &BallJoint) -> [Vec3; 2] {
+        let on_body = |b: usize, anchor: Vec3| self.bodies[b].position + self.bodies[b].rotation * anchor;
+        let on_a = on_body(joint.body_a, joint.anchor_a);
+        [on_a, joint.body_b.map_or(joint.anchor_b, |b| on_body(b, joint.anchor_b))]
+    }
+
+    /// Largest distance between the two anchors of any joint [m].
+    pub fn joint_gap(&self) -> f32 {
+        self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
     }
 
     /// Number of dynamic bodies.

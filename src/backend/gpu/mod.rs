@@ -14,8 +14,8 @@ use std::sync::{Arc, Mutex};
 
 use super::Backend;
 use crate::error::{Error, Result};
-use crate::plan::{Kernel, Pass, contact_range};
-use crate::problem::{BodyRow, ImpulseRow, PassColors, StepProblem};
+use crate::plan::{Kernel, Pass};
+use crate::problem::{ConvergenceRow, PassColors, StepProblem};
 use shader::{BINDINGS, PASS_COLORS, WORKGROUP};
 
 /// Follows plans on a device through wgpu.
@@ -94,6 +94,9 @@ impl Gpu {
             bytemuck::cast_slice(&problem.points),
             bytemuck::cast_slice(&problem.impulses),
             bytemuck::cast_slice(&problem.colors),
+            bytemuck::cast_slice(&problem.joints),
+            bytemuck::cast_slice(&problem.joint_impulses),
+            bytemuck::bytes_of(&problem.convergence),
         ];
         // Refused before anything is sent.
         for (name, bytes) in BINDINGS.iter().zip(rows) {
@@ -189,22 +192,28 @@ impl Gpu {
         encoder
     }
 
-    /// Copies bodies and impulses back and waits for them.
+    /// Copies what the plan changed back and waits for it.
     fn finish(&mut self, problem: &mut StepProblem, mut encoder: wgpu::CommandEncoder) -> Result<()> {
-        let (bodies, impulses) = (size_of_val(&problem.bodies[..]) as u64, size_of_val(&problem.impulses[..]) as u64);
-        let size = (bodies + impulses).max(16);
+        let mut changed: [(u32, &mut [u8]); 4] = [
+            (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
+            (shader::IMPULSES, bytemuck::cast_slice_mut(&mut problem.impulses)),
+            (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
+            (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
+        ];
+        let size = changed.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
         if self.read_back.as_ref().is_none_or(|b| b.size() < size) {
             self.read_back = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("read back"),
-                size: size + size / 2 / 16 * 16,
+                size: (size + size / 2).next_multiple_of(16),
                 usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }));
         }
         let read_back = self.read_back.as_ref().expect("made above");
         let mut at = 0;
-        for (binding, bytes) in [(shader::BODIES, bodies), (shader::IMPULSES, impulses)] {
-            if let (Some(buffer), true) = (&self.buffers[binding as usize], bytes > 0) {
+        for (binding, rows) in &changed {
+            let bytes = rows.len() as u64;
+            if let (Some(buffer), true) = (&self.buffers[*binding as usize], bytes > 0) {
                 encoder.copy_buffer_to_buffer(buffer, 0, read_back, at, bytes);
                 at += bytes;
             }
@@ -219,10 +228,12 @@ impl Gpu {
         receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
         {
             let mapped = slice.get_mapped_range().map_err(|e| lost(&e))?;
-            let (body_bytes, rest) = mapped.split_at(bodies as usize);
-            bytemuck::cast_slice_mut::<BodyRow, u8>(&mut problem.bodies).copy_from_slice(body_bytes);
-            let impulse_bytes = &rest[..impulses as usize];
-            bytemuck::cast_slice_mut::<ImpulseRow, u8>(&mut problem.impulses).copy_from_slice(impulse_bytes);
+            let mut rest = &mapped[..];
+            for (_, rows) in &mut changed {
+                let (own, others) = rest.split_at(rows.len());
+                rows.copy_from_slice(own);
+                rest = others;
+            }
         }
         read_back.unmap();
         Ok(())
@@ -257,12 +268,16 @@ impl Backend for Gpu {
     }
 
     fn bytes_transferred(&self, problem: &StepProblem) -> u64 {
-        let down = size_of_val(&problem.bodies[..]) + size_of_val(&problem.impulses[..]);
+        let down = size_of_val(&problem.bodies[..])
+            + size_of_val(&problem.impulses[..])
+            + size_of_val(&problem.joint_impulses[..])
+            + size_of::<ConvergenceRow>();
         let up = down
             + size_of_val(&problem.masses[..])
             + size_of_val(&problem.inertias[..])
             + size_of_val(&problem.contacts[..])
             + size_of_val(&problem.points[..])
+            + size_of_val(&problem.joints[..])
             + size_of_val(&problem.colors[..]);
         (up + down) as u64
     }
@@ -302,8 +317,10 @@ fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
     let rows = match pass.kernel {
         Kernel::IntegrateVelocities | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
+        Kernel::ClearImpulses => problem.impulses.len(),
+        Kernel::BeginSweep { .. } => 1,
         _ if pass.colors.len() > 1 => 1,
-        _ => contact_range(&problem.colors, &pass.colors).len(),
+        _ => problem.rows_of(&pass.colors).len(),
     };
     (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535)
 }

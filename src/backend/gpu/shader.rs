@@ -4,48 +4,94 @@ use naga::back::spv;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
 use super::exact;
+use crate::config::FrictionRule;
 use crate::error::{Error, Result};
+use crate::kernels::Rules;
 use crate::plan::Kernel;
 
 /// Name of each binding, which is also a field of `StepProblem`; the place in this list is its number.
-pub const BINDINGS: [&str; 9] =
-    ["params", "pass_colors", "bodies", "masses", "inertias", "contacts", "points", "impulses", "colors"];
+pub const BINDINGS: [&str; 12] = [
+    "params",
+    "pass_colors",
+    "bodies",
+    "masses",
+    "inertias",
+    "contacts",
+    "points",
+    "impulses",
+    "colors",
+    "joints",
+    "joint_impulses",
+    "convergence",
+];
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;
 /// The colors of a pass, at an offset of their own for each.
 pub const PASS_COLORS: u32 = 1;
 /// State, read back.
 pub const BODIES: u32 = 2;
-/// Impulses, read back.
+/// Impulses of the points, read back.
 pub const IMPULSES: u32 = 7;
+/// Impulses of the joints, read back.
+pub const JOINT_IMPULSES: u32 = 10;
+/// Whether the sweeps still move anything, read back.
+pub const CONVERGENCE: u32 = 11;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
-const TYPES: &str = include_str!("../../../shaders/lib/types.wgsl");
-const BINDINGS_WGSL: &str = include_str!("../../../shaders/lib/bindings.wgsl");
-const MATH: &str = include_str!("../../../shaders/lib/math.wgsl");
-const CONTACT: &str = include_str!("../../../shaders/lib/contact.wgsl");
+/// Reads a shader part at compile time.
+macro_rules! part {
+    ($name:literal) => {
+        include_str!(concat!("../../../shaders/", $name, ".wgsl"))
+    };
+}
 
 /// The WGSL of a kernel: the parts it is made of, one after another.
 pub fn source(kernel: Kernel) -> String {
-    let body = match kernel {
-        Kernel::IntegrateVelocities => include_str!("../../../shaders/integrate_velocities.wgsl"),
-        Kernel::IntegrateGyroscopic => include_str!("../../../shaders/integrate_gyroscopic.wgsl"),
-        Kernel::WarmStart(_) => include_str!("../../../shaders/warm_start.wgsl"),
-        Kernel::SolveContacts(_) => include_str!("../../../shaders/solve_contacts.wgsl"),
-        Kernel::IntegratePositions => include_str!("../../../shaders/integrate_positions.wgsl"),
-        Kernel::ApplyRestitution(_) => include_str!("../../../shaders/apply_restitution.wgsl"),
+    let own: &[&str] = match kernel {
+        Kernel::IntegrateVelocities => &[part!("integrate_velocities")],
+        Kernel::IntegrateGyroscopic => &[part!("integrate_gyroscopic")],
+        Kernel::IntegratePositions => &[part!("integrate_positions")],
+        Kernel::ClearImpulses => &[part!("clear_impulses")],
+        Kernel::BeginSweep { .. } => &[part!("begin_sweep")],
+        Kernel::WarmStartJoints => &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")],
+        Kernel::SolveJoints(_) => &[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")],
+        Kernel::WarmStart(_) => &[part!("lib/pair"), part!("lib/friction"), part!("warm_start")],
+        Kernel::SolveContacts(_) => &[
+            part!("lib/pair"),
+            part!("lib/contact"),
+            part!("lib/friction"),
+            part!("lib/sweep"),
+            part!("solve_contacts"),
+        ],
+        Kernel::ApplyRestitution(_) => &[part!("lib/pair"), part!("apply_restitution")],
     };
-    let contact = if kernel.rules().is_some() { CONTACT } else { "" };
-    [TYPES, BINDINGS_WGSL, MATH, contact, body].join("\n")
+    let shared = [part!("lib/types"), part!("lib/bindings"), part!("lib/math")];
+    [&shared[..], own].concat().join("\n")
 }
 
-/// The overrides of a kernel.
+/// The overrides of a kernel, as its source has them.
 pub fn constants(kernel: Kernel) -> Vec<(&'static str, f64)> {
-    let as_number = |b: bool| if b { 1.0 } else { 0.0 };
-    kernel.rules().map_or_else(Vec::new, |r| {
-        vec![("BIASED", as_number(r.biased)), ("FRICTION", as_number(r.friction)), ("ROUND", as_number(r.round))]
-    })
+    let yes = |b: bool| f64::from(u8::from(b));
+    let pair = |r: Rules| vec![("BIASED", yes(r.biased)), ("MEASURED", yes(r.measured))];
+    let friction = |r: Rules| {
+        let rule = match r.friction {
+            FrictionRule::None => 0.0,
+            FrictionRule::Slip => 1.0,
+            FrictionRule::Box => 2.0,
+            FrictionRule::Disc => 3.0,
+        };
+        vec![("FRICTION", rule), ("PATCH", yes(r.patch)), ("FRICTION_FIRST", yes(r.friction_first))]
+    };
+    let contact = |r: Rules| vec![("ACCUMULATED", yes(r.accumulated)), ("ROUND", yes(r.round))];
+    match kernel {
+        Kernel::BeginSweep { first } => vec![("FIRST", yes(first))],
+        Kernel::WarmStartJoints => pair(Rules::default()),
+        Kernel::SolveJoints(r) | Kernel::ApplyRestitution(r) => pair(r),
+        Kernel::WarmStart(r) => [pair(r), friction(r)].concat(),
+        Kernel::SolveContacts(r) => [pair(r), contact(r), friction(r)].concat(),
+        _ => Vec::new(),
+    }
 }
 
 /// A kernel as naga understands it, its overrides resolved.

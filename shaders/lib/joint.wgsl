@@ -1,0 +1,27 @@
+// One ball joint: the anchors of two bodies stay together. Doubles: src/kernels/joint.rs.
+
+struct Anchors { r_a: vec3f, r_b: vec3f }
+
+// The arms now: what they were when the step began, turned with their bodies.
+fn current_anchors(pair: ptr<function, Pair>, joint: Joint) -> Anchors {
+    return Anchors(joint.r_a + turned((*pair).a.dq, joint.r_a), joint.r_b + turned((*pair).b.dq, joint.r_b));
+}
+
+// The column of [r] I^-1 [r]^T that belongs to the axis e: r x (I^-1 (r x e)), with its sign.
+fn turning_column(m: Mass, r: vec3f, e: vec3f) -> vec3f {
+    return cross3(inv_inertia_times(m, cross3(r, e)), r);
+}
+
+// One column of the joint's block of G M^-1 G^T.
+fn joint_column(pair: ptr<function, Pair>, anchors: Anchors, e: vec3f) -> vec3f {
+    let turning = turning_column((*pair).mass_a, anchors.r_a, e) + turning_column((*pair).mass_b, anchors.r_b, e);
+    return e * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning;
+}
+
+// Solves the symmetric block with these columns for u, by Cramer's rule.
+fn solve_block(x: vec3f, y: vec3f, z: vec3f, u: vec3f) -> vec3f {
+    let c_x = cross3(y, z);
+    let c_y = cross3(z, x);
+    let c_z = cross3(x, y);
+    return vec3f(dot3(c_x, u), dot3(c_y, u), dot3(c_z, u)) * reciprocal(dot3(x, c_x));
+}

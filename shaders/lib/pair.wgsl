@@ -1,0 +1,65 @@
+// Two bodies while one thread works on them, and the sweeps over colors. Doubles: src/kernels/pair.rs.
+
+override BIASED: bool = true;
+override MEASURED: bool = false;
+
+struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass }
+
+fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
+    let p = m.inv_inertia_x;
+    let q = m.inv_inertia_yz;
+    return vec3f(
+        p.x * u.x + p.y * u.y + p.z * u.z,
+        p.y * u.x + q.x * u.y + q.y * u.z,
+        p.z * u.x + q.y * u.y + q.z * u.z,
+    );
+}
+
+// Applies the impulse p to b at r_b, and -p to a at r_a.
+fn apply_impulse(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f, p: vec3f) {
+    (*pair).a.v -= p * (*pair).mass_a.inv_mass;
+    (*pair).a.w -= inv_inertia_times((*pair).mass_a, cross3(r_a, p));
+    (*pair).b.v += p * (*pair).mass_b.inv_mass;
+    (*pair).b.w += inv_inertia_times((*pair).mass_b, cross3(r_b, p));
+}
+
+// Velocity of b at r_b relative to a at r_a.
+fn relative_velocity(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
+    return ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));
+}
+
+// How far b at r_b moved relative to a at r_a since the step began.
+fn relative_movement(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
+    let moved_b = (*pair).b.dp + turned((*pair).b.dq, r_b);
+    let moved_a = (*pair).a.dp + turned((*pair).a.dq, r_a);
+    return moved_b - moved_a;
+}
+
+fn load_pair(a: u32, b: u32) -> Pair {
+    return Pair(bodies[a], bodies[b], masses[a], masses[b]);
+}
+
+// A body that cannot move is never written: no color protects it.
+fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
+    if (*pair).mass_a.inv_mass > 0.0 {
+        bodies[a].v = (*pair).a.v;
+        bodies[a].w = (*pair).a.w;
+    }
+    if (*pair).mass_b.inv_mass > 0.0 {
+        bodies[b].v = (*pair).b.v;
+        bodies[b].w = (*pair).b.w;
+    }
+}
+
+// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
+fn note_correction(impulse: f32, mass: f32) {
+    if MEASURED {
+        if larger(impulse, -impulse) > params.tolerance * mass { atomicStore(&convergence.moving, 1u); }
+    }
+}
+
+// Whether the sweeps of this substep have come to their end already.
+fn is_converged() -> bool {
+    if MEASURED { return convergence.done != 0u; }
+    return false;
+}

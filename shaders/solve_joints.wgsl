@@ -1,0 +1,43 @@
+// solve_joints: one thread sweeps one joint of one color.
+// Reads joints, masses. Writes joint_impulses, and bodies that can move.
+// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
+// Double: src/kernels/joint.rs.
+
+fn solve_joint(i: u32) {
+    let joint = joints[i];
+    var pair = load_pair(joint.body_a, joint.body_b);
+    let anchors = current_anchors(&pair, joint);
+    let x = joint_column(&pair, anchors, vec3f(1.0, 0.0, 0.0));
+    let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0));
+    let z = joint_column(&pair, anchors, vec3f(0.0, 0.0, 1.0));
+
+    // The gap is pulled shut softly, or not at all in a relax sweep.
+    let before = joint_impulses[i].linear;
+    var wanted = relative_velocity(&pair, anchors.r_a, anchors.r_b);
+    var mass_scale = 1.0;
+    var impulse_scale = 0.0;
+    if BIASED {
+        wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
+        mass_scale = params.joint.mass_scale;
+        impulse_scale = params.joint.impulse_scale;
+    }
+    let correction = solve_block(x, y, z, wanted) * mass_scale + before * impulse_scale;
+    let change = correction * -params.relaxation;
+    joint_impulses[i].linear = before + change;
+    note_correction(change.x, reciprocal(x.x));
+    note_correction(change.y, reciprocal(y.y));
+    note_correction(change.z, reciprocal(z.z));
+    apply_impulse(&pair, anchors.r_a, anchors.r_b, change);
+    store_pair(joint.body_a, joint.body_b, &pair);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn solve_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let converged = is_converged();
+    for (var color = pass_colors.first; color < pass_colors.end; color++) {
+        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
+            if !converged { solve_joint(i); }
+        }
+        storageBarrier();
+    }
+}

@@ -1,0 +1,22 @@
+// warm_start_joints: one thread applies the impulse that one joint already carries.
+// Reads joints, joint_impulses, masses. Writes bodies that can move.
+// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
+// Double: src/kernels/joint.rs.
+
+fn warm_start_joint(i: u32) {
+    let joint = joints[i];
+    var pair = load_pair(joint.body_a, joint.body_b);
+    let anchors = current_anchors(&pair, joint);
+    apply_impulse(&pair, anchors.r_a, anchors.r_b, joint_impulses[i].linear);
+    store_pair(joint.body_a, joint.body_b, &pair);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn warm_start_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var color = pass_colors.first; color < pass_colors.end; color++) {
+        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
+            warm_start_joint(i);
+        }
+        storageBarrier();
+    }
+}

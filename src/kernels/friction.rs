@@ -1,0 +1,81 @@
+//! Friction at one point or over one manifold. Doubles of `shaders/lib/friction.wgsl`.
+
+use super::Rules;
+use super::pair::{apply_impulse, note_correction, relative_velocity};
+use super::rows::{Contact, Impulse, Pair, Point, StepParams};
+use crate::config::FrictionRule;
+use crate::math::{Lane, cross3, dot3, larger, smaller};
+
+/// x, no further from 0 than the limit.
+#[inline(always)]
+fn clamp_abs<L: Lane>(x: L, limit: L) -> L {
+    larger(smaller(x, limit), -limit)
+}
+
+/// The tangential impulse nearest to y that the rule allows under the normal impulse's limit.
+#[inline(always)]
+pub fn allowed_friction<L: Lane>(rule: FrictionRule, y: [L; 2], limit: L) -> [L; 2] {
+    if rule != FrictionRule::Disc {
+        return [clamp_abs(y[0], limit), clamp_abs(y[1], limit)];
+    }
+    let length_squared = y[0] * y[0] + y[1] * y[1];
+    let outside = length_squared.gt(limit * limit);
+    let scale = L::select(L::constant(1.0), limit * length_squared.inverse_sqrt(), outside);
+    [y[0] * scale, y[1] * scale]
+}
+
+/// Coulomb friction: the sum of the tangential impulses stays within what the normal impulse allows.
+///
+/// The step along both tangents has one length, one over the larger eigenvalue of the tangential block: with a matrix
+/// step the clamped point slips in a wrong direction unless that block is isotropic.
+#[inline(always)]
+pub fn solve_friction<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    point: &Point<L>,
+    normal_impulse: L,
+    impulse: &mut Impulse<L>,
+) {
+    let tangent_2 = cross3(contact.normal, contact.tangent);
+    let u = relative_velocity(pair, point.r_a, point.r_b);
+    let u_1 = dot3(u, contact.tangent);
+    let u_2 = dot3(u, tangent_2);
+    let limit = contact.friction * normal_impulse;
+    let mass = params.relaxation * point.tangent_mass;
+    let sum = if rules.friction == FrictionRule::Slip {
+        // One direction: the impulses along both tangents are its components.
+        let along = impulse.tangent_1 * point.slip_1 + impulse.tangent_2 * point.slip_2;
+        let s = clamp_abs(along - mass * (u_1 * point.slip_1 + u_2 * point.slip_2), limit);
+        [s * point.slip_1, s * point.slip_2]
+    } else {
+        allowed_friction(rules.friction, [impulse.tangent_1 - mass * u_1, impulse.tangent_2 - mass * u_2], limit)
+    };
+    let change_1 = sum[0] - impulse.tangent_1;
+    let change_2 = sum[1] - impulse.tangent_2;
+    impulse.tangent_1 = sum[0];
+    impulse.tangent_2 = sum[1];
+    note_correction(rules, params, pair, change_1, point.tangent_mass);
+    note_correction(rules, params, pair, change_2, point.tangent_mass);
+    apply_impulse(pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
+}
+
+/// Spin about the normal, limited by the normal impulses times their distance from the middle.
+#[inline(always)]
+pub fn solve_twist<L: Lane>(
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    patch: &Point<L>,
+    lever: L,
+    impulse: &mut Impulse<L>,
+) {
+    let spin = dot3(pair.b.w - pair.a.w, contact.normal);
+    let mass = params.relaxation * patch.normal_mass;
+    let sum = clamp_abs(impulse.normal - mass * spin, contact.friction * lever);
+    let change = contact.normal * (sum - impulse.normal);
+    impulse.normal = sum;
+    pair.a.w -= pair.mass_a.inv_inertia.times(change);
+    pair.b.w += pair.mass_b.inv_inertia.times(change);
+}

@@ -1,0 +1,77 @@
+//! One ball joint: the anchors of two bodies stay together. Doubles of `shaders/lib/joint.wgsl` and of the kernels
+//! `warm_start_joints` and `solve_joints`.
+
+use super::Rules;
+use super::pair::{apply_impulse, note_correction, relative_movement, relative_velocity};
+use super::rows::{Joint, Mass, Pair, StepParams};
+use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
+
+/// The arms now: what they were when the step began, turned with their bodies.
+#[inline(always)]
+pub fn current_anchors<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [Vec3<L>; 2] {
+    [joint.r_a + turned(pair.a.dq, joint.r_a), joint.r_b + turned(pair.b.dq, joint.r_b)]
+}
+
+/// The column of the body's share of G M⁻¹ Gᵀ that belongs to the axis e: (I⁻¹ (r x e)) x r.
+#[inline(always)]
+fn turning_column<L: Lane>(m: &Mass<L>, r: Vec3<L>, e: Vec3<L>) -> Vec3<L> {
+    cross3(m.inv_inertia.times(cross3(r, e)), r)
+}
+
+/// One column of the joint's block of G M⁻¹ Gᵀ.
+#[inline(always)]
+pub fn joint_column<L: Lane>(pair: &Pair<L>, anchors: [Vec3<L>; 2], e: Vec3<L>) -> Vec3<L> {
+    let turning = turning_column(&pair.mass_a, anchors[0], e) + turning_column(&pair.mass_b, anchors[1], e);
+    e * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning
+}
+
+/// Solves the symmetric block with these columns for u, by Cramer's rule.
+#[inline(always)]
+fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<L> {
+    let c_x = cross3(y, z);
+    let c_y = cross3(z, x);
+    let c_z = cross3(x, y);
+    vec3(dot3(c_x, u), dot3(c_y, u), dot3(c_z, u)) * reciprocal(dot3(x, c_x))
+}
+
+/// Applies the impulse that a joint already carries. Kernel `warm_start_joints`.
+#[inline(always)]
+pub fn warm_start_joint<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, impulse: Vec3<L>) {
+    let [r_a, r_b] = current_anchors(pair, joint);
+    apply_impulse(pair, r_a, r_b, impulse);
+}
+
+/// Sweeps one joint. Kernel `solve_joints`.
+#[inline(always)]
+pub fn solve_joint<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    joint: &Joint<L>,
+    impulse: &mut Vec3<L>,
+) {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let anchors = current_anchors(pair, joint);
+    let x = joint_column(pair, anchors, vec3(one, zero, zero));
+    let y = joint_column(pair, anchors, vec3(zero, one, zero));
+    let z = joint_column(pair, anchors, vec3(zero, zero, one));
+
+    // The gap is pulled shut softly, or not at all in a relax sweep.
+    let before = *impulse;
+    let mut wanted = relative_velocity(pair, anchors[0], anchors[1]);
+    let (mut mass_scale, mut impulse_scale) = (one, zero);
+    if rules.biased {
+        wanted += (joint.gap + relative_movement(pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
+        mass_scale = params.joint.mass_scale;
+        impulse_scale = params.joint.impulse_scale;
+    }
+    let correction = solve_block(x, y, z, wanted) * mass_scale + before * impulse_scale;
+    let change = correction * -params.relaxation;
+    *impulse = before + change;
+    if rules.measured {
+        note_correction(rules, params, pair, change.x, reciprocal(x.x));
+        note_correction(rules, params, pair, change.y, reciprocal(y.y));
+        note_correction(rules, params, pair, change.z, reciprocal(z.z));
+    }
+    apply_impulse(pair, anchors[0], anchors[1], change);
+}

@@ -1,0 +1,37 @@
+//! Two bodies while one thread works on them. Doubles of `shaders/lib/pair.wgsl`.
+
+use super::Rules;
+use super::rows::{Pair, StepParams};
+use crate::math::{Lane, Vec3, cross3, larger, turned};
+
+/// Applies the impulse p to b at r_b, and -p to a at r_a.
+#[inline(always)]
+pub fn apply_impulse<L: Lane>(pair: &mut Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>, p: Vec3<L>) {
+    pair.a.v -= p * pair.mass_a.inv_mass;
+    pair.a.w -= pair.mass_a.inv_inertia.times(cross3(r_a, p));
+    pair.b.v += p * pair.mass_b.inv_mass;
+    pair.b.w += pair.mass_b.inv_inertia.times(cross3(r_b, p));
+}
+
+/// Velocity of b at r_b relative to a at r_a.
+#[inline(always)]
+pub fn relative_velocity<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
+    (pair.b.v + cross3(pair.b.w, r_b)) - (pair.a.v + cross3(pair.a.w, r_a))
+}
+
+/// How far b at r_b moved relative to a at r_a since the step began.
+#[inline(always)]
+pub fn relative_movement<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
+    let moved_b = pair.b.dp + turned(pair.b.dq, r_b);
+    let moved_a = pair.a.dp + turned(pair.a.dq, r_a);
+    moved_b - moved_a
+}
+
+/// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
+#[inline(always)]
+pub fn note_correction<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, impulse: L, mass: L) {
+    if rules.measured {
+        let above = larger(impulse, -impulse).gt(params.tolerance * mass);
+        pair.moving = L::select(pair.moving, L::constant(1.0), above);
+    }
+}

@@ -1,0 +1,36 @@
+//! Ball joints.
+
+use glam::Vec3;
+
+/// Keeps a point of one body together with a point of another, or of the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BallJoint {
+    /// Index of one body.
+    pub body_a: usize,
+    /// Index of the other; none for the world.
+    pub body_b: Option<usize>,
+    /// The point in a's frame [m].
+    pub anchor_a: Vec3,
+    /// The point in b's frame, or in the world [m].
+    pub anchor_b: Vec3,
+    /// Whether the two bodies still collide with each other.
+    pub collide: bool,
+}
+
+impl BallJoint {
+    /// Ties two bodies together, which then do not collide.
+    pub fn new(body_a: usize, anchor_a: Vec3, body_b: usize, anchor_b: Vec3) -> Self {
+        Self { body_a, body_b: Some(body_b), anchor_a, anchor_b, collide: false }
+    }
+
+    /// Ties a body to a point of the world.
+    pub fn to_world(body_a: usize, anchor_a: Vec3, point: Vec3) -> Self {
+        Self { body_a, body_b: None, anchor_a, anchor_b: point, collide: false }
+    }
+
+    /// Lets the two bodies collide all the same.
+    pub fn colliding(mut self) -> Self {
+        self.collide = true;
+        self
+    }
+}
