@@ -62,8 +62,8 @@ struct SceneArgs {
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Threads for everything that runs on the CPU; 0 is one a core.
-    #[arg(long, default_value_t = 0)]
-    threads: usize,
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -97,7 +97,7 @@ impl SceneArgs {
 
     /// Sets the number of threads, once for the process; 0 keeps one a core, or `unless_told`.
     fn set_threads(&self, unless_told: usize) {
-        let threads = if self.threads == 0 { unless_told } else { self.threads };
+        let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
         // Fails only if it was set before, which nothing does.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
