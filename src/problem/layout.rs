@@ -4,6 +4,7 @@
 //! offset of every field by reflection.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// State of one body that a step changes, 64 B.
 #[repr(C)]
@@ -85,6 +86,14 @@ pub struct ContactRow {
     /// Radius of curvature of b's surface [m].
     pub radius_b: f32,
     pub(crate) pad: [f32; 2],
+}
+
+impl ContactRow {
+    /// The two tangents; together with the normal a right-handed frame.
+    pub fn tangents(&self) -> (Vec3, Vec3) {
+        let tangent_1 = Vec3::from_array(self.tangent);
+        (tangent_1, Vec3::from_array(self.normal).cross(tangent_1))
+    }
 }
 
 /// One contact point, 48 B.

@@ -1,5 +1,6 @@
 //! One step as a value: plain rows in color order, whose names are the names of the WGSL bindings.
 
+pub mod effective;
 mod layout;
 mod prepare;
 pub mod softness;

@@ -1,9 +1,10 @@
 //! From bodies and manifolds to rows: arms, effective masses, impulses carried over.
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::StepProblem;
+use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
     Softness,
@@ -260,7 +261,7 @@ fn prepare_header(row: &mut ContactRow, pair: &Pair, manifold: &Manifold, [a, b]
 }
 
 fn carried_over(row: &ContactRow, p: &ManifoldPoint) -> ImpulseRow {
-    let (tangent_1, tangent_2) = tangents(row);
+    let (tangent_1, tangent_2) = row.tangents();
     // Friction that a rule no longer allows is not carried over.
     let friction = if row.friction > 0.0 { p.friction_impulse } else { Vec3::ZERO };
     ImpulseRow {
@@ -271,75 +272,13 @@ fn carried_over(row: &ContactRow, p: &ManifoldPoint) -> ImpulseRow {
     }
 }
 
-/// The two tangents of a row.
-pub(super) fn tangents(row: &ContactRow) -> (Vec3, Vec3) {
-    let tangent_1 = Vec3::from_array(row.tangent);
-    (tangent_1, Vec3::from_array(row.normal).cross(tangent_1))
-}
-
 fn carried_over_patch(row: &ContactRow, manifold: &Manifold) -> ImpulseRow {
-    let (tangent_1, tangent_2) = tangents(row);
+    let (tangent_1, tangent_2) = row.tangents();
     ImpulseRow {
         normal: manifold.twist_impulse,
         tangent_1: manifold.friction_impulse.dot(tangent_1),
         tangent_2: manifold.friction_impulse.dot(tangent_2),
         peak: 0.0,
-    }
-}
-
-/// Inverse mass and inertia of one body.
-struct InverseMass {
-    mass: f32,
-    inertia: Mat3,
-}
-
-impl InverseMass {
-    fn of(row: &MassRow) -> Self {
-        let ([xx, xy, xz], [yy, yz, zz]) = (row.inv_inertia_x, row.inv_inertia_yz);
-        Self { mass: row.inv_mass, inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]) }
-    }
-
-    /// Share of this body in the entry (d, e) of G M⁻¹ Gᵀ at arm `r`.
-    fn entry(&self, r: Vec3, d: Vec3, e: Vec3) -> f32 {
-        self.mass * d.dot(e) + r.cross(d).dot(self.inertia * r.cross(e))
-    }
-}
-
-/// G M⁻¹ Gᵀ of the points of one manifold.
-struct EffectiveMass<'a> {
-    inverse: &'a [InverseMass; 2],
-    row: &'a ContactRow,
-}
-
-impl EffectiveMass<'_> {
-    /// One over the normal entry at arms `r_a`, `r_b`; 0 if nothing can move.
-    fn normal(&self, r_a: Vec3, r_b: Vec3) -> f32 {
-        let n = Vec3::from_array(self.row.normal);
-        inverse_or_zero(self.entry(r_a, r_b, n, n))
-    }
-
-    /// One over the largest eigenvalue of the tangential block.
-    fn tangent(&self, r_a: Vec3, r_b: Vec3) -> f32 {
-        let (t_1, t_2) = tangents(self.row);
-        let (s_11, s_22, s_12) =
-            (self.entry(r_a, r_b, t_1, t_1), self.entry(r_a, r_b, t_2, t_2), self.entry(r_a, r_b, t_1, t_2));
-        inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
-    }
-
-    /// One over the entry of the tangential direction `d`.
-    fn along(&self, r_a: Vec3, r_b: Vec3, d: Vec3) -> f32 {
-        inverse_or_zero(self.entry(r_a, r_b, d, d))
-    }
-
-    /// One over the inverse inertia about the normal.
-    fn twist(&self) -> f32 {
-        let n = Vec3::from_array(self.row.normal);
-        inverse_or_zero(self.inverse.iter().map(|i| n.dot(i.inertia * n)).sum())
-    }
-
-    fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
-        let [a, b] = self.inverse;
-        a.entry(r_a, d, e) + b.entry(r_b, d, e)
     }
 }
 
@@ -350,7 +289,7 @@ fn prepare_point(effective: &EffectiveMass, p: &ManifoldPoint, [a, b]: [&Body; 2
         _ => body.linear_velocity + body.angular_velocity.cross(r),
     };
     let u = velocity(b, r_b) - velocity(a, r_a);
-    let (tangent_1, tangent_2) = tangents(effective.row);
+    let (tangent_1, tangent_2) = effective.row.tangents();
     // A point that does not slip yet takes the first tangent.
     let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
     let tangent_mass = match rule {
@@ -386,8 +325,4 @@ fn prepare_patch(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow
         tangent_mass: effective.tangent(r_a, r_b),
         ..PointRow::default()
     }
-}
-
-fn inverse_or_zero(x: f32) -> f32 {
-    if x > 0.0 { 1.0 / x } else { 0.0 }
 }

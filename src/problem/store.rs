@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::prepare::{Prepared, tangents};
+use super::prepare::Prepared;
 use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
 use crate::world::{BodyKind, World};
@@ -26,7 +26,7 @@ impl Prepared {
         }
         for (&(i, k), &row) in self.contacts.iter().zip(&self.row_of) {
             let contact = &problem.contacts[row as usize];
-            let (tangent_1, tangent_2) = tangents(contact);
+            let (tangent_1, tangent_2) = contact.tangents();
             let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
             let manifold = &mut pairs[i as usize].manifolds[k as usize];
             let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);

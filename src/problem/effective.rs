@@ -1,0 +1,73 @@
+//! How hard a constraint is to move: entries of S = G M⁻¹ Gᵀ at one contact point. Derivation: docs/derivation.md.
+
+use glam::{Mat3, Vec3};
+
+use super::layout::{ContactRow, MassRow};
+
+/// Inverse mass [1/kg] and inverse inertia in world axes [1/(kg m²)] of one body.
+#[derive(Clone, Copy, Debug)]
+pub struct InverseMass {
+    /// One over the mass; 0 if nothing moves it.
+    pub mass: f32,
+    /// Inverse of the inertia about the centre of mass.
+    pub inertia: Mat3,
+}
+
+impl InverseMass {
+    /// From a row.
+    pub fn of(row: &MassRow) -> Self {
+        let ([xx, xy, xz], [yy, yz, zz]) = (row.inv_inertia_x, row.inv_inertia_yz);
+        Self { mass: row.inv_mass, inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]) }
+    }
+
+    /// Share of this body in the entry (d, e) of G M⁻¹ Gᵀ at arm `r`.
+    fn entry(&self, r: Vec3, d: Vec3, e: Vec3) -> f32 {
+        self.mass * d.dot(e) + r.cross(d).dot(self.inertia * r.cross(e))
+    }
+}
+
+/// The effective masses of the points of one manifold.
+#[derive(Clone, Copy, Debug)]
+pub struct EffectiveMass<'a> {
+    /// Of a and b.
+    pub inverse: &'a [InverseMass; 2],
+    /// Normal and tangent of the manifold.
+    pub row: &'a ContactRow,
+}
+
+impl EffectiveMass<'_> {
+    /// One over the normal entry at arms `r_a`, `r_b`; 0 if nothing can move.
+    pub fn normal(&self, r_a: Vec3, r_b: Vec3) -> f32 {
+        let n = Vec3::from_array(self.row.normal);
+        inverse_or_zero(self.entry(r_a, r_b, n, n))
+    }
+
+    /// One over the largest eigenvalue of the tangential block.
+    pub fn tangent(&self, r_a: Vec3, r_b: Vec3) -> f32 {
+        let (t_1, t_2) = self.row.tangents();
+        let (s_11, s_22, s_12) =
+            (self.entry(r_a, r_b, t_1, t_1), self.entry(r_a, r_b, t_2, t_2), self.entry(r_a, r_b, t_1, t_2));
+        inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
+    }
+
+    /// One over the entry of the tangential direction `d`.
+    pub fn along(&self, r_a: Vec3, r_b: Vec3, d: Vec3) -> f32 {
+        inverse_or_zero(self.entry(r_a, r_b, d, d))
+    }
+
+    /// One over the inverse inertia about the normal.
+    pub fn twist(&self) -> f32 {
+        let n = Vec3::from_array(self.row.normal);
+        inverse_or_zero(self.inverse.iter().map(|i| n.dot(i.inertia * n)).sum())
+    }
+
+    /// The entry of the directions `d` and `e` at arms `r_a`, `r_b`.
+    pub fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
+        let [a, b] = self.inverse;
+        a.entry(r_a, d, e) + b.entry(r_b, d, e)
+    }
+}
+
+fn inverse_or_zero(x: f32) -> f32 {
+    if x > 0.0 { 1.0 / x } else { 0.0 }
+}
