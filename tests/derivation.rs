@@ -124,7 +124,8 @@ fn a_row_with_a_wrong_arm_or_sign_is_found() {
 fn the_relative_velocity_is_the_row_times_the_velocities() {
     let case = case();
     let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
-    let v = [DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.1, 4.0), DVec3::new(-1.0, 0.2, 0.7), DVec3::new(2.0, 1.0, -3.0)];
+    let v =
+        [DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.1, 4.0), DVec3::new(-1.0, 0.2, 0.7), DVec3::new(2.0, 1.0, -3.0)];
     (pair.a.v, pair.a.w, pair.b.v, pair.b.w) = (lane(v[0]), lane(v[1]), lane(v[2]), lane(v[3]));
     let u = relative_velocity(&pair, lane(case.r[0]), lane(case.r[1]));
     for (axis, component) in [(DVec3::X, u.x), (DVec3::Y, u.y), (DVec3::Z, u.z)] {

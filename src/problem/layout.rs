@@ -12,13 +12,16 @@ use glam::Vec3;
 pub struct BodyRow {
     /// Velocity of the centre of mass [m/s].
     pub v: [f32; 3],
-    pub(crate) pad_v: f32,
+    #[doc(hidden)]
+    pub pad_v: f32,
     /// Angular velocity, world axes [rad/s].
     pub w: [f32; 3],
-    pub(crate) pad_w: f32,
+    #[doc(hidden)]
+    pub pad_w: f32,
     /// Movement of the centre of mass since the step began [m].
     pub dp: [f32; 3],
-    pub(crate) pad_dp: f32,
+    #[doc(hidden)]
+    pub pad_dp: f32,
     /// Rotation since the step began, x y z w.
     pub dq: [f32; 4],
 }
@@ -39,10 +42,12 @@ pub struct MassRow {
     pub inv_mass: f32,
     /// Inverse inertia; yy yz zz.
     pub inv_inertia_yz: [f32; 3],
-    pub(crate) pad: f32,
+    #[doc(hidden)]
+    pub pad: f32,
     /// Gravity plus force over mass [m/s²].
     pub acceleration: [f32; 3],
-    pub(crate) pad_end: f32,
+    #[doc(hidden)]
+    pub pad_end: f32,
 }
 
 /// Principal inertia of one body whose moments differ, 48 B.
@@ -55,7 +60,8 @@ pub struct InertiaRow {
     pub body: u32,
     /// One over the moments [1/(kg m²)].
     pub inv_principal: [f32; 3],
-    pub(crate) pad: f32,
+    #[doc(hidden)]
+    pub pad: f32,
     /// Rotation from the principal axes to the world when the step begins, x y z w.
     pub frame: [f32; 4],
 }
@@ -85,7 +91,8 @@ pub struct ContactRow {
     pub radius_a: f32,
     /// Radius of curvature of b's surface [m].
     pub radius_b: f32,
-    pub(crate) pad: [f32; 2],
+    #[doc(hidden)]
+    pub pad: [f32; 2],
 }
 
 impl ContactRow {
@@ -133,7 +140,8 @@ pub struct JointRow {
     pub body_b: u32,
     /// Anchor of b less anchor of a when the step begins [m].
     pub gap: [f32; 3],
-    pub(crate) pad: f32,
+    #[doc(hidden)]
+    pub pad: f32,
 }
 
 /// The impulse of one joint on its body b, accumulated, 16 B [N s].
@@ -142,7 +150,8 @@ pub struct JointRow {
 pub struct JointImpulseRow {
     /// World axes.
     pub linear: [f32; 3],
-    pub(crate) pad: f32,
+    #[doc(hidden)]
+    pub pad: f32,
 }
 
 /// Whether sweeps still move anything, 16 B. Written by the sweeps of a step that has a tolerance.
@@ -222,7 +231,8 @@ pub struct Params {
     pub relaxation: f32,
     /// Corrections that change a relative velocity by less count as none [m/s].
     pub tolerance: f32,
-    pub(crate) pad: [u32; 3],
+    #[doc(hidden)]
+    pub pad: [u32; 3],
 }
 
 /// The colors that one dispatch sweeps, one after another.
