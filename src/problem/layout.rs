@@ -118,7 +118,7 @@ pub struct PointRow {
     /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ; with one slip direction, one over the
     /// entry of that direction [kg].
     pub tangent_mass: f32,
-    /// Normal velocity when the step begins, negative when approaching [m/s].
+    /// Normal velocity with which the surfaces meet, negative when approaching [m/s].
     pub approach_velocity: f32,
     /// Component of the slip direction along the first tangent; with friction per manifold, distance from the patch [m].
     pub slip_1: f32,

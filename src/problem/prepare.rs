@@ -169,6 +169,7 @@ impl Prepared {
             chunks.push((rows, order, own_points, own_impulses));
         }
         let masses = &problem.masses;
+        let h = problem.params.substep;
         chunks.into_par_iter().for_each(|(rows, order, points, impulses)| {
             let mut next = 0;
             for (row, &contact) in rows.iter_mut().zip(order) {
@@ -176,12 +177,14 @@ impl Prepared {
                 let bodies = [pair.body_a, pair.body_b].map(|i| &world.bodies[i as usize]);
                 prepare_header(row, pair, manifold, bodies, config);
                 let inverse = [pair.body_a, pair.body_b].map(|i| InverseMass::of(&masses[i as usize]));
+                let accelerations =
+                    [pair.body_a, pair.body_b].map(|i| Vec3::from_array(masses[i as usize].acceleration));
                 let effective = EffectiveMass { inverse: &inverse, row };
                 let end = next + manifold.points().len();
                 for (p, (point, impulse)) in
                     manifold.points().iter().zip(points[next..].iter_mut().zip(&mut impulses[next..]))
                 {
-                    *point = prepare_point(&effective, p, bodies, config.friction);
+                    *point = prepare_point(&effective, p, bodies, accelerations, h, config.friction);
                     *impulse = if config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
                 }
                 if patch {
@@ -282,13 +285,22 @@ fn carried_over_patch(row: &ContactRow, manifold: &Manifold) -> ImpulseRow {
     }
 }
 
-fn prepare_point(effective: &EffectiveMass, p: &ManifoldPoint, [a, b]: [&Body; 2], rule: FrictionRule) -> PointRow {
+fn prepare_point(
+    effective: &EffectiveMass,
+    p: &ManifoldPoint,
+    [a, b]: [&Body; 2],
+    accelerations: [Vec3; 2],
+    h: f32,
+    rule: FrictionRule,
+) -> PointRow {
     let (r_a, r_b) = (p.r_a, p.r_b);
     let velocity = |body: &Body, r: Vec3| match body.kind {
         BodyKind::Fixed => Vec3::ZERO,
         _ => body.linear_velocity + body.angular_velocity.cross(r),
     };
     let u = velocity(b, r_b) - velocity(a, r_a);
+    let normal = Vec3::from_array(effective.row.normal);
+    let pull = (accelerations[1] - accelerations[0]).dot(normal);
     let (tangent_1, tangent_2) = effective.row.tangents();
     // A point that does not slip yet takes the first tangent.
     let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
@@ -303,10 +315,26 @@ fn prepare_point(effective: &EffectiveMass, p: &ManifoldPoint, [a, b]: [&Body; 2
         r_b: r_b.to_array(),
         normal_mass: effective.normal(r_a, r_b),
         tangent_mass,
-        approach_velocity: u.dot(Vec3::from_array(effective.row.normal)),
+        approach_velocity: velocity_at_impact(u.dot(normal), pull, p.separation, h, effective.row.restitution),
         slip_1: slip.x,
         slip_2: slip.y,
     }
+}
+
+/// Normal velocity whose opposite, times the restitution `e`, gives back the energy of the approach.
+///
+/// `vn` is the normal velocity when the step begins, `pull` the relative acceleration along the normal, `gap` the distance
+/// still to go and `h` the substep. Two corrections: what the surfaces gain on the way, and that the velocities of the
+/// integrator stand half a substep ahead of the parabola that its positions lie on, before the bounce and after it.
+/// Without them a perfectly elastic ball that fell 5 m lost 2.3 % of its energy in 20 s at steps of 1 ms.
+fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
+    if vn >= 0.0 || e == 0.0 {
+        return vn;
+    }
+    let ahead = 0.5 * pull * h;
+    let approach = (vn + ahead).min(0.0);
+    let meeting = (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt();
+    -(meeting - ahead / e)
 }
 
 /// The row that stands for the friction of all `points`, which learn how far from it they are.
