@@ -1,0 +1,26 @@
+//! Reads contacts and impulses after a step: who touches whom, how deep, how hard.
+//!
+//!     cargo run --release --example read_contacts
+
+use drystone::{Reference, Result, Scene, Simulation, SolverConfig};
+
+fn main() -> Result<()> {
+    let scene = Scene::find("tower", &["n=3".into()])?;
+    let config = SolverConfig::default();
+    let substep = scene.dt / config.substeps as f32;
+    let mut simulation = Simulation::new(scene.world, config, Box::new(Reference::<f32>::new()))?;
+    for _ in 0..300 {
+        simulation.step(scene.dt)?;
+    }
+    for pair in simulation.pairs() {
+        for manifold in &pair.manifolds {
+            println!("body {} on body {}, normal {:.2}", pair.body_b, pair.body_a, manifold.normal);
+            for point in manifold.points() {
+                // Impulses are those of the last substep: over its length they are forces.
+                let force = point.normal_impulse / substep;
+                println!("    {:.3} mm apart, {force:.0} N", point.separation * 1e3);
+            }
+        }
+    }
+    Ok(())
+}
