@@ -118,7 +118,7 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// The first pass after which two backends disagree on `problem` in any bit of bodies or impulses; by bisection.
+/// The first pass after which two backends disagree on `problem` in any bit that they give back; by bisection.
 ///
 /// # Errors
 /// A backend cannot run.
@@ -134,9 +134,13 @@ pub fn first_difference(
         }
         let [a, b] = results;
         let bytes = |p: &StepProblem| {
-            let bodies: &[u8] = bytemuck::cast_slice(&p.bodies);
-            let impulses: &[u8] = bytemuck::cast_slice(&p.impulses);
-            (bodies.to_vec(), impulses.to_vec())
+            let rows: [&[u8]; 4] = [
+                bytemuck::cast_slice(&p.bodies),
+                bytemuck::cast_slice(&p.impulses),
+                bytemuck::cast_slice(&p.joint_impulses),
+                bytemuck::bytes_of(&p.convergence),
+            ];
+            rows.concat()
         };
         Ok(bytes(&a) == bytes(&b))
     };

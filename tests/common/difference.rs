@@ -1,0 +1,46 @@
+//! How far apart two backends leave one problem: the rows that a backend gives back.
+
+use drystone::StepProblem;
+
+/// Everything that a backend gives back, as numbers.
+fn numbers(problem: &StepProblem) -> Vec<f32> {
+    let c = &problem.convergence;
+    let rows: [&[f32]; 3] = [
+        bytemuck::cast_slice(&problem.bodies),
+        bytemuck::cast_slice(&problem.impulses),
+        bytemuck::cast_slice(&problem.joint_impulses),
+    ];
+    let counts = [c.moving, c.done, c.sweeps, c.planned].map(|n| n as f32);
+    [&rows.concat()[..], &counts].concat()
+}
+
+/// The numbers of `a` with those of `b`.
+fn pairs(a: &StepProblem, b: &StepProblem) -> impl Iterator<Item = (f32, f32)> {
+    let (a, b) = (numbers(a), numbers(b));
+    assert_eq!(a.len(), b.len());
+    a.into_iter().zip(b)
+}
+
+/// How many numbers differ in any bit.
+pub fn differing(a: &StepProblem, b: &StepProblem) -> usize {
+    pairs(a, b).filter(|(x, y)| x.to_bits() != y.to_bits()).count()
+}
+
+/// The largest difference of two numbers, relative to 1 plus their size; infinite if it is not a number.
+pub fn largest(a: &StepProblem, b: &StepProblem) -> f64 {
+    let apart = |(x, y): (f32, f32)| {
+        let (x, y) = (f64::from(x), f64::from(y));
+        let d = (x - y).abs() / (1.0 + x.abs().max(y.abs()));
+        if d.is_nan() { f64::INFINITY } else { d }
+    };
+    pairs(a, b).map(apart).fold(0.0, f64::max)
+}
+
+/// The largest difference of a component of a velocity [m/s] or an angular velocity [rad/s].
+pub fn of_velocities(a: &StepProblem, b: &StepProblem) -> f64 {
+    assert_eq!(a.bodies.len(), b.bodies.len());
+    let velocities =
+        |problem: &StepProblem| -> Vec<f32> { problem.bodies.iter().flat_map(|row| [row.v, row.w].concat()).collect() };
+    let apart = |(x, y): (f32, f32)| if (x - y).is_nan() { f64::INFINITY } else { f64::from((x - y).abs()) };
+    velocities(a).into_iter().zip(velocities(b)).map(apart).fold(0.0, f64::max)
+}

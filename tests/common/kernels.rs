@@ -1,0 +1,88 @@
+//! Every kernel there is, and passes of one kernel.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use drystone::StepProblem;
+use drystone::config::FrictionRule;
+use drystone::kernels::Rules;
+use drystone::plan::{Kernel, Pass};
+
+/// Every combination of rules that differ in what they do.
+pub fn every_rules() -> Vec<Rules> {
+    let mut all = Vec::new();
+    for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
+        for bits in 0..64 {
+            let has = |bit: u32| bits >> bit & 1 == 1;
+            let rules = Rules {
+                biased: has(0),
+                friction,
+                patch: has(1),
+                friction_first: has(2),
+                accumulated: has(3),
+                round: has(4),
+                measured: has(5),
+            };
+            // Without friction it does not matter when it acts.
+            if friction != FrictionRule::None || !rules.friction_first {
+                all.push(rules);
+            }
+        }
+    }
+    all
+}
+
+/// Every kernel under every combination of rules.
+pub fn every_kernel() -> Vec<Kernel> {
+    let mut all = vec![
+        Kernel::IntegrateVelocities,
+        Kernel::IntegrateGyroscopic,
+        Kernel::IntegratePositions,
+        Kernel::ClearImpulses,
+        Kernel::BeginSweep { first: true },
+        Kernel::BeginSweep { first: false },
+        Kernel::WarmStartJoints,
+    ];
+    for rules in every_rules() {
+        all.push(Kernel::WarmStart(rules.of_warm_start()));
+        all.push(Kernel::SolveJoints(rules.of_joints()));
+        all.push(Kernel::SolveContacts(rules));
+        all.push(Kernel::ApplyRestitution(Rules { patch: rules.patch, ..Rules::default() }));
+    }
+    let mut known = HashSet::new();
+    all.retain(|kernel| known.insert(*kernel));
+    all
+}
+
+/// A sweep with friction at the points of round surfaces.
+pub fn sweep() -> Kernel {
+    Kernel::SolveContacts(Rules { biased: true, friction: FrictionRule::Disc, round: true, ..Rules::default() })
+}
+
+/// Whether `kernel` asks for manifolds that carry a patch.
+pub fn has_patches(kernel: Kernel) -> bool {
+    kernel.rules().is_some_and(|rules| rules.patch)
+}
+
+/// The colors that `kernel` goes over; none for one that goes over something else.
+fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
+    match kernel {
+        Kernel::WarmStartJoints | Kernel::SolveJoints(_) => problem.joint_colors(),
+        Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => problem.contact_colors(),
+        _ => 0..0,
+    }
+}
+
+/// `kernel` over all of `problem` in one pass.
+pub fn in_one_pass(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
+    vec![Pass { kernel, colors: colors_of(kernel, problem) }]
+}
+
+/// `kernel` over all of `problem`, one color a pass.
+pub fn color_by_color(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
+    let colors = colors_of(kernel, problem);
+    if colors.is_empty() {
+        return in_one_pass(kernel, problem);
+    }
+    colors.map(|c| Pass { kernel, colors: c..c + 1 }).collect()
+}

@@ -1,0 +1,231 @@
+//! Random problems: every row is valid, no two make a scene.
+// Only the crate can name the padding of a row, so rows are made empty and filled.
+#![allow(clippy::field_reassign_with_default)]
+
+use drystone::StepProblem;
+use drystone::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use drystone::problem::softness::softness;
+use drystone::problem::{
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
+};
+use glam::{Mat3, Quat, Vec3};
+
+/// SplitMix64: the same numbers everywhere and forever.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A whole number below `end`.
+    pub fn below(&mut self, end: u32) -> u32 {
+        (self.bits() % u64::from(end)) as u32
+    }
+
+    /// Whether something of `chance` in 1 happens.
+    pub fn happens(&mut self, chance: f32) -> bool {
+        self.within(0.0, 1.0) < chance
+    }
+
+    pub fn within(&mut self, least: f32, most: f32) -> f32 {
+        least + (most - least) * ((self.bits() >> 40) as f32 / (1 << 24) as f32)
+    }
+
+    pub fn vector(&mut self, size: f32) -> Vec3 {
+        Vec3::from_array([(); 3].map(|()| self.within(-size, size)))
+    }
+
+    pub fn rotation(&mut self) -> Quat {
+        let q = Quat::from_array([(); 4].map(|()| self.within(-1.0, 1.0)));
+        if q.length() > 0.1 { q.normalize() } else { Quat::IDENTITY }
+    }
+}
+
+/// Bodies of a random problem. Every fifth cannot move.
+const BODIES: u32 = 200;
+/// Contacts of a random problem: some of its colors are then larger than a workgroup.
+const CONTACTS: u32 = 600;
+/// Joints of a random problem.
+const JOINTS: u32 = 300;
+
+fn is_movable(body: u32) -> bool {
+    !body.is_multiple_of(5)
+}
+
+/// A problem in color order with 1 to 4 points a contact, and patches if `patches`. Numbers are of order 1; a substep
+/// turns bodies by up to 3 rad, so that every term of every series counts.
+pub fn problem(seed: u64, patches: bool) -> StepProblem {
+    let random = &mut Random::new(seed);
+    let mut problem = StepProblem::default();
+    for body in 0..BODIES {
+        problem.bodies.push(body_row(random));
+        problem.masses.push(if is_movable(body) { mass_row(random) } else { MassRow::default() });
+        if is_movable(body) && random.happens(0.5) {
+            problem.inertias.push(inertia_row(random, body));
+        }
+    }
+    let (contacts, colors) = in_color_order(random, CONTACTS);
+    problem.first_joint_color = colors.len() as u32;
+    problem.colors = colors;
+    for bodies in contacts {
+        let first_point = problem.points.len() as u32;
+        let point_count = 1 + random.below(4);
+        problem.contacts.push(contact_row(random, bodies, first_point, point_count));
+        for row in 0..point_count + u32::from(patches) {
+            problem.points.push(point_row(random, patches));
+            problem.impulses.push(impulse_row(random, row == point_count));
+        }
+    }
+    let (joints, colors) = in_color_order(random, JOINTS);
+    problem.colors.extend(colors);
+    for bodies in joints {
+        problem.joints.push(joint_row(random, bodies));
+        let mut impulse = JointImpulseRow::default();
+        impulse.linear = random.vector(1.0).to_array();
+        problem.joint_impulses.push(impulse);
+    }
+    problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
+    problem.params = params(&problem);
+    problem
+}
+
+/// The same problem with everything that moves, pushes or separates scaled by `scale`.
+pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
+    let scale = |x: &mut f32| *x *= scale;
+    for row in &mut problem.bodies {
+        row.v.iter_mut().chain(&mut row.w).chain(&mut row.dp).for_each(scale);
+    }
+    problem.masses.iter_mut().flat_map(|row| &mut row.acceleration).for_each(scale);
+    problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
+    problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
+    [&mut problem.params.slop, &mut problem.params.tolerance].into_iter().for_each(scale);
+    problem
+}
+
+fn params(problem: &StepProblem) -> Params {
+    let substep = 0.1;
+    let mut params = Params::default();
+    params.substep = substep;
+    params.inverse_substep = 1.0 / substep;
+    params.restitution_threshold = 1.0;
+    params.inertia_count = problem.inertias.len() as u32;
+    params.movable = softness(1.5, 2.0, substep, 0.5);
+    params.fixed = softness(3.0, 2.0, substep, 0.5);
+    params.joint = softness(2.0, 1.0, substep, 0.5);
+    params.body_count = problem.bodies.len() as u32;
+    params.point_count = problem.points.len() as u32;
+    params.slop = 0.02;
+    params.relaxation = 0.9;
+    params.tolerance = 0.5;
+    params
+}
+
+/// The bodies of `count` random constraints in color order, and where each color begins and the last ends.
+fn in_color_order(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Vec<u32>) {
+    let pairs: Vec<_> = (0..count).map(|_| random_pair(random)).collect();
+    let place = |body: u32| if is_movable(body) { body } else { IMMOVABLE };
+    let mut edges: Vec<_> = pairs.iter().map(|&[a, b]| Edge { a: place(a), b: place(b), color: None }).collect();
+    let coloring = ConstraintGraph::default().color(BODIES as usize, &mut edges, 64);
+    (coloring.order.iter().map(|&i| pairs[i as usize]).collect(), coloring.offsets)
+}
+
+fn random_pair(random: &mut Random) -> [u32; 2] {
+    loop {
+        let (a, b) = (random.below(BODIES), random.below(BODIES));
+        if a != b && (is_movable(a) || is_movable(b)) {
+            return [a, b];
+        }
+    }
+}
+
+fn body_row(random: &mut Random) -> BodyRow {
+    let mut row = BodyRow::AT_REST;
+    row.v = random.vector(5.0).to_array();
+    row.w = random.vector(17.0).to_array();
+    row.dp = random.vector(0.1).to_array();
+    row.dq = random.rotation().to_array();
+    row
+}
+
+fn mass_row(random: &mut Random) -> MassRow {
+    let axes = Mat3::from_quat(random.rotation());
+    let inverse = (Vec3::splat(1.1) + random.vector(1.0)) * 0.5;
+    let i = axes * Mat3::from_diagonal(inverse) * axes.transpose();
+    let mut row = MassRow::default();
+    row.inv_inertia_x = [i.x_axis.x, i.x_axis.y, i.x_axis.z];
+    row.inv_inertia_yz = [i.y_axis.y, i.y_axis.z, i.z_axis.z];
+    row.inv_mass = random.within(0.1, 1.0);
+    row.acceleration = random.vector(10.0).to_array();
+    row
+}
+
+fn inertia_row(random: &mut Random, body: u32) -> InertiaRow {
+    let principal = Vec3::splat(3.0) + random.vector(1.0);
+    let mut row = InertiaRow::default();
+    row.principal = principal.to_array();
+    row.body = body;
+    row.inv_principal = principal.recip().to_array();
+    row.frame = random.rotation().to_array();
+    row
+}
+
+fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32, point_count: u32) -> ContactRow {
+    let axes = Mat3::from_quat(random.rotation());
+    let mut or_zero = |chance: f32| if random.happens(chance) { 0.0 } else { random.within(0.1, 1.0) };
+    let mut row = ContactRow::default();
+    row.normal = axes.x_axis.to_array();
+    row.friction = or_zero(0.2);
+    row.tangent = axes.y_axis.to_array();
+    row.restitution = or_zero(0.5);
+    row.body_a = body_a;
+    row.body_b = body_b;
+    row.first_point = first_point;
+    row.point_count = point_count;
+    row.radius_a = or_zero(0.5);
+    row.radius_b = or_zero(0.5);
+    row
+}
+
+fn point_row(random: &mut Random, patches: bool) -> PointRow {
+    // A direction of slip, or a distance from the patch.
+    let (sin, cos) = random.within(0.0, std::f32::consts::TAU).sin_cos();
+    let [slip_1, slip_2] = if patches { [sin.abs(), 0.0] } else { [sin, cos] };
+    PointRow {
+        r_a: random.vector(1.0).to_array(),
+        separation: random.within(-0.3, 0.3),
+        r_b: random.vector(1.0).to_array(),
+        normal_mass: random.within(0.1, 0.5),
+        tangent_mass: random.within(0.1, 0.5),
+        approach_velocity: random.within(-3.0, 1.0),
+        slip_1,
+        slip_2,
+    }
+}
+
+/// The impulse of a point, or of a patch: the one pushes, the other twists either way.
+fn impulse_row(random: &mut Random, patch: bool) -> ImpulseRow {
+    let least = if patch { -2.0 } else { 0.0 };
+    let normal = if random.happens(0.3) { 0.0 } else { random.within(least, 2.0) };
+    let (tangent_1, tangent_2) = (random.within(-1.0, 1.0), random.within(-1.0, 1.0));
+    ImpulseRow { normal, tangent_1, tangent_2, peak: normal.max(0.0) }
+}
+
+fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {
+    let mut row = JointRow::default();
+    row.r_a = random.vector(1.0).to_array();
+    row.body_a = body_a;
+    row.r_b = random.vector(1.0).to_array();
+    row.body_b = body_b;
+    row.gap = random.vector(0.1).to_array();
+    row
+}

@@ -1,0 +1,147 @@
+//! The comparison of backends finds what a backend does wrong, and where.
+
+use drystone::compare::{Difference, compare, first_difference};
+use drystone::plan::Pass;
+use drystone::problem::JointImpulseRow;
+use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+
+/// What goes wrong at one pass.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// It is not run.
+    Dropped,
+    /// What it leaves behind is changed.
+    Spoiled(fn(&mut StepProblem)),
+}
+
+/// A reference that does one pass of a step wrong.
+struct Faulty {
+    fault: Fault,
+    pass: usize,
+}
+
+impl Backend for Faulty {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn adapter(&self) -> String {
+        format!("{:?} at pass {}", self.fault, self.pass)
+    }
+
+    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+        let (before, rest) = passes.split_at(self.pass.min(passes.len()));
+        let mut reference = Reference::<f32>::new();
+        reference.run(problem, before)?;
+        if let Some((pass, after)) = rest.split_first() {
+            match self.fault {
+                Fault::Dropped => {}
+                Fault::Spoiled(spoil) => {
+                    reference.run(problem, std::slice::from_ref(pass))?;
+                    spoil(problem);
+                }
+            }
+            reference.run(problem, after)?;
+        }
+        Ok(())
+    }
+}
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+/// A small pile: by 40 steps it lies on the floor.
+fn pile() -> Scene {
+    Scene::find("pile", &["n=27".into()]).expect("a scene of the catalogue")
+}
+
+/// A step of the pile on the floor.
+fn lying() -> (StepProblem, StepPlan) {
+    let scene = pile();
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    for _ in 0..40 {
+        simulation.step(scene.dt).expect("the reference runs");
+    }
+    let (problem, plan) = simulation.next_problem(scene.dt);
+    (problem.clone(), plan.clone())
+}
+
+#[test]
+fn two_equal_backends_have_no_first_difference() {
+    let (problem, plan) = lying();
+    assert_eq!(first_difference(&problem, &plan, &mut [reference(), reference()]).expect("both run"), None);
+}
+
+/// One impulse is one percent off.
+fn perturb(problem: &mut StepProblem) {
+    let largest = problem.impulses.iter_mut().max_by(|a, b| a.normal.total_cmp(&b.normal));
+    largest.expect("the boxes touch").normal *= 1.01;
+}
+
+#[test]
+fn the_pass_that_goes_wrong_is_found_whichever_it_is() {
+    let (problem, plan) = lying();
+    for pass in 0..plan.passes.len() {
+        for fault in [Fault::Dropped, Fault::Spoiled(perturb)] {
+            let mut backends: [Box<dyn Backend>; 2] = [reference(), Box::new(Faulty { fault, pass })];
+            let found = first_difference(&problem, &plan, &mut backends).expect("both run");
+            assert_eq!(found, Some(pass), "{fault:?}, {}", plan.passes[pass].kernel);
+        }
+    }
+}
+
+#[test]
+fn whatever_a_backend_gives_back_is_compared() {
+    let (mut problem, plan) = lying();
+    problem.joint_impulses.push(JointImpulseRow::default());
+    let spoils: [fn(&mut StepProblem); 4] = [
+        |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
+        |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),
+        |problem| problem.joint_impulses[0].linear[1] = -0.0,
+        |problem| problem.convergence.sweeps += 1,
+    ];
+    let last = plan.passes.len() - 1;
+    for spoil in spoils {
+        let faulty = Box::new(Faulty { fault: Fault::Spoiled(spoil), pass: last });
+        let found = first_difference(&problem, &plan, &mut [reference(), faulty]).expect("both run");
+        assert_eq!(found, Some(last));
+    }
+}
+
+#[test]
+fn a_comparison_names_the_step_the_pass_and_the_kernel() {
+    // The first pass of each step adds gravity, which every box feels in the first step already.
+    let mut open = |which| -> Result<Box<dyn Backend>> {
+        Ok(if which == 0 { reference() } else { Box::new(Faulty { fault: Fault::Dropped, pass: 0 }) })
+    };
+    let mut finished = 0;
+    let scene = pile();
+    let found = compare(&scene, &SolverConfig::default(), &mut open, 3, || finished += 1).expect("both run");
+    assert_eq!((finished, found.steps.len()), (3, 3));
+    assert_eq!(found.steps[0].bodies, scene.world.dynamic_count());
+    let first = found.first.expect("a difference");
+    assert_eq!((first.step, first.pass, first.kernel.as_str()), (1, 0, "integrate_velocities"));
+}
+
+#[test]
+fn equal_backends_agree_in_every_bit_of_every_step() {
+    let found = compare(&pile(), &SolverConfig::default(), &mut |_| Ok(reference()), 50, || ()).expect("both run");
+    assert!(found.steps.iter().all(|d| *d == Difference::default()));
+    assert_eq!(found.first, None);
+}
+
+#[test]
+fn one_bit_of_one_number_makes_a_body_differ() {
+    let world = pile().world;
+    let changed = |change: &dyn Fn(&mut drystone::Body)| {
+        let mut other = world.clone();
+        change(&mut other.bodies[7]);
+        Difference::between(&world, &other)
+    };
+    assert_eq!(changed(&|_| ()), Difference::default());
+    assert_eq!(changed(&|b| b.angular_velocity.z = f32::from_bits(1)).bodies, 1);
+    assert_eq!(changed(&|b| b.position.x = b.position.x.next_up()).bodies, 1);
+    let lost = changed(&|b| b.linear_velocity.y = f32::NAN);
+    assert_eq!((lost.bodies, lost.velocity), (1, f64::INFINITY));
+}

@@ -1,0 +1,93 @@
+//! The house has floors: a module names only modules of its own floor or of lower ones.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The modules of each floor, the ground floor first.
+const FLOORS: [&[&str]; 9] = [
+    &["math", "error", "stats"],
+    &["world", "config"],
+    &["collide", "graph", "scenes"],
+    &["problem"],
+    &["kernels", "plan", "metrics"],
+    &["backend"],
+    &["simulation"],
+    &["report", "compare"],
+    &["main", "cli"],
+];
+
+const LIB: &str = include_str!("../src/lib.rs");
+
+fn floor(module: &str) -> Option<usize> {
+    FLOORS.iter().position(|modules| modules.contains(&module))
+}
+
+fn identifier(text: &str) -> &str {
+    &text[..text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len())]
+}
+
+/// What the crate's root gives on under a shorter name, and the module that it comes from.
+fn re_exports() -> BTreeMap<&'static str, &'static str> {
+    let lines = LIB.lines().filter_map(|line| line.strip_prefix("pub use "));
+    let names = |line: &'static str| {
+        let last = line.rsplit("::").next().unwrap_or(line);
+        last.split(|c: char| !c.is_alphanumeric()).filter(|name| !name.is_empty()).map(move |n| (n, identifier(line)))
+    };
+    lines.flat_map(names).collect()
+}
+
+/// The modules that the code of `text` names, whatever its comments say.
+fn named_modules(text: &str) -> Vec<&str> {
+    let code = text.lines().map(|line| line.split("//").next().unwrap_or(line));
+    let names = code.flat_map(|line| {
+        ["crate::", "drystone::"].into_iter().flat_map(move |root| line.split(root).skip(1).map(identifier))
+    });
+    let exports = re_exports();
+    names.map(|name| exports.get(name).copied().unwrap_or(name)).collect()
+}
+
+/// Each module that `text`, a file of `module`, names against the rule.
+fn too_high(module: &str, text: &str) -> Vec<String> {
+    let own = floor(module).unwrap_or_else(|| panic!("{module} is on no floor"));
+    let named = named_modules(text).into_iter().filter(|name| floor(name).is_none_or(|f| f > own));
+    named.map(|name| format!("{module} names {name}")).collect()
+}
+
+fn source_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    entries.flat_map(|path| if path.is_dir() { source_files(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn a_module_names_only_modules_of_its_own_floor_or_lower_ones() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut wrong = Vec::new();
+    for path in source_files(&root) {
+        let inside = path.strip_prefix(&root).expect("found there");
+        let module = inside.iter().next().expect("a name").to_string_lossy();
+        let module = module.trim_end_matches(".rs");
+        if module != "lib" {
+            wrong.extend(too_high(module, &std::fs::read_to_string(&path).expect("a text")));
+        }
+    }
+    assert_eq!(wrong, [""; 0]);
+}
+
+#[test]
+fn every_module_is_on_one_floor() {
+    let modules = LIB.lines().filter_map(|line| line.strip_prefix("pub mod ")).map(identifier);
+    let mut modules: Vec<_> = modules.chain(["main"]).collect();
+    let mut housed = FLOORS.concat();
+    modules.sort_unstable();
+    housed.sort_unstable();
+    assert_eq!(housed, modules);
+}
+
+#[test]
+fn a_module_that_names_a_higher_one_is_found() {
+    assert_eq!(too_high("graph", "use crate::simulation::Simulation;"), ["graph names simulation"]);
+    assert_eq!(too_high("graph", "fn f() -> crate::Simulation {}"), ["graph names simulation"]);
+    assert_eq!(too_high("math", "use crate::{world::World, error::Error};").len(), 1);
+    assert_eq!(too_high("graph", "/// As in [`Simulation`](crate::simulation::Simulation)."), [""; 0]);
+    assert_eq!(too_high("simulation", "use crate::graph::Edge; use crate::Error;"), [""; 0]);
+}

@@ -1,0 +1,173 @@
+//! Whole steps of the GPU against the reference.
+
+mod common;
+
+use common::difference::of_velocities;
+use common::gpu::gpu;
+use common::tolerance;
+use drystone::compare::compare;
+use drystone::glam::Vec3;
+use drystone::plan::Kernel;
+use drystone::stats::median;
+use drystone::{
+    Backend, BallJoint, Body, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+};
+
+fn pile() -> Scene {
+    Scene::find("pile", &[]).expect("a scene of the catalogue")
+}
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn after(backend: &mut dyn Backend, problem: &StepProblem, plan: &StepPlan) -> StepProblem {
+    let mut result = problem.clone();
+    backend.run(&mut result, &plan.passes).expect("the problem is small");
+    result
+}
+
+/// The reference, and the GPU, in exact mode if it can.
+fn opened(which: usize) -> drystone::Result<Box<dyn Backend>> {
+    if which == 0 {
+        return Ok(reference());
+    }
+    Ok(Box::new(gpu(true).expect("asked for before")))
+}
+
+/// Fails unless the GPU takes `scene` where the reference takes it, to the last bit. Without exact mode the two part ways
+/// at the first contact: then only the first step is held, and single steps below.
+fn assert_same(scene: &Scene, config: &SolverConfig, steps: u32, what: &str) {
+    let Some(gpu) = gpu(true) else { return };
+    let steps = if gpu.is_exact() { steps } else { 1 };
+    let found = compare(scene, config, &mut opened, steps, || ()).expect("both run");
+    assert_eq!(found.steps.len(), steps as usize);
+    if gpu.is_exact() {
+        assert_eq!(found.first, None, "{what}: {:?}", found.steps);
+        assert!(found.steps.iter().all(|d| d.bodies == 0), "{what}");
+    } else {
+        assert!(found.steps[0].velocity <= tolerance::PLAIN_STEP, "{what}: {:?}", found.steps);
+    }
+}
+
+#[test]
+fn a_falling_pile_has_the_bits_of_the_reference_in_exact_mode() {
+    assert_same(&pile(), &SolverConfig::default(), 60, "pile");
+}
+
+/// One body of every shape, all of which bounce, and a chain of long links: every kernel has work.
+fn mixture() -> Scene {
+    let mut scene = Scene::find("drop", &[]).expect("a scene of the catalogue");
+    scene.world.bodies.iter_mut().for_each(|body| body.material.restitution = 0.3);
+    let end = Vec3::new(0.0, 0.25, 0.0);
+    let mut above = None;
+    for i in 0..8 {
+        let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.1)).position(10.0, 8.0 - 0.5 * i as f32, 0.0);
+        let link = scene.world.add(link.velocity(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
+        scene.world.join(match above {
+            None => BallJoint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
+            Some(above) => BallJoint::new(above, -end, link, end),
+        });
+        above = Some(link);
+    }
+    scene
+}
+
+/// Settings that differ from the defaults in one rule each.
+const RULES: [&[&str]; 14] = [
+    &[],
+    &["friction=none"],
+    &["friction=slip"],
+    &["friction=box"],
+    &["friction_at=manifold"],
+    &["friction_order=friction-first"],
+    &["friction_sweeps=all"],
+    &["relax=0", "stabilization=baumgarte"],
+    &["relax=0", "stabilization=none", "clamping=per-correction"],
+    &["tolerance=0.01", "iterations=4", "relax=4"],
+    &["relaxation=1.3"],
+    &["warm_start=false"],
+    &["max_colors=2"],
+    &["substeps=1", "iterations=10", "fuse_colors_below=0"],
+];
+
+/// By then every body of the mixture has met the ground.
+const LANDED: u32 = 80;
+
+#[test]
+fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
+    for rule in RULES {
+        let mut config = SolverConfig::default();
+        rule.iter().for_each(|assignment| config.set(assignment).expect("a setting"));
+        assert_same(&mixture(), &config, LANDED, &rule.join(" "));
+    }
+}
+
+#[test]
+fn a_mixture_has_work_for_every_kernel() {
+    let scene = mixture();
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    for _ in 0..LANDED {
+        simulation.step(scene.dt).expect("the reference runs");
+    }
+    let problem = simulation.problem();
+    assert!(problem.has_friction() && problem.has_restitution() && problem.has_round_shapes());
+    assert!(problem.contacts.len() >= 5, "{} contacts", problem.contacts.len());
+    assert_eq!(problem.joints.len(), 8);
+    assert!(problem.inertias.len() > 8);
+}
+
+/// How far `step` takes the velocities of a falling pile from where the reference takes them, at several moments between
+/// the first contact and rest. Each step begins from the reference's state: trajectories part, single steps do not.
+fn apart_during_a_fall(mut step: impl FnMut(&StepProblem, &StepPlan) -> StepProblem) -> Vec<f64> {
+    let scene = pile();
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    let mut apart = Vec::new();
+    for now in 1..=100 {
+        let (problem, plan) = simulation.next_problem(scene.dt);
+        if !problem.contacts.is_empty() && now % 5 == 1 {
+            apart.push(of_velocities(&after(&mut *reference(), problem, plan), &step(problem, plan)));
+        }
+        simulation.step(scene.dt).expect("the reference runs");
+    }
+    assert!(simulation.problem().contacts.len() > 3000, "the pile never came to lie");
+    apart
+}
+
+fn largest(apart: &[f64]) -> f64 {
+    apart.iter().copied().fold(0.0, f64::max)
+}
+
+#[test]
+fn a_step_of_plain_wgsl_is_near_the_reference_during_a_fall() {
+    let Some(mut gpu) = gpu(false) else { return };
+    let apart = apart_during_a_fall(|problem, plan| after(&mut gpu, problem, plan));
+    println!("apart by {:.1e} in the middle, {:.1e} at most: {apart:?}", median(&apart), largest(&apart));
+    assert!(median(&apart) <= tolerance::PLAIN_STEP, "{apart:?}");
+    assert!(largest(&apart) <= tolerance::PLAIN_JUMP, "{apart:?}");
+}
+
+#[test]
+fn a_step_that_lacks_one_sweep_of_one_color_is_found() {
+    let apart = apart_during_a_fall(|problem, plan| {
+        let mut plan = plan.clone();
+        let last = plan.passes.iter().rposition(|p| matches!(p.kernel, Kernel::SolveContacts(_))).expect("a sweep");
+        plan.passes.remove(last);
+        after(&mut *reference(), problem, &plan)
+    });
+    println!("apart by {:.1e} in the middle, {:.1e} at most: {apart:?}", median(&apart), largest(&apart));
+    assert!(median(&apart) > tolerance::PLAIN_STEP, "{apart:?}");
+    assert!(largest(&apart) > tolerance::PLAIN_JUMP, "{apart:?}");
+}
+
+#[test]
+fn a_problem_too_large_for_the_adapter_is_refused_by_name() {
+    let Some(mut gpu) = gpu(false) else { return };
+    let summary = gpu.summary().clone();
+    // Zeros that nobody touches cost no memory.
+    let colors = vec![0; (summary.buffer_limit / 4 + 1) as usize];
+    let mut problem = StepProblem { colors, ..StepProblem::default() };
+    let Err(Error::TooLarge(line)) = gpu.run(&mut problem, &[]) else { panic!("{summary} took it") };
+    assert!(line.starts_with("the colors of this problem take "), "{line}");
+    assert!(line.contains(&summary.name) && line.ends_with("use --backend cpu"), "{line}");
+}

@@ -1,0 +1,198 @@
+//! Every kernel against its Rust double, pass by pass, on random problems.
+
+mod common;
+
+use common::difference::{differing, largest};
+use common::gpu::gpu;
+use common::kernels::{color_by_color, every_kernel, has_patches, in_one_pass, sweep};
+use common::{random, tolerance};
+use drystone::config::FrictionRule;
+use drystone::kernels::Rules;
+use drystone::plan::{Kernel, Pass};
+use drystone::problem::ConvergenceRow;
+use drystone::{Backend, Gpu, Reference, StepProblem};
+
+const MEASURED: Rules = Rules {
+    biased: true,
+    friction: FrictionRule::Disc,
+    patch: false,
+    friction_first: false,
+    accumulated: true,
+    round: true,
+    measured: true,
+};
+
+const SEEDS: std::ops::Range<u64> = 0..2;
+
+fn after(backend: &mut dyn Backend, problem: &StepProblem, passes: &[Pass]) -> StepProblem {
+    let mut result = problem.clone();
+    backend.run(&mut result, passes).expect("the problem is small");
+    result
+}
+
+fn by_the_reference(problem: &StepProblem, passes: &[Pass]) -> StepProblem {
+    after(&mut Reference::<f32>::new(), problem, passes)
+}
+
+/// What a kernel is run as: over all colors in one pass, and color by color; with a sweep after it if it writes rows that
+/// are not read back.
+fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
+    let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
+    if kernel == Kernel::IntegrateGyroscopic {
+        ways.iter_mut().for_each(|passes| passes.extend(color_by_color(sweep(), problem)));
+    }
+    ways.dedup();
+    ways
+}
+
+/// A random problem whose manifolds carry no patches, and one whose manifolds do.
+fn problems(seed: u64) -> [StepProblem; 2] {
+    [false, true].map(|patches| random::problem(seed, patches))
+}
+
+/// Runs every kernel on the problem that it asks for, on the reference and on `gpu`, in every way.
+fn run_all(gpu: &mut Gpu, problems: &[StepProblem; 2], mut compare: impl FnMut(&StepProblem, &StepProblem, &str)) {
+    for kernel in every_kernel() {
+        let problem = &problems[usize::from(has_patches(kernel))];
+        for passes in ways_to_run(kernel, problem) {
+            let what = format!("{kernel} in {} passes", passes.len());
+            compare(&by_the_reference(problem, &passes), &after(gpu, problem, &passes), &what);
+        }
+    }
+}
+
+/// Fails unless all kernels agree: to the last bit, or within the tolerance where the adapter has no exact mode.
+fn assert_same(gpu: &mut Gpu, problems: &[StepProblem; 2], name: &str) {
+    let exact = gpu.is_exact();
+    run_all(gpu, problems, |ours, theirs, what| {
+        if exact {
+            let count = differing(ours, theirs);
+            assert_eq!(count, 0, "{name}, {what}: {count} numbers differ");
+        } else {
+            let apart = largest(ours, theirs);
+            assert!(apart <= tolerance::PLAIN_PASS, "{name}, {what}: {apart:e} apart");
+        }
+    });
+}
+
+#[test]
+fn every_kernel_gives_the_bits_of_its_double_in_exact_mode() {
+    let Some(mut gpu) = gpu(true) else { return };
+    for seed in SEEDS {
+        assert_same(&mut gpu, &problems(seed), &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn tiny_numbers_keep_their_bits_in_exact_mode() {
+    let Some(mut gpu) = gpu(true) else { return };
+    // Squares that are subnormal, and numbers that are.
+    for scale in [1e-20, 1e-22, 1e-40] {
+        let tiny = problems(0).map(|problem| random::scaled(problem, scale));
+        assert_same(&mut gpu, &tiny, &format!("scale {scale:e}"));
+    }
+}
+
+#[test]
+fn every_kernel_is_near_its_double_as_plain_wgsl() {
+    let Some(mut gpu) = gpu(false) else { return };
+    let mut worst = (0.0, String::new());
+    for seed in SEEDS {
+        run_all(&mut gpu, &problems(seed), |ours, theirs, what| {
+            let apart = largest(ours, theirs);
+            if apart > worst.0 {
+                worst = (apart, format!("seed {seed}, {what}"));
+            }
+        });
+    }
+    println!("largest difference {:e}: {}", worst.0, worst.1);
+    assert!(worst.0 <= tolerance::PLAIN_PASS, "{:e}: {}", worst.0, worst.1);
+}
+
+#[test]
+fn sweeps_end_where_no_correction_is_above_the_tolerance() {
+    let Some(mut gpu) = gpu(true) else { return };
+    for (tolerance, sweeps) in [(1e9, 1), (0.0, 3)] {
+        for kernel in [Kernel::SolveJoints(MEASURED), Kernel::SolveContacts(MEASURED)] {
+            let mut problem = random::problem(0, false);
+            problem.params.tolerance = tolerance;
+            problem.convergence = ConvergenceRow::default();
+            let once = |first| {
+                [vec![Pass { kernel: Kernel::BeginSweep { first }, colors: 0..0 }], in_one_pass(kernel, &problem)]
+                    .concat()
+            };
+            let passes = [once(true), once(false), once(false)].concat();
+            let (ours, theirs) = (by_the_reference(&problem, &passes), after(&mut gpu, &problem, &passes));
+            assert_eq!(ours.convergence, theirs.convergence, "{kernel}");
+            assert_eq!((ours.convergence.sweeps, ours.convergence.planned), (sweeps, 3), "{kernel}");
+            // What was not done changed nothing.
+            let done = by_the_reference(&problem, &passes[..2 * sweeps as usize]);
+            assert_eq!(
+                (&ours.bodies, &ours.impulses, &ours.joint_impulses),
+                (&done.bodies, &done.impulses, &done.joint_impulses)
+            );
+            if gpu.is_exact() {
+                assert_eq!(differing(&ours, &theirs), 0, "{kernel}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kernel_changes_a_random_problem() {
+    let problems = problems(0);
+    for kernel in every_kernel() {
+        let problem = &problems[usize::from(has_patches(kernel))];
+        let apart = largest(problem, &by_the_reference(problem, &in_one_pass(kernel, problem)));
+        assert!(apart > 0.01 && apart.is_finite(), "{kernel}: {apart:e}");
+    }
+}
+
+/// The comparers find what they are there to find.
+mod must_fail {
+    use super::*;
+
+    fn assert_found(good: &StepProblem, bad: &StepProblem) {
+        assert!(differing(good, bad) > 0);
+        assert!(largest(good, bad) > tolerance::PLAIN_PASS, "{:e}", largest(good, bad));
+    }
+
+    #[test]
+    fn an_impulse_that_is_one_percent_off_is_found() {
+        let problem = random::problem(0, false);
+        let good = by_the_reference(&problem, &in_one_pass(sweep(), &problem));
+        let mut bad = good.clone();
+        let impulse = bad.impulses.iter_mut().find(|i| i.normal > 0.1).expect("some point pushes");
+        impulse.normal *= 1.01;
+        assert_found(&good, &bad);
+    }
+
+    #[test]
+    fn two_swapped_colors_are_found() {
+        let problem = random::problem(0, false);
+        let mut passes = color_by_color(sweep(), &problem);
+        let good = by_the_reference(&problem, &passes);
+        passes.swap(0, 1);
+        assert_found(&good, &by_the_reference(&problem, &passes));
+    }
+
+    #[test]
+    fn a_dropped_pass_is_found() {
+        let problem = random::problem(0, false);
+        let passes = color_by_color(sweep(), &problem);
+        let good = by_the_reference(&problem, &passes);
+        for dropped in 0..passes.len() {
+            let mut passes = passes.clone();
+            passes.remove(dropped);
+            assert_found(&good, &by_the_reference(&problem, &passes));
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_found() {
+        let good = random::problem(0, false);
+        let mut bad = good.clone();
+        bad.bodies[0].v[0] = f32::NAN;
+        assert_eq!((differing(&good, &bad), largest(&good, &bad)), (1, f64::INFINITY));
+    }
+}

@@ -1,0 +1,316 @@
+//! The shaders as text, without a GPU: what naga finds in them is what the crate says of them.
+
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+use std::path::Path;
+
+use common::kernels::{every_kernel, every_rules};
+use drystone::backend::gpu::shader::{BINDINGS, Reflected, UNIFORMS, WORKGROUP, constants, source};
+use drystone::kernels::Rules;
+use drystone::plan::Kernel;
+
+/// One kernel without overrides that naga reads.
+fn reflected(kernel: Kernel) -> Reflected {
+    let reflected = Reflected::new(&source(kernel), kernel.name(), &constants(kernel));
+    reflected.unwrap_or_else(|e| panic!("{kernel}: {e}"))
+}
+
+/// As written, overrides and all.
+fn parsed(source: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)))
+}
+
+mod layouts {
+    use super::*;
+    use drystone::problem::{
+        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
+        PassColors, PointRow, Softness,
+    };
+
+    const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
+
+    /// Size of a struct, and offset of each of its fields.
+    #[derive(Debug, PartialEq)]
+    struct Layout {
+        size: usize,
+        fields: BTreeMap<String, usize>,
+    }
+
+    macro_rules! layouts {
+        ($($twin:ident = $row:ident { $($field:ident)* })*) => {
+            BTreeMap::from([$((
+                stringify!($twin).to_owned(),
+                Layout {
+                    size: size_of::<$row>(),
+                    fields: BTreeMap::from([$((stringify!($field).to_owned(), offset_of!($row, $field))),*]),
+                },
+            )),*])
+        };
+    }
+
+    /// The layout of each row, under the name of its twin.
+    fn in_rust() -> BTreeMap<String, Layout> {
+        layouts! {
+            Body = BodyRow { v w dp dq }
+            Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
+            Inertia = InertiaRow { principal body inv_principal frame }
+            Contact = ContactRow {
+                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+            }
+            Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
+            Joint = JointRow { r_a body_a r_b body_b gap }
+            JointImpulse = JointImpulseRow { linear }
+            Convergence = ConvergenceRow { moving done sweeps planned }
+            Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
+            Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
+            Params = Params {
+                substep inverse_substep restitution_threshold inertia_count movable fixed joint
+                body_count point_count slop relaxation tolerance
+            }
+            PassColors = PassColors { first end }
+        }
+    }
+
+    /// The layout of each struct of `types`.
+    fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
+        let module = parsed(types);
+        let structs = module.types.iter().filter_map(|(_, t)| match &t.inner {
+            naga::TypeInner::Struct { members, span } => Some((t.name.clone()?, members, *span)),
+            _ => None,
+        });
+        let field = |m: &naga::StructMember| (m.name.clone().expect("a field has a name"), m.offset as usize);
+        structs
+            .map(|(name, members, span)| {
+                (name, Layout { size: span as usize, fields: members.iter().map(field).collect() })
+            })
+            .collect()
+    }
+
+    /// Names of the structs whose two layouts differ. A uniform may be larger in Rust: it stands in no array.
+    fn differing(types: &str) -> Vec<String> {
+        let (ours, theirs) = (in_rust(), in_wgsl(types));
+        let names: BTreeSet<_> = ours.keys().chain(theirs.keys()).collect();
+        let agree = |name: &str| match (ours.get(name), theirs.get(name)) {
+            (Some(a), Some(b)) if name == "Params" => a.fields == b.fields && a.size >= b.size,
+            (a, b) => a == b,
+        };
+        names.into_iter().filter(|name| !agree(name)).cloned().collect()
+    }
+
+    #[test]
+    fn every_row_has_the_layout_of_its_twin() {
+        assert_eq!(differing(TYPES), [""; 0]);
+    }
+
+    #[test]
+    fn a_changed_twin_is_found() {
+        for (before, after, name) in [
+            ("v: vec3f, w: vec3f", "w: vec3f, v: vec3f", "Body"),
+            ("first_point: u32, point_count: u32", "point_count: u32, first_point: u32", "Contact"),
+            ("peak: f32 }", "peak: f32, more: f32 }", "Impulse"),
+            ("push_limit: f32", "limit: f32", "Softness"),
+            ("struct PassColors", "struct Colors", "Colors"),
+        ] {
+            let changed = TYPES.replace(before, after);
+            assert_ne!(changed, TYPES, "{before} is not in the text");
+            assert!(differing(&changed).iter().any(|n| n == name), "{after}");
+        }
+    }
+}
+
+#[test]
+fn every_shader_file_is_a_kernel_and_every_kernel_a_file_with_an_entry_point_of_its_name() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let entries = std::fs::read_dir(folder).expect("the folder of the shaders").map(|e| e.expect("an entry").path());
+    let files: BTreeSet<_> = entries
+        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
+        .map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    let kernels: BTreeSet<_> = every_kernel().into_iter().map(|k| k.name().to_owned()).collect();
+    assert_eq!(files, kernels);
+    for kernel in every_kernel() {
+        let names: Vec<_> = parsed(&source(kernel)).entry_points.into_iter().map(|e| e.name).collect();
+        assert_eq!(names, [kernel.name()]);
+    }
+}
+
+#[test]
+fn every_kernel_stays_inside_what_every_webgpu_offers() {
+    for kernel in every_kernel() {
+        // Validates without any capability.
+        let reflected = reflected(kernel);
+        let storage = reflected.bindings.iter().filter(|&&b| b as usize >= UNIFORMS).count();
+        assert!(storage <= 8, "{kernel} has {storage} storage buffers");
+        let threads = if matches!(kernel, Kernel::BeginSweep { .. }) { 1 } else { WORKGROUP };
+        assert_eq!(reflected.module.entry_points[0].workgroup_size, [threads, 1, 1], "{kernel}");
+    }
+}
+
+#[test]
+fn every_binding_stands_where_its_name_stands_in_the_list() {
+    for kernel in every_kernel() {
+        let module = parsed(&source(kernel));
+        let mut bound: Vec<_> = module
+            .global_variables
+            .iter()
+            .filter_map(|(_, v)| {
+                v.binding.map(|at| (at.binding, v.name.clone().expect("a binding has a name"), v.space))
+            })
+            .collect();
+        bound.sort_by_key(|(at, ..)| *at);
+        assert_eq!(bound.iter().map(|(at, ..)| *at).collect::<Vec<_>>(), Vec::from_iter(0..BINDINGS.len() as u32));
+        assert_eq!(bound.iter().map(|(_, name, _)| name).collect::<Vec<_>>(), BINDINGS);
+        for (at, name, space) in bound {
+            assert_eq!(space == naga::AddressSpace::Uniform, (at as usize) < UNIFORMS, "{name}");
+        }
+    }
+}
+
+#[test]
+fn every_override_is_a_constant_of_its_kernel_and_every_constant_an_override() {
+    for kernel in every_kernel() {
+        let module = parsed(&source(kernel));
+        let overrides: BTreeSet<_> = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+        let constants: BTreeSet<_> = constants(kernel).into_iter().map(|(name, _)| name.to_owned()).collect();
+        assert_eq!(overrides, constants, "{kernel}");
+    }
+}
+
+#[test]
+fn every_rule_reaches_the_sweep_as_a_constant() {
+    let all = every_rules();
+    let constants = |&rules: &Rules| format!("{:?}", constants(Kernel::SolveContacts(rules)));
+    let distinct: BTreeSet<_> = all.iter().map(constants).collect();
+    assert_eq!(distinct.len(), all.len());
+}
+
+#[test]
+fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
+    // The last ones are too small to show in the bits of a rotation.
+    let module = parsed(&source(Kernel::IntegratePositions));
+    let named = |f: &&naga::Function| f.name.as_deref() == Some("exp_rotation");
+    let function = module.functions.iter().map(|(_, f)| f).find(named).expect("the function");
+    let magnitude = |e: &naga::Expression| match e {
+        naga::Expression::Literal(naga::Literal::F32(x)) => Some(x.abs().to_bits()),
+        _ => None,
+    };
+    let found: BTreeSet<u32> = function.expressions.iter().filter_map(|(_, e)| magnitude(e)).collect();
+    let mut factorial = 1.0_f64;
+    let series = (1..=11).map(|n| {
+        factorial *= f64::from(n);
+        (1.0 / factorial) as f32
+    });
+    assert_eq!(found, series.map(f32::to_bits).collect());
+}
+
+mod exact {
+    use super::*;
+
+    /// What may make a float, or a vector of floats: reading, moving, choosing, and + - * in a written order.
+    const EXACT: [u32; 14] = [
+        55,  // OpFunctionParameter
+        57,  // OpFunctionCall
+        61,  // OpLoad
+        79,  // OpVectorShuffle
+        80,  // OpCompositeConstruct
+        81,  // OpCompositeExtract
+        124, // OpBitcast
+        127, // OpFNegate
+        129, // OpFAdd
+        131, // OpFSub
+        133, // OpFMul
+        142, // OpVectorTimesScalar
+        169, // OpSelect
+        245, // OpPhi
+    ];
+    const ROUNDS: [u32; 5] = [127, 129, 131, 133, 142];
+    const TYPE_FLOAT: u32 = 22;
+    const TYPE_VECTOR: u32 = 23;
+    const FUNCTION: u32 = 54;
+    const DECORATE: u32 = 71;
+    const NO_CONTRACTION: u32 = 42;
+
+    fn instructions(words: &[u32]) -> Vec<(u32, &[u32])> {
+        let (mut rest, mut all) = (&words[5..], Vec::new());
+        while let Some(&first) = rest.first() {
+            let (instruction, after) = rest.split_at((first >> 16) as usize);
+            all.push((first & 0xffff, &instruction[1..]));
+            rest = after;
+        }
+        all
+    }
+
+    /// Opcodes that make floats in a way that is not exact, or that a driver may fuse.
+    fn inexact(words: &[u32]) -> BTreeSet<u32> {
+        let all = instructions(words);
+        let mut floats = BTreeSet::new();
+        for (opcode, operands) in &all {
+            if *opcode == TYPE_FLOAT || (*opcode == TYPE_VECTOR && floats.contains(&operands[1])) {
+                floats.insert(operands[0]);
+            }
+        }
+        let kept = |(opcode, operands): &(u32, &[u32])| {
+            (*opcode == DECORATE && operands[1] == NO_CONTRACTION).then(|| operands[0])
+        };
+        let kept: BTreeSet<_> = all.iter().filter_map(kept).collect();
+        // In functions the first operand of what has a result is its type, and no other instruction names a type there.
+        all.iter()
+            .skip_while(|(opcode, _)| *opcode != FUNCTION)
+            .filter(|(opcode, operands)| *opcode != FUNCTION && operands.first().is_some_and(|t| floats.contains(t)))
+            .filter(|(opcode, operands)| {
+                !EXACT.contains(opcode) || (ROUNDS.contains(opcode) && !kept.contains(&operands[1]))
+            })
+            .map(|(opcode, _)| *opcode)
+            .collect()
+    }
+
+    fn spirv(source: &str, entry_point: &str, constants: &[(&str, f64)]) -> Vec<u32> {
+        let reflected = Reflected::new(source, entry_point, constants).unwrap_or_else(|e| panic!("{e}"));
+        reflected.exact_spirv().expect("naga writes SPIR-V")
+    }
+
+    #[test]
+    fn every_kernel_only_adds_and_multiplies_and_may_not_be_fused() {
+        for kernel in every_kernel() {
+            let words = spirv(&source(kernel), kernel.name(), &constants(kernel));
+            assert_eq!(inexact(&words), BTreeSet::new(), "{kernel}");
+        }
+    }
+
+    /// The words of a kernel that computes one expression of `x: array<f32>`.
+    fn one_expression(expression: &str) -> Vec<u32> {
+        let source = format!(
+            "@group(0) @binding(2) var<storage, read_write> x: array<f32>;
+            @compute @workgroup_size(64) fn kernel() {{ x[0] = {expression}; }}"
+        );
+        spirv(&source, "kernel", &[])
+    }
+
+    #[test]
+    fn what_a_driver_may_round_as_it_likes_is_found() {
+        for (expression, opcode) in [
+            ("x[1] / x[2]", 136),                         // OpFDiv
+            ("sqrt(x[1])", 12),                           // OpExtInst
+            ("fma(x[1], x[2], x[3])", 12),                // OpExtInst
+            ("max(x[1], x[2])", 12),                      // OpExtInst
+            ("x[1] % x[2]", 140),                         // OpFRem
+            ("f32(u32(x[1]))", 112),                      // OpConvertUToF
+            ("dot(vec2f(x[1], x[2]), vec2f(x[3]))", 148), // OpDot
+        ] {
+            let found = inexact(&one_expression(expression));
+            assert!(found.contains(&opcode), "{expression}: {found:?}");
+        }
+        assert_eq!(inexact(&one_expression("x[1] * x[2] + x[3]")), BTreeSet::new());
+    }
+
+    #[test]
+    fn a_result_without_its_decoration_is_found() {
+        let mut words = one_expression("x[1] * x[2] + x[3]");
+        let at = words.iter().position(|&w| w == (3 << 16 | DECORATE)).expect("a decoration");
+        assert_eq!(words[at + 2], NO_CONTRACTION);
+        words.drain(at..at + 3);
+        assert_eq!(inexact(&words).len(), 1);
+    }
+}
