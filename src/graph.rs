@@ -61,7 +61,7 @@ impl ConstraintGraph {
         // Those that have a color keep it, and so take their place first.
         for edge in edges.iter_mut() {
             if let Some(color) = edge.color {
-                if self.free(edge) & available & (1 << color) != 0 {
+                if color < 64 && self.free(edge) & available & (1 << color) != 0 {
                     self.take(edge, color);
                 } else {
                     edge.color = None;

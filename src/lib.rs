@@ -49,3 +49,8 @@ pub use scenes::Scene;
 pub use simulation::Simulation;
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyKind, MassProperties, Material, Shape, World};
+
+/// The example of the README, compiled and run with the other documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -44,6 +44,10 @@ fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
 }
 
 /// Non-penetration at one point.
+///
+/// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other: a separation of 1e-11 m
+/// that rounding puts on the other side changes a sweep by what the spring is soft. That is why plain WGSL agrees with
+/// the reference to 1e-6 m/s in the middle of a step and to a few hundredths in the worst one.
 #[inline(always)]
 fn solve_normal<L: Lane>(
     rules: Rules,

@@ -1,6 +1,6 @@
 //! The rows of a [`StepProblem`](super::StepProblem): plain memory, the same in Rust and WGSL.
 //!
-//! Every struct is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/shaders.rs` compares the
+//! Every row is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/shaders.rs` compares the
 //! offset of every field by reflection.
 
 use bytemuck::{Pod, Zeroable};

@@ -4,5 +4,4 @@ mod plot;
 
 mod run;
 
-
 pub use run::{RunReport, StageRow, Trajectory};

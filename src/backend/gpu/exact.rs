@@ -5,6 +5,9 @@
 //! arithmetic result it does not, at the same speed, and the GPU agrees with the reference to the last bit. naga writes
 //! no such decoration, so it is added to the words that naga wrote.
 
+use super::shader::Reflected;
+use crate::error::Result;
+
 /// Words of a SPIR-V header.
 const HEADER: usize = 5;
 const OP_DECORATE: u32 = 71;
@@ -38,17 +41,20 @@ pub(super) fn without_contraction(words: &[u32]) -> Vec<u32> {
 
 /// A shader module of SPIR-V that wgpu hands to the driver as it is.
 #[allow(unsafe_code)]
-pub(super) fn shader_module(device: &wgpu::Device, entry_point: &str, spirv: &[u32]) -> wgpu::ShaderModule {
+pub(super) fn shader_module(device: &wgpu::Device, reflected: &Reflected) -> Result<wgpu::ShaderModule> {
+    let spirv = reflected.exact_spirv()?;
+    let entry_point = &reflected.module.entry_points[0];
+    let [x, y, z] = entry_point.workgroup_size;
     let entry_points =
-        [wgpu::PassthroughShaderEntryPoint { name: entry_point.into(), workgroup_size: (super::WORKGROUP, 1, 1) }];
+        [wgpu::PassthroughShaderEntryPoint { name: entry_point.name.as_str().into(), workgroup_size: (x, y, z) }];
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
-        label: Some(entry_point),
+        label: Some(entry_point.name.as_str()),
         entry_points: (&entry_points[..]).into(),
         spirv: Some(spirv.into()),
         ..Default::default()
     };
     // SAFETY: the words are naga's own, written from a module that it validated; only decorations were added to them.
-    unsafe { device.create_shader_module_passthrough(descriptor) }
+    Ok(unsafe { device.create_shader_module_passthrough(descriptor) })
 }
 
 #[cfg(test)]

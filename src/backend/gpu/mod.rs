@@ -144,7 +144,7 @@ impl Gpu {
         let reflected = shader::Reflected::new(&source, kernel.name(), &constants)?;
         let layout = shader::layout(&self.device, &reflected);
         let module = if self.exact {
-            exact::shader_module(&self.device, kernel.name(), &reflected.exact_spirv()?)
+            exact::shader_module(&self.device, &reflected)?
         } else {
             self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(kernel.name()),
