@@ -1,5 +1,5 @@
 // begin_sweep: one thread decides whether the sweep that follows is still needed, and counts.
-// Reads and writes convergence. Double: src/backend/cpu.rs.
+// Reads and writes convergence. Double: src/backend/cpu/mod.rs.
 
 override FIRST: bool = false;
 

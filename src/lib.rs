@@ -8,7 +8,7 @@
 //! color    greedy, deterministic; only bodies that can move count             pairs  -> colors      graph
 //! prepare  arms, masses, separations, carried-over impulses                   ...    -> StepProblem problem
 //! plan     substeps x (velocities, warm start, sweep, positions, relax)       config -> StepPlan    plan
-//! run      reference or GPU, the same kernels                                 in place              backend
+//! run      reference, lanes or GPU: same kernels                               in place              backend
 //! store    poses, velocities, impulses back                                   -> world, manifolds   problem
 //! ```
 //!
@@ -38,7 +38,7 @@ pub mod stats;
 pub mod world;
 
 pub use backend::Backend;
-pub use backend::cpu::Reference;
+pub use backend::cpu::{Cpu, Reference};
 pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
 pub use error::{Error, Result};

@@ -1,7 +1,7 @@
 //! Which backend runs a scene.
 
 use super::Backend;
-use super::cpu::Reference;
+use super::cpu::{Cpu, Reference};
 use super::gpu::{AdapterChoice, Gpu};
 use crate::error::Result;
 
@@ -30,24 +30,24 @@ pub const AUTO_GPU_BODIES: usize = 5_000;
 /// # Errors
 /// A GPU is asked for by name and there is none, or it cannot do what is asked.
 pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Result<(Box<dyn Backend>, String)> {
-    let reference = |why: String| -> (Box<dyn Backend>, String) { (Box::new(Reference::<f32>::new()), why) };
+    let cpu = |why: String| -> (Box<dyn Backend>, String) { (Box::new(Cpu::new()), why) };
     match choice {
-        BackendChoice::Reference => Ok(reference("reference: asked for".into())),
-        BackendChoice::Cpu => Ok(reference("cpu: asked for".into())),
+        BackendChoice::Reference => Ok((Box::new(Reference::<f32>::new()), "reference: asked for".into())),
+        BackendChoice::Cpu => Ok(cpu("cpu: asked for".into())),
         BackendChoice::Gpu => {
             let gpu = Gpu::new(AdapterChoice::Best, exact)?;
             let why = format!("gpu: asked for; {}", gpu.adapter());
             Ok((Box::new(gpu), why))
         }
         BackendChoice::Auto if dynamic_bodies < AUTO_GPU_BODIES => {
-            Ok(reference(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU pays from {AUTO_GPU_BODIES}")))
+            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU pays from {AUTO_GPU_BODIES}")))
         }
         BackendChoice::Auto => match Gpu::new(AdapterChoice::Hardware, exact) {
             Ok(gpu) => {
                 let why = format!("gpu: {dynamic_bodies} dynamic bodies and {}", gpu.adapter());
                 Ok((Box::new(gpu), why))
             }
-            Err(_) => Ok(reference("cpu: no hardware GPU found (drystone adapters lists what there is)".into())),
+            Err(_) => Ok(cpu("cpu: no hardware GPU found (drystone adapters lists what there is)".into())),
         },
     }
 }

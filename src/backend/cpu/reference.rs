@@ -1,6 +1,7 @@
 //! The CPU reference: one thread, one constraint at a time, in the order of the plan.
 
-use super::Backend;
+use super::super::Backend;
+use super::begin_sweep;
 use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
@@ -170,15 +171,6 @@ impl<S: Scalar> Reference<S> {
     fn is_converged(&self, rules: Rules) -> bool {
         rules.measured && self.convergence.done != 0
     }
-}
-
-/// Decides whether the sweep that follows is still needed, and counts. Kernel `begin_sweep`.
-fn begin_sweep(first: bool, convergence: &mut ConvergenceRow) {
-    let done = !first && (convergence.done != 0 || convergence.moving == 0);
-    convergence.done = u32::from(done);
-    convergence.sweeps += u32::from(!done);
-    convergence.planned += 1;
-    convergence.moving = 0;
 }
 
 impl<S: Scalar> Backend for Reference<S> {

@@ -1,0 +1,303 @@
+//! The kernels over eight lanes and all threads: eight constraints of one color at a time.
+//!
+//! The same kernel text as the reference, over another lane type, so the results are the reference's to the last bit.
+//! Contacts of one color and one number of points stand in groups of eight, lane by lane; what does not fill a group is
+//! filled up with contacts of nothing with nothing. The instruction set is chosen at run time. Color order makes the
+//! order inside a pass irrelevant, so a pass can be cut into as many tasks as there are threads.
+
+use std::sync::atomic::AtomicBool;
+
+use super::super::Backend;
+use super::begin_sweep;
+use super::lane8::Row8;
+use super::shared::Shared;
+use super::sweep::{BodyWork, ContactWork, Group, InstructionSet, State, load_mass, spread};
+use crate::error::Result;
+use crate::kernels::integrate::integrate_gyroscopic;
+use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::{Inertia, Joint, Pair, StepParams};
+use crate::math::Vec3;
+use crate::plan::{Kernel, Pass};
+use crate::problem::{ConvergenceRow, ImpulseRow, PointRow, StepProblem};
+
+/// The backend of the processor.
+pub struct Cpu {
+    instructions: InstructionSet,
+    bodies: Vec<State>,
+    masses: Vec<Row8>,
+    accelerations: Vec<Row8>,
+    groups: Vec<Group>,
+    /// Where the groups of each color begin.
+    colors: Vec<u32>,
+    points: Vec<[Row8; 12]>,
+    impulses: Vec<[Row8; 4]>,
+    convergence: ConvergenceRow,
+    inertias: Vec<Inertia<f32>>,
+    joints: Vec<Joint<f32>>,
+    joint_impulses: Vec<Vec3<f32>>,
+}
+
+impl Default for Cpu {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Cpu {
+    /// A backend on the best instruction set that the processor has.
+    pub fn new() -> Self {
+        Self::on(InstructionSet::best())
+    }
+
+    /// A backend on what every processor has, to compare with.
+    pub fn portable() -> Self {
+        Self::on(InstructionSet::Portable)
+    }
+
+    fn on(instructions: InstructionSet) -> Self {
+        Self {
+            instructions,
+            bodies: Vec::new(),
+            masses: Vec::new(),
+            accelerations: Vec::new(),
+            groups: Vec::new(),
+            colors: Vec::new(),
+            points: Vec::new(),
+            impulses: Vec::new(),
+            convergence: ConvergenceRow::default(),
+            inertias: Vec::new(),
+            joints: Vec::new(),
+            joint_impulses: Vec::new(),
+        }
+    }
+
+    fn load(&mut self, problem: &StepProblem, patch: bool) {
+        let rows8 = |row: &crate::problem::BodyRow| {
+            let all: &[f32; 16] = bytemuck::cast_ref(row);
+            let half = |at: usize| Row8(std::array::from_fn(|i| all[at + i]));
+            State { velocity: half(0), movement: half(8) }
+        };
+        self.bodies.clear();
+        self.bodies.extend(problem.bodies.iter().map(rows8));
+        // One more that nothing moves, for lanes without a contact, and some to fill the last group of bodies.
+        self.bodies.resize((problem.bodies.len() + 1).next_multiple_of(8), State::default());
+        self.masses.clear();
+        self.masses.extend(problem.masses.iter().map(|row| {
+            let all: &[f32; 12] = bytemuck::cast_ref(row);
+            Row8(std::array::from_fn(|i| all[i]))
+        }));
+        self.masses.resize(self.bodies.len(), Row8::default());
+        self.accelerations.clear();
+        self.accelerations.extend(problem.masses.iter().map(|row| {
+            let [x, y, z] = row.acceleration;
+            Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0])
+        }));
+        self.accelerations.resize(self.bodies.len(), Row8::default());
+        self.inertias.clear();
+        self.inertias.extend(problem.inertias.iter().map(Inertia::load));
+        self.joints.clear();
+        self.joints.extend(problem.joints.iter().map(Joint::load));
+        self.joint_impulses.clear();
+        self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
+        self.convergence = problem.convergence;
+        self.load_contacts(problem, patch);
+    }
+
+    fn load_contacts(&mut self, problem: &StepProblem, patch: bool) {
+        self.groups.clear();
+        self.points.clear();
+        self.impulses.clear();
+        self.colors.clear();
+        let nobody = problem.bodies.len() as u32;
+        for color in problem.contact_colors() {
+            self.colors.push(self.groups.len() as u32);
+            for count in 1..=4 {
+                let mut lanes = [u32::MAX; 8];
+                let mut filled = 0;
+                for row in problem.rows_of(&(color..color + 1)) {
+                    if problem.contacts[row].point_count != count {
+                        continue;
+                    }
+                    lanes[filled] = row as u32;
+                    filled += 1;
+                    if filled == 8 {
+                        self.load_group(problem, lanes, count, patch, nobody);
+                        (lanes, filled) = ([u32::MAX; 8], 0);
+                    }
+                }
+                if filled > 0 {
+                    self.load_group(problem, lanes, count, patch, nobody);
+                }
+            }
+        }
+        self.colors.push(self.groups.len() as u32);
+    }
+
+    fn load_group(&mut self, problem: &StepProblem, rows: [u32; 8], count: u32, patch: bool, nobody: u32) {
+        let first_point = self.points.len() as u32;
+        let points = count + u32::from(patch);
+        let mut group =
+            Group { body_a: [nobody; 8], body_b: [nobody; 8], rows, first_point, points, ..Group::default() };
+        self.points.resize(self.points.len() + points as usize, [Row8::default(); 12]);
+        self.impulses.resize(self.points.len(), [Row8::default(); 4]);
+        for (lane, &row) in rows.iter().enumerate().filter(|r| *r.1 != u32::MAX) {
+            let c = &problem.contacts[row as usize];
+            (group.body_a[lane], group.body_b[lane]) = (c.body_a, c.body_b);
+            let [nx, ny, nz] = c.normal;
+            let [tx, ty, tz] = c.tangent;
+            let values = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
+            for (wide, value) in group.contact.iter_mut().zip(values) {
+                wide.0[lane] = value;
+            }
+            let from = c.first_point as usize;
+            for k in 0..points as usize {
+                let point: &[f32; 12] = bytemuck::cast_ref::<PointRow, _>(&problem.points[from + k]);
+                for (wide, value) in self.points[first_point as usize + k].iter_mut().zip(point) {
+                    wide.0[lane] = *value;
+                }
+                let impulse: &[f32; 4] = bytemuck::cast_ref(&problem.impulses[from + k]);
+                for (wide, value) in self.impulses[first_point as usize + k].iter_mut().zip(impulse) {
+                    wide.0[lane] = *value;
+                }
+            }
+        }
+        self.groups.push(group);
+    }
+
+    fn store(&self, problem: &mut StepProblem) {
+        self.store_bodies(problem);
+        for group in &self.groups {
+            for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != u32::MAX) {
+                let to = problem.contacts[row as usize].first_point as usize;
+                for k in 0..group.points as usize {
+                    let wide = &self.impulses[group.first_point as usize + k];
+                    let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
+                    problem.impulses[to + k] = ImpulseRow { normal, tangent_1, tangent_2, peak };
+                }
+            }
+        }
+        for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
+            row.linear = impulse.store();
+        }
+        problem.convergence = self.convergence;
+    }
+
+    fn store_bodies(&self, problem: &mut StepProblem) {
+        for (row, state) in problem.bodies.iter_mut().zip(&self.bodies) {
+            let all: &mut [f32; 16] = bytemuck::cast_mut(row);
+            all[..8].copy_from_slice(&state.velocity.0);
+            all[8..].copy_from_slice(&state.movement.0);
+        }
+    }
+
+    fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
+        match pass.kernel {
+            Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
+            Kernel::ClearImpulses => {
+                for impulse in &mut self.impulses {
+                    impulse[..3].fill(Row8::default());
+                }
+            }
+            Kernel::IntegrateVelocities | Kernel::IntegratePositions => {
+                let groups = 0..self.bodies.len() / 8;
+                let (kernel, params) = (pass.kernel, &problem.params);
+                let (instructions, bodies) = (self.instructions, Shared::new(&mut self.bodies));
+                let work = BodyWork { kernel, params, bodies, accelerations: &self.accelerations };
+                spread(groups, &|range| work.run(instructions, range));
+            }
+            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
+                let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
+                // Colors of one pass are swept one after another.
+                for color in if skipped { 0..0 } else { pass.colors.clone() } {
+                    let groups = self.colors[color as usize] as usize..self.colors[color as usize + 1] as usize;
+                    let moving = AtomicBool::new(false);
+                    let work = ContactWork {
+                        kernel: pass.kernel,
+                        params: &problem.params,
+                        bodies: Shared::new(&mut self.bodies),
+                        masses: &self.masses,
+                        groups: &self.groups,
+                        points: &self.points,
+                        impulses: Shared::new(&mut self.impulses),
+                        moving: &moving,
+                    };
+                    spread(groups, &|range| work.run(self.instructions, range));
+                    self.convergence.moving |= u32::from(moving.into_inner());
+                }
+            }
+            Kernel::IntegrateGyroscopic => {
+                let params = StepParams::load(&problem.params);
+                for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
+                    let i = row.body as usize;
+                    let (mut body, mut mass) = (self.bodies[i].load(), load_mass(&self.masses[i]));
+                    integrate_gyroscopic(&params, inertia, &mut body, &mut mass);
+                    self.bodies[i].store_velocity(&body);
+                    let (x, yz) = (mass.inv_inertia.x, mass.inv_inertia.yz);
+                    self.masses[i] = Row8([x.x, x.y, x.z, mass.inv_mass, yz.x, yz.y, yz.z, 0.0]);
+                }
+            }
+            Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
+                warm_start_joint(pair, joint, *impulse);
+            }),
+            Kernel::SolveJoints(rules) => {
+                if !(rules.measured && self.convergence.done != 0) {
+                    self.over_joints(problem, pass, |params, pair, joint, impulse| {
+                        solve_joint(rules, params, pair, joint, impulse);
+                    });
+                }
+            }
+        }
+    }
+
+    /// One joint after another, as the reference does: they are few.
+    fn over_joints(
+        &mut self,
+        problem: &StepProblem,
+        pass: &Pass,
+        kernel: impl Fn(&StepParams<f32>, &mut Pair<f32>, &Joint<f32>, &mut Vec3<f32>),
+    ) {
+        let params = StepParams::load(&problem.params);
+        for i in problem.rows_of(&pass.colors) {
+            let (a, b) = (problem.joints[i].body_a as usize, problem.joints[i].body_b as usize);
+            let mut pair = Pair {
+                a: self.bodies[a].load(),
+                b: self.bodies[b].load(),
+                mass_a: load_mass(&self.masses[a]),
+                mass_b: load_mass(&self.masses[b]),
+                moving: 0.0,
+            };
+            kernel(&params, &mut pair, &self.joints[i], &mut self.joint_impulses[i]);
+            if pair.mass_a.inv_mass > 0.0 {
+                self.bodies[a].store_velocity(&pair.a);
+            }
+            if pair.mass_b.inv_mass > 0.0 {
+                self.bodies[b].store_velocity(&pair.b);
+            }
+            self.convergence.moving |= u32::from(pair.moving > 0.0);
+        }
+    }
+}
+
+impl Backend for Cpu {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn adapter(&self) -> String {
+        let threads = rayon::current_num_threads();
+        let plural = if threads == 1 { "" } else { "s" };
+        format!("{threads} thread{plural}, 8 lanes, {}", self.instructions.name())
+    }
+
+    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+        // Patches stand in the problem whether a pass asks for them or not.
+        let contacts_and_patches =
+            problem.points.len() - problem.contacts.iter().map(|c| c.point_count as usize).sum::<usize>();
+        self.load(problem, contacts_and_patches > 0);
+        for pass in passes {
+            self.run_pass(problem, pass);
+        }
+        self.store(problem);
+        Ok(())
+    }
+}

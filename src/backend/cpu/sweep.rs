@@ -1,0 +1,398 @@
+//! The inner loops of the lanes: what one task does to some groups of eight.
+
+#![allow(unsafe_code)]
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use super::lane8::{Lane8, Portable, Row8};
+use super::shared::Shared;
+use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
+use crate::kernels::integrate::{integrate_positions, integrate_velocities};
+use crate::kernels::{Body, Contact, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+use crate::math::{Quat, Vec3, vec3};
+use crate::plan::Kernel;
+use crate::problem::{Params, Softness};
+
+/// Velocities of a body, and its movement: v . w . and dp . dq.
+#[derive(Clone, Copy, Default)]
+pub(super) struct State {
+    pub velocity: Row8,
+    pub movement: Row8,
+}
+
+impl State {
+    /// As one body.
+    pub fn load(&self) -> Body<f32> {
+        let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (self.velocity.0, self.movement.0);
+        Body {
+            v: vec3(vx, vy, vz),
+            w: vec3(wx, wy, wz),
+            dp: vec3(px, py, pz),
+            dq: Quat { axis: vec3(qx, qy, qz), w: qw },
+        }
+    }
+
+    /// Takes over the velocities.
+    pub fn store_velocity(&mut self, body: &Body<f32>) {
+        let (v, w) = (body.v, body.w);
+        self.velocity = Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0]);
+    }
+}
+
+/// The masses that a row of eight numbers holds.
+pub(super) fn load_mass(row: &Row8) -> Mass<f32> {
+    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = row.0;
+    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
+}
+
+/// Eight contacts of one color with as many points each.
+#[derive(Clone, Default)]
+pub(super) struct Group {
+    pub body_a: [u32; 8],
+    pub body_b: [u32; 8],
+    /// Rows of the problem that the lanes hold; `u32::MAX` where there is none.
+    pub rows: [u32; 8],
+    pub contact: [Row8; 10],
+    /// Where its points begin, in `points` and `impulses`.
+    pub first_point: u32,
+    /// Points, the patch included.
+    pub points: u32,
+}
+
+/// An array of eight, without a closure: a closure would be compiled for the plain instruction set.
+macro_rules! eight {
+    ($lane:ident => $value:expr) => {
+        [
+            {
+                let $lane = 0;
+                $value
+            },
+            {
+                let $lane = 1;
+                $value
+            },
+            {
+                let $lane = 2;
+                $value
+            },
+            {
+                let $lane = 3;
+                $value
+            },
+            {
+                let $lane = 4;
+                $value
+            },
+            {
+                let $lane = 5;
+                $value
+            },
+            {
+                let $lane = 6;
+                $value
+            },
+            {
+                let $lane = 7;
+                $value
+            },
+        ]
+    };
+}
+
+/// Most points of a group, the patch included.
+const MOST_POINTS: usize = 5;
+
+/// Groups that one task takes at least: some ten microseconds of work.
+const TASK_GROUPS: usize = 64;
+
+/// Runs `work` over the groups, on all threads if there are enough of them.
+pub(super) fn spread(groups: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
+    let threads = rayon::current_num_threads();
+    if threads == 1 || groups.len() < 2 * TASK_GROUPS {
+        return work(groups);
+    }
+    let tasks = (groups.len() / TASK_GROUPS).min(2 * threads);
+    let cut = |i: usize| groups.start + groups.len() * i / tasks;
+    (0..tasks).into_par_iter().for_each(|i| work(cut(i)..cut(i + 1)));
+}
+
+/// What a processor can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum InstructionSet {
+    /// What every processor of its kind has.
+    Portable,
+    /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::best`] makes it, after it has asked.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl InstructionSet {
+    /// The best that this processor has.
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            return Self::Avx2;
+        }
+        Self::Portable
+    }
+
+    /// Its name, for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => "AVX2",
+        }
+    }
+}
+
+/// Enters the function of a work that was compiled for an instruction set.
+macro_rules! enter {
+    ($self:ident, $instructions:ident, $range:ident) => {
+        match $instructions {
+            InstructionSet::Portable => $self.run_on::<Portable>($range),
+            // SAFETY: `InstructionSet::best` asked the processor.
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx2 => unsafe { $self.run_avx2($range) },
+        }
+    };
+}
+
+/// A pass over bodies.
+pub(super) struct BodyWork<'a> {
+    pub kernel: Kernel,
+    pub params: &'a Params,
+    pub bodies: Shared<'a, State>,
+    pub accelerations: &'a [Row8],
+}
+
+impl BodyWork<'_> {
+    /// Does groups of eight bodies; no other task has the same.
+    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
+        enter!(self, instructions, groups)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2(&self, groups: Range<usize>) {
+        self.run_on::<super::lane8::avx2::Avx2>(groups);
+    }
+
+    #[inline(always)]
+    fn run_on<L: Lane8>(&self, groups: Range<usize>) {
+        let params = wide_params::<L>(self.params);
+        for group in groups {
+            let bodies: [usize; 8] = eight!(lane => 8 * group + lane);
+            // SAFETY: tasks have different groups, and so different bodies.
+            let states = unsafe { read_states(&self.bodies, bodies) };
+            let mut body = wide_body::<L>(&states);
+            if self.kernel == Kernel::IntegrateVelocities {
+                let [x, y, z, ..] = L::transposed(eight!(lane => L::load(&self.accelerations[bodies[lane]])));
+                let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
+                integrate_velocities(&params, &mass, &mut body);
+            } else {
+                integrate_positions(&params, &mut body);
+            }
+            let (velocities, movements) = (velocity_rows(&body), movement_rows(&body));
+            for (lane, &i) in bodies.iter().enumerate() {
+                let state = State { velocity: velocities[lane].store(), movement: movements[lane].store() };
+                // SAFETY: as above.
+                unsafe { self.bodies.write(i, state) };
+            }
+        }
+    }
+}
+
+/// A pass over the groups of one color.
+pub(super) struct ContactWork<'a> {
+    pub kernel: Kernel,
+    pub params: &'a Params,
+    pub bodies: Shared<'a, State>,
+    pub masses: &'a [Row8],
+    pub groups: &'a [Group],
+    pub points: &'a [[Row8; 12]],
+    pub impulses: Shared<'a, [Row8; 4]>,
+    /// Set if a correction was above the tolerance.
+    pub moving: &'a AtomicBool,
+}
+
+impl ContactWork<'_> {
+    /// Does some groups; no other task has the same.
+    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
+        enter!(self, instructions, groups)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2(&self, groups: Range<usize>) {
+        self.run_on::<super::lane8::avx2::Avx2>(groups);
+    }
+
+    #[inline(always)]
+    fn run_on<L: Lane8>(&self, groups: Range<usize>) {
+        let params = wide_params::<L>(self.params);
+        for group in groups {
+            self.sweep::<L>(&params, &self.groups[group]);
+        }
+    }
+
+    #[inline(always)]
+    fn sweep<L: Lane8>(&self, params: &StepParams<L>, group: &Group) {
+        let (a, b): ([usize; 8], [usize; 8]) =
+            (eight!(lane => group.body_a[lane] as usize), eight!(lane => group.body_b[lane] as usize));
+        // SAFETY: a body that this color writes is in this group only; the others nobody writes.
+        let (state_a, state_b) = unsafe { (read_states(&self.bodies, a), read_states(&self.bodies, b)) };
+        let mut pair = Pair {
+            a: wide_body::<L>(&state_a),
+            b: wide_body::<L>(&state_b),
+            mass_a: wide_mass::<L>(self.masses, a),
+            mass_b: wide_mass::<L>(self.masses, b),
+            moving: L::constant(0.0),
+        };
+        let contact = wide_contact::<L>(&group.contact);
+        let rules = self.kernel.rules().unwrap_or_default();
+        let first = group.first_point as usize;
+        // A patch that the rules do not ask for stays out.
+        let count = group.points as usize;
+        let mut points = [Point::<L>::default(); MOST_POINTS];
+        let mut impulses = [Impulse::<L>::default(); MOST_POINTS];
+        for k in 0..count {
+            points[k] = wide_point(&self.points[first + k]);
+            // SAFETY: the impulses of a group are its own.
+            impulses[k] = wide_impulse(&unsafe { self.impulses.read(first + k) });
+        }
+        let (points, impulses) = (&points[..count], &mut impulses[..count]);
+        match self.kernel {
+            Kernel::WarmStart(_) => warm_start(rules, &mut pair, &contact, points, impulses),
+            Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, &contact, points, impulses),
+            _ => restitute_contact(rules, params, &mut pair, &contact, points, impulses),
+        }
+        if !matches!(self.kernel, Kernel::WarmStart(_)) {
+            for (k, i) in impulses.iter().enumerate() {
+                let row = [i.normal.store(), i.tangent_1.store(), i.tangent_2.store(), i.peak.store()];
+                // SAFETY: as above.
+                unsafe { self.impulses.write(first + k, row) };
+            }
+        }
+        self.store_velocities(a, &pair.a, &state_a, &pair.mass_a);
+        self.store_velocities(b, &pair.b, &state_b, &pair.mass_b);
+        if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
+            self.moving.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Writes the bodies that can move.
+    #[inline(always)]
+    fn store_velocities<L: Lane8>(&self, bodies: [usize; 8], body: &Body<L>, states: &[State; 8], mass: &Mass<L>) {
+        let rows = velocity_rows(body);
+        let inv_mass = mass.inv_mass.store();
+        for (lane, &i) in bodies.iter().enumerate() {
+            if inv_mass.0[lane] > 0.0 {
+                let state = State { velocity: rows[lane].store(), ..states[lane] };
+                // SAFETY: in one color a body that can move is in one lane of one group.
+                unsafe { self.bodies.write(i, state) };
+            }
+        }
+    }
+}
+
+/// # Safety
+/// Nobody writes these bodies meanwhile.
+#[inline(always)]
+unsafe fn read_states(bodies: &Shared<State>, indices: [usize; 8]) -> [State; 8] {
+    // SAFETY: the caller's promise.
+    unsafe { eight!(lane => bodies.read(indices[lane])) }
+}
+
+#[inline(always)]
+fn wide_body<L: Lane8>(states: &[State; 8]) -> Body<L> {
+    let [vx, vy, vz, _, wx, wy, wz, _] = L::transposed(eight!(lane => L::load(&states[lane].velocity)));
+    let [px, py, pz, _, qx, qy, qz, qw] = L::transposed(eight!(lane => L::load(&states[lane].movement)));
+    Body { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz), dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
+}
+
+#[inline(always)]
+fn velocity_rows<L: Lane8>(body: &Body<L>) -> [L; 8] {
+    let (v, w, zero) = (body.v, body.w, L::constant(0.0));
+    L::transposed([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero])
+}
+
+#[inline(always)]
+fn movement_rows<L: Lane8>(body: &Body<L>) -> [L; 8] {
+    let (p, q) = (body.dp, body.dq);
+    L::transposed([p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w])
+}
+
+#[inline(always)]
+fn wide_mass<L: Lane8>(masses: &[Row8], bodies: [usize; 8]) -> Mass<L> {
+    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = L::transposed(eight!(lane => L::load(&masses[bodies[lane]])));
+    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
+}
+
+#[inline(always)]
+fn wide_vec3<L: Lane8>(rows: &[Row8], at: usize) -> Vec3<L> {
+    vec3(L::load(&rows[at]), L::load(&rows[at + 1]), L::load(&rows[at + 2]))
+}
+
+#[inline(always)]
+fn wide_contact<L: Lane8>(rows: &[Row8; 10]) -> Contact<L> {
+    Contact {
+        normal: wide_vec3(rows, 0),
+        tangent: wide_vec3(rows, 3),
+        friction: L::load(&rows[6]),
+        restitution: L::load(&rows[7]),
+        radius_a: L::load(&rows[8]),
+        radius_b: L::load(&rows[9]),
+    }
+}
+
+/// In the order of the fields of `PointRow`.
+#[inline(always)]
+fn wide_point<L: Lane8>(rows: &[Row8; 12]) -> Point<L> {
+    Point {
+        r_a: wide_vec3(rows, 0),
+        separation: L::load(&rows[3]),
+        r_b: wide_vec3(rows, 4),
+        normal_mass: L::load(&rows[7]),
+        tangent_mass: L::load(&rows[8]),
+        approach_velocity: L::load(&rows[9]),
+        slip_1: L::load(&rows[10]),
+        slip_2: L::load(&rows[11]),
+    }
+}
+
+#[inline(always)]
+fn wide_impulse<L: Lane8>(rows: &[Row8; 4]) -> Impulse<L> {
+    Impulse {
+        normal: L::load(&rows[0]),
+        tangent_1: L::load(&rows[1]),
+        tangent_2: L::load(&rows[2]),
+        peak: L::load(&rows[3]),
+    }
+}
+
+/// Once a task, so that closures do no harm.
+#[inline(always)]
+fn wide_params<L: Lane8>(p: &Params) -> StepParams<L> {
+    let c = |x: f32| L::constant(x.into());
+    let softness = |s: &Softness| SoftnessOf {
+        bias_rate: c(s.bias_rate),
+        mass_scale: c(s.mass_scale),
+        impulse_scale: c(s.impulse_scale),
+        push_limit: c(s.push_limit),
+    };
+    StepParams {
+        substep: c(p.substep),
+        inverse_substep: c(p.inverse_substep),
+        restitution_threshold: c(p.restitution_threshold),
+        movable: softness(&p.movable),
+        fixed: softness(&p.fixed),
+        joint: softness(&p.joint),
+        slop: c(p.slop),
+        relaxation: c(p.relaxation),
+        tolerance: c(p.tolerance),
+    }
+}

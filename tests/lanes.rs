@@ -1,0 +1,94 @@
+//! Eight lanes and all threads against one constraint at a time: the same bits.
+
+use drystone::compare::{Comparison, compare};
+use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
+
+/// Compares a backend with the reference on a scene of the catalogue, on a pool of `threads`.
+fn against_reference(
+    backend: fn() -> Box<dyn Backend>,
+    scene: &str,
+    parameters: &[&str],
+    settings: &[&str],
+    steps: u32,
+    threads: usize,
+) -> Comparison {
+    let parameters: Vec<String> = parameters.iter().map(|&p| p.into()).collect();
+    let scene = Scene::find(scene, &parameters).unwrap();
+    let mut config = SolverConfig::default();
+    settings.iter().for_each(|s| config.set(s).unwrap());
+    let mut open = |which: usize| Ok(if which == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { backend() });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| compare(&scene, &config, &mut open, steps, || ()).unwrap())
+}
+
+fn best() -> Box<dyn Backend> {
+    Box::new(Cpu::new())
+}
+
+fn portable() -> Box<dyn Backend> {
+    Box::new(Cpu::portable())
+}
+
+#[track_caller]
+fn same_bits(comparison: &Comparison) {
+    assert!(comparison.first.is_none(), "{:?}", comparison.first);
+    assert!(comparison.steps.iter().all(|s| s.bodies == 0));
+}
+
+#[test]
+fn a_falling_pile_has_the_same_bits_on_one_thread_and_on_two() {
+    for threads in [1, 2] {
+        same_bits(&against_reference(best, "pile", &["n=1500"], &[], 40, threads));
+    }
+}
+
+#[test]
+fn the_portable_lanes_have_the_same_bits() {
+    same_bits(&against_reference(portable, "pile", &["n=200"], &[], 40, 1));
+}
+
+#[test]
+fn every_rule_has_the_same_bits() {
+    let rules: [&[&str]; 8] = [
+        &["friction=none"],
+        &["friction=slip"],
+        &["friction=box"],
+        &["friction_at=manifold"],
+        &["friction_order=friction-first", "friction_sweeps=all"],
+        &["stabilization=baumgarte", "relax=0", "clamping=per-correction"],
+        &["tolerance=0.001", "iterations=8"],
+        &["relaxation=1.2", "max_colors=2"],
+    ];
+    for settings in rules {
+        println!("{settings:?}");
+        same_bits(&against_reference(best, "pile", &["n=150"], settings, 40, 2));
+    }
+}
+
+#[test]
+fn every_shape_and_unequal_moments_of_inertia_have_the_same_bits() {
+    same_bits(&against_reference(best, "drop", &[], &[], 90, 2));
+    same_bits(&against_reference(best, "wall", &["rows=6", "columns=6"], &[], 40, 2));
+}
+
+/// Runs the plan without its last pass.
+struct Lazy(Cpu);
+
+impl Backend for Lazy {
+    fn name(&self) -> &'static str {
+        "lazy"
+    }
+    fn adapter(&self) -> String {
+        String::new()
+    }
+    fn run(&mut self, p: &mut drystone::StepProblem, passes: &[drystone::plan::Pass]) -> drystone::Result<()> {
+        self.0.run(p, &passes[..passes.len() - 1])
+    }
+}
+
+#[test]
+fn a_backend_that_leaves_out_a_pass_is_found() {
+    let lazy = || Box::new(Lazy(Cpu::new())) as Box<dyn Backend>;
+    let found = against_reference(lazy, "pile", &["n=50"], &[], 40, 1);
+    assert!(found.first.is_some());
+}
