@@ -37,7 +37,9 @@ fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_w
             let row_2 = vec3f(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), 1.0);
             next -= solve_3x3(row_0, row_1, row_2, residual);
         }
-        bodies[inertia.body].w = x * next.x + y * next.y + z * next.z;
+        // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+        let change = next - spin;
+        bodies[inertia.body].w = w + (x * change.x + y * change.y + z * change.z);
 
         // The inverse inertia in world axes.
         let kx = x * k.x;

@@ -59,7 +59,9 @@ pub fn integrate_gyroscopic<L: Lane>(
         let row_2 = vec3(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), one);
         next -= solve_3x3(row_0, row_1, row_2, residual);
     }
-    body.w = x * next.x + y * next.y + z * next.z;
+    // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+    let change = next - spin;
+    body.w += x * change.x + y * change.y + z * change.z;
 
     // The inverse inertia in world axes.
     let (kx, ky, kz) = (x * k.x, y * k.y, z * k.z);
