@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{SceneArgs, print_json, progress};
+use super::{SceneArgs, print, print_json, progress};
 use crate::backend::gpu::adapters;
 use crate::backend::{BackendChoice, choose};
 use crate::compare::{Difference, compare};
@@ -44,34 +44,31 @@ impl CompareArgs {
         let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc(1))?;
         bar.finish_and_clear();
         if self.scene.json {
-            print_json(&serde_json::json!({
+            return print_json(&serde_json::json!({
                 "scene": scene.name, "backends": named, "exact": exact, "bodies": bodies, "dt": scene.dt,
                 "config": config, "steps": found.steps, "first": found.first,
             }));
-            return Ok(());
         }
-        println!("{} against {}, {bodies} dynamic bodies", named[1], named[0]);
-        println!(
-            "{:>6} {:>8} {:>12} {:>12} {:>12} {:>12}",
-            "step", "differ", "position m", "rotation", "v m/s", "w rad/s"
-        );
+        print(format_args!("{} against {}, {bodies} dynamic bodies", named[1], named[0]))?;
+        print("  step   differ   position m     rotation        v m/s      w rad/s")?;
         for (step, d) in (1..).zip(&found.steps) {
             // Every step at first, then the round ones and the last.
             if step <= 4 || step % (scene.steps / 10).max(1) == 0 || step == scene.steps {
-                print_step(step, d);
+                print_step(step, d)?;
             }
         }
         match found.first {
-            Some(f) => println!("first difference: step {}, pass {} of {}, {}", f.step, f.pass, f.passes, f.kernel),
-            None => println!("no difference in any bit"),
+            Some(f) => {
+                print(format_args!("first difference: step {}, pass {} of {}, {}", f.step, f.pass, f.passes, f.kernel))
+            }
+            None => print("no difference in any bit"),
         }
-        Ok(())
     }
 }
 
-fn print_step(step: u32, d: &Difference) {
-    println!(
+fn print_step(step: u32, d: &Difference) -> Result<()> {
+    print(format_args!(
         "{step:>6} {:>8} {:>12.3e} {:>12.3e} {:>12.3e} {:>12.3e}",
         d.bodies, d.position, d.rotation, d.velocity, d.angular_velocity
-    );
+    ))
 }

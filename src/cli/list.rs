@@ -3,7 +3,7 @@
 use clap::Args;
 use comfy_table::{Table, presets};
 
-use super::print_json;
+use super::{print, print_json};
 use crate::backend::gpu::adapters;
 use crate::error::Result;
 use crate::scenes::{CATALOGUE, schema};
@@ -23,8 +23,7 @@ impl ScenesArgs {
     /// Lists the catalogue.
     pub fn run(&self) -> Result<()> {
         if self.schema {
-            println!("{}", serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
-            return Ok(());
+            return print(serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
         }
         if self.json {
             let parameter = |p: &crate::scenes::Parameter| serde_json::json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
@@ -32,13 +31,12 @@ impl ScenesArgs {
                 let parameters: Vec<_> = e.parameters.iter().map(parameter).collect();
                 serde_json::json!({"name": e.name, "summary": e.summary, "parameters": parameters})
             };
-            print_json(&serde_json::json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
-            return Ok(());
+            return print_json(&serde_json::json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
         }
         for entry in CATALOGUE {
-            println!("{}\n    {}", entry.name, entry.summary);
+            print(format_args!("{}\n    {}", entry.name, entry.summary))?;
             for p in entry.parameters {
-                println!("    -p {}={}  {}", p.name, p.default, p.summary);
+                print(format_args!("    -p {}={}  {}", p.name, p.default, p.summary))?;
             }
         }
         Ok(())
@@ -62,12 +60,10 @@ impl AdaptersArgs {
                 serde_json::json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
                     "hardware": a.hardware, "exact": a.exact, "buffer_limit": a.buffer_limit})
             };
-            print_json(&serde_json::json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
-            return Ok(());
+            return print_json(&serde_json::json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
         }
         if found.is_empty() {
-            println!("none; everything runs on the CPU");
-            return Ok(());
+            return print("none; everything runs on the CPU");
         }
         let mut table = Table::new();
         table.load_preset(presets::NOTHING).set_header([
@@ -89,7 +85,6 @@ impl AdaptersArgs {
                 format!("{} MiB", a.buffer_limit >> 20),
             ]);
         }
-        println!("{table}");
-        Ok(())
+        print(table)
     }
 }

@@ -5,12 +5,14 @@ mod list;
 //mod report;
 mod run;
 
+use std::fmt::Display;
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scenes::Scene;
 
 /// Contact between rigid bodies: run scenes, compare backends.
@@ -87,10 +89,11 @@ impl SceneArgs {
                 config.set(&format!("{name}={value}"))?;
             }
         }
+        config.check()?;
         let mut scene = Scene::find(&self.scene, &self.parameter)?;
         if let Some(dt) = self.dt {
             if !(dt > 0.0 && dt <= 1.0) {
-                return Err(crate::Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));
+                return Err(Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));
             }
             scene.dt = dt;
         }
@@ -116,9 +119,17 @@ fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
     indicatif::ProgressBar::new(steps.into()).with_style(style)
 }
 
+/// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
+fn print(text: impl Display) -> Result<()> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::file("standard output")(e)),
+        _ => Ok(()),
+    }
+}
+
 /// Prints a value as JSON on one line.
-fn print_json(value: &impl serde::Serialize) {
-    println!("{}", serde_json::to_string(value).expect("reports serialize"));
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    print(serde_json::to_string(value).expect("reports serialize"))
 }
 
 /// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter.
@@ -134,7 +145,8 @@ pub fn main() -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(e) => {
-            eprintln!("drystone: {e}");
+            // One line, whatever the caller's names are made of.
+            eprintln!("drystone: {}", e.to_string().replace(char::is_control, " "));
             e.exit_code().into()
         }
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, print_json, progress};
+use super::{SceneArgs, print, print_json, progress};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
@@ -36,8 +36,8 @@ impl RunArgs {
         let (scene, config) = self.scene.load()?;
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
-        eprintln!("{why}");
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
+        eprintln!("{why}");
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
         let bar = progress(scene.steps, self.scene.json);
@@ -56,9 +56,9 @@ impl RunArgs {
         }
         report.measure(&scene, &mut simulation);
         if self.scene.json {
-            print_json(&report);
+            print_json(&report)?;
         } else {
-            print_table(&report);
+            print_table(&report)?;
         }
         match &report.first_non_finite {
             Some(body) => {
@@ -69,7 +69,7 @@ impl RunArgs {
     }
 }
 
-fn print_table(report: &RunReport) {
+fn print_table(report: &RunReport) -> Result<()> {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     for (what, value) in report.rows() {
@@ -78,5 +78,5 @@ fn print_table(report: &RunReport) {
     if let Some(column) = table.column_mut(0) {
         column.set_cell_alignment(CellAlignment::Left);
     }
-    println!("{table}");
+    print(table)
 }
