@@ -191,7 +191,10 @@ impl SolverConfig {
     /// The file cannot be read, is not TOML, names an unknown setting or gives one an impossible value.
     pub fn from_toml_file(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
-        let config: Self = toml::from_str(&text).map_err(|e| Error::input(one_line(&path.display(), &e)))?;
+        let config: Self = toml::from_str(&text).map_err(|e| {
+            let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+            Error::input(format!("{}: line {line}: {}", path.display(), first_line(&e)))
+        })?;
         config.check().map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
         Ok(config)
     }
@@ -288,10 +291,6 @@ impl SolverConfig {
 /// A rule by the word that names it in files.
 fn word(rule: &impl Serialize) -> String {
     serde_json::to_value(rule).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
-}
-
-fn one_line(place: &dyn std::fmt::Display, e: &toml::de::Error) -> String {
-    format!("{place}: {}", first_line(e))
 }
 
 /// The message of a TOML error without its drawing of the text.
