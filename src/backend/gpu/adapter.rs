@@ -69,6 +69,10 @@ pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSumma
 
 fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
     let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
+    // No driver is even loaded.
+    if wanted == "none" {
+        return Vec::new();
+    }
     // OpenGL only where there is nothing better: its loaders are noisy on machines without a display.
     for backends in [wgpu::Backends::PRIMARY, wgpu::Backends::SECONDARY] {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
