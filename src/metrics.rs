@@ -23,7 +23,8 @@ impl Penetration {
         };
         let depths: Vec<f64> = pairs.iter().flat_map(|p| &p.manifolds).map(deepest).collect();
         let max = depths.iter().copied().fold(0.0, |x: f64, y| if y > x || y.is_nan() { y } else { x });
-        let mean = depths.iter().sum::<f64>() / depths.len().max(1) as f64;
+        // Not a sum, which is -0 for none.
+        let mean = depths.iter().fold(0.0, |total, depth| total + depth) / depths.len().max(1) as f64;
         Self { max, mean }
     }
 }
