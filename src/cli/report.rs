@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::progress;
+use super::{print, progress};
 use crate::error::Result;
 use crate::report::{RUNS, rules};
 
@@ -34,9 +34,8 @@ impl ReportArgs {
                 let report = rules(|| bar.inc(1))?;
                 bar.finish_and_clear();
                 report.write(&self.out)?;
-                println!("{}", self.out.join("rules.md").display());
+                print(self.out.join("rules.md").display())
             }
         }
-        Ok(())
     }
 }
