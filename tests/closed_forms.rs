@@ -3,21 +3,21 @@
 //! The GPU runs plain WGSL here: its exact mode is held to the reference bit for bit elsewhere. Beside every tolerance
 //! stands the largest error that was measured on the two backends, and where it comes from.
 
+mod common;
+
 use std::f64::consts::{FRAC_PI_6, PI};
 
-use drystone::backend::gpu::AdapterChoice;
+use common::gpu::gpu;
 use drystone::metrics::rms_speed;
-use drystone::{Backend, Body, Gpu, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
 use glam::{DVec3, Quat, Vec3};
 
 const G: f64 = 9.81;
 
-/// The reference, and the best adapter; that one may only be missing where `DRYSTONE_ADAPTER=none` says so.
+/// The reference and the GPU.
 fn backends() -> Vec<Box<dyn Backend>> {
     let mut all = vec![reference()];
-    if std::env::var("DRYSTONE_ADAPTER").as_deref() != Ok("none") {
-        let gpu = Gpu::new(AdapterChoice::Best, false);
-        let gpu = gpu.unwrap_or_else(|e| panic!("{e}; DRYSTONE_ADAPTER=none tests without a GPU"));
+    if let Some(gpu) = gpu(false) {
         all.push(Box::new(gpu));
     }
     all

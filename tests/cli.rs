@@ -1,0 +1,294 @@
+//! The command line: what it prints, and how it refuses bad input.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use drystone::Scene;
+use serde_json::Value;
+
+/// A folder for one test, in which the commands run.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder"))
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn with(self, name: &str, text: &str) -> Self {
+        std::fs::write(self.path().join(name), text).expect("a file");
+        self
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        command.args(arguments).current_dir(self.path()).env("DRYSTONE_ADAPTER", "none");
+        command.output().expect("the command starts")
+    }
+
+    /// Standard output of a command that succeeds.
+    fn output(&self, arguments: &str) -> String {
+        let output = self.run(&arguments.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    fn json(&self, arguments: &str) -> Value {
+        let printed = self.output(arguments);
+        assert_eq!(printed.lines().count(), 1, "one object on one line");
+        serde_json::from_str(&printed).expect("JSON")
+    }
+
+    /// The files in it, sorted.
+    fn files(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.path()).expect("a folder");
+        let mut names: Vec<_> =
+            entries.map(|e| e.expect("an entry").file_name().into_string().expect("text")).collect();
+        names.sort();
+        names
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("text")
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+fn array<'a>(value: &'a Value, key: &str) -> &'a Vec<Value> {
+    value[key].as_array().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+#[test]
+fn a_run_reports_on_itself_as_json() {
+    let report = Folder::new().json("run pile -p n=27 --steps 40 --json --substeps 3 --set push_limit=2");
+    let expected = "scene backend adapter bodies steps dt config step_ms stage_ms manifolds points colors overflow \
+        penetration_max penetration_mean kinetic_energy non_finite first_non_finite";
+    let missing: Vec<_> = expected.split_whitespace().filter(|&key| report.get(key).is_none()).collect();
+    assert!(missing.is_empty(), "{missing:?} of {:?}", keys(&report));
+    assert_eq!((&report["scene"], &report["backend"]), (&"pile".into(), &"reference".into()));
+    assert_eq!((&report["bodies"], &report["steps"], &report["non_finite"]), (&27.into(), &40.into(), &0.into()));
+    assert_eq!((&report["config"]["substeps"], &report["config"]["push_limit"]), (&3.into(), &2.0.into()));
+    assert_eq!(array(&report, "step_ms").len(), 40);
+    let stages: Vec<_> = array(&report, "stage_ms").iter().map(|s| s["stage"].as_str().expect("a name")).collect();
+    assert_eq!(stages, ["detect", "color", "prepare", "run", "store"]);
+    assert!(report["manifolds"].as_u64() > Some(0) && report["penetration_max"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn a_run_reports_on_itself_as_rows() {
+    let folder = Folder::new();
+    let printed = folder.output("run tower --steps 5");
+    for part in ["tower, 10 dynamic bodies", "5 of 16.667 ms", "penetration", "mm/s rms"] {
+        assert!(printed.contains(part), "{part} is not in: {printed}");
+    }
+    assert!(folder.files().is_empty());
+}
+
+#[test]
+fn every_kth_step_of_every_body_that_can_move_is_written_as_csv() {
+    let folder = Folder::new();
+    folder.output("run tower -p n=3 --steps 10 --every 4 --out motion.csv --dt 0.01");
+    let written = std::fs::read_to_string(folder.path().join("motion.csv")).expect("the file");
+    let mut lines = written.lines();
+    assert_eq!(lines.next(), Some("step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz"));
+    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|x| x.parse().expect("a number")).collect()).collect();
+    assert!(rows.iter().all(|r| r.len() == 16));
+    // Steps 0, 4 and 8 of bodies 1, 2 and 3: body 0 is the floor.
+    let which: Vec<_> = rows.iter().map(|r| (r[0], r[2])).collect();
+    let expected: Vec<_> = [0.0, 4.0, 8.0].iter().flat_map(|&s| [1.0, 2.0, 3.0].map(|b| (s, b))).collect();
+    assert_eq!(which, expected);
+    assert!(rows.iter().all(|r| (r[1] - 0.01 * r[0]).abs() < 1e-8), "the time is that of the step");
+    assert!((rows[0][4] - 0.5).abs() < 1e-6 && (rows[8][4] - 2.5).abs() < 0.01, "heights are in column py");
+}
+
+/// What is typed, and what the one line that refuses it must name.
+const REFUSED: &[(&[&str], &[&str])] = &[
+    (&["run", "nowhere"], &["nowhere", "pile"]),
+    (&["run", "."], &["\".\""]),
+    (&["run", "pile", "-p", "m=1"], &["pile", "\"m\"", "jitter"]),
+    (&["run", "pile", "-p", "n"], &["pile", "\"n\"", "key=value"]),
+    (&["run", "pile", "-p", "n=0"], &["pile", "n = \"0\"", "4000000"]),
+    (&["run", "pile", "-p", "n=1.5"], &["n = \"1.5\"", "whole"]),
+    (&["run", "pile", "-p", "jitter=nan"], &["jitter", "nan"]),
+    (&["run", "drop", "--set", "substeps"], &["--set substeps", "key=value"]),
+    (&["run", "drop", "--set", "step=1"], &["--set step=1", "unknown", "substeps"]),
+    (&["run", "drop", "--set", "substeps=x"], &["--set substeps=x", "u32"]),
+    (&["run", "drop", "--set", "substeps=0"], &["substeps = 0", "1 to 4096"]),
+    (&["run", "drop", "--set", "contact_frequency=nan"], &["contact_frequency = NaN"]),
+    (&["run", "drop", "--set", "friction=cone"], &["friction=cone", "disc"]),
+    (&["run", "drop", "--set", "stabilization=baumgarte"], &["stabilization = baumgarte", "relax=0"]),
+    (&["run", "drop", "--set", "a\nb=1"], &["a b"]),
+    (&["run", "drop", "--substeps", "0"], &["substeps = 0"]),
+    (&["run", "drop", "--dt", "0"], &["--dt 0", "more than 0"]),
+    (&["run", "drop", "--dt", "nan"], &["--dt NaN"]),
+    (&["run", "drop", "--config", "none.toml"], &["none.toml"]),
+    (&["run", "drop", "--config", "torn.toml"], &["torn.toml", "line 2"]),
+    (&["run", "drop", "--config", "unknown.toml"], &["unknown.toml", "line 3", "`substep`"]),
+    (&["run", "drop", "--config", "range.toml"], &["range.toml", "relax = 5000", "4096"]),
+    (&["run", "drop", "--config", "a\nb.toml"], &["a b.toml"]),
+    (&["run", "none.json"], &["none.json"]),
+    (&["run", "torn.json"], &["torn.json", "line 1"]),
+    (&["run", "negative.json"], &["negative.json", "body 1 \"pebble\"", "shapes[0]", "radius = -1"]),
+    (&["run", "two.json"], &["two.json", "version = 2"]),
+    (&["run", "good.json", "-p", "n=1"], &["good.json", "n=1"]),
+    (&["run", "good.json", "--out", "nowhere/motion.csv"], &["nowhere/motion.csv"]),
+    (&["run", "good.json", "--out", "."], &[".: "]),
+    (&["compare", "drop", "--backends", "reference"], &["--backends", "1 were given"]),
+    (&["compare", "drop", "--backends", "reference,cpu,cpu"], &["--backends", "3 were given"]),
+];
+
+const GOOD: &str = r#"{"version": 1, "steps": 3, "bodies": [{"shapes": [{"type": "ball", "radius": 0.5}]}]}"#;
+
+fn folder_of_bad_files() -> Folder {
+    let negative = r#"{"version": 1, "bodies": [{"kind": "fixed"}, {"name": "pebble", "shapes": [{"type": "ball", "radius": -1}]}]}"#;
+    Folder::new()
+        .with("torn.toml", "# settings\nsubsteps = [")
+        .with("unknown.toml", "# settings\n\nsubstep = 1\n")
+        .with("range.toml", "relax = 5000\n")
+        .with("torn.json", r#"{"version": 1, "bodies": ["#)
+        .with("negative.json", negative)
+        .with("two.json", r#"{"version": 2}"#)
+        .with("good.json", GOOD)
+}
+
+#[test]
+fn bad_input_ends_in_one_line_that_names_it_and_leaves_no_file_behind() {
+    let folder = folder_of_bad_files();
+    let before = folder.files();
+    for &(arguments, named) in REFUSED {
+        // With a file to write, unless the file is what is wrong.
+        let out: &[&str] =
+            if arguments[0] == "compare" || arguments.contains(&"--out") { &[] } else { &["--out", "x.csv"] };
+        let output = folder.run(&[arguments, out].concat());
+        let line = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {line}");
+        assert_eq!(line.lines().count(), 1, "{arguments:?}: {line}");
+        assert!(line.starts_with("drystone: "), "{arguments:?}: {line}");
+        for part in named {
+            assert!(line.contains(part), "{arguments:?}: {part:?} is not in: {line}");
+        }
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        assert_eq!(folder.files(), before, "{arguments:?}");
+    }
+}
+
+/// The good neighbors of the bad input above: the test could not fail if these were refused too.
+#[test]
+fn good_input_is_not_refused() {
+    let folder = folder_of_bad_files().with("good.toml", "relax = 2\nsubsteps = 2\n");
+    folder.output("run good.json --out motion.csv");
+    assert!(folder.files().contains(&"motion.csv".to_owned()));
+    for arguments in [
+        "run drop --steps 1 --config good.toml --set substeps=3 --dt 1",
+        "run drop --steps 1 --set stabilization=baumgarte --set relax=0",
+        "run drop --steps 0",
+        "run pile -p n=8 -p jitter=0 --steps 1 --threads 2 --backend cpu",
+    ] {
+        folder.output(arguments);
+    }
+}
+
+/// Usage that clap refuses: it ends with 2 as well, and never in a panic.
+#[test]
+fn usage_errors_end_with_the_same_code() {
+    for arguments in [
+        "",
+        "walk",
+        "run",
+        "run drop --steps -1",
+        "run drop --dt x",
+        "run drop --every 0",
+        "run drop --backend abacus",
+        "run drop --threads 100000",
+        "compare drop --backends abacus,cpu",
+        "compare drop --exact --plain",
+    ] {
+        let arguments: Vec<_> = arguments.split_whitespace().collect();
+        let output = Folder::new().run(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output.stderr));
+        assert!(!text(&output.stderr).contains("panicked"), "{arguments:?}");
+    }
+}
+
+/// A body so fast that its numbers leave the finite range: said by name, with a code of failure, after the report.
+#[test]
+fn numbers_that_cannot_be_used_are_an_error() {
+    let fast = GOOD.replace(r#"{"shapes""#, r#"{"name": "comet", "linear_velocity": [3e38, 0, 0], "shapes""#);
+    let folder = Folder::new().with("fast.json", &fast);
+    let output = folder.run(&["run", "fast.json", "--dt", "1", "--steps", "3", "--json"]);
+    let report: Value = serde_json::from_str(&text(&output.stdout)).expect("a report all the same");
+    assert_eq!((&report["non_finite"], output.status.code()), (&1.into(), Some(2)));
+    assert!(text(&output.stderr).lines().any(|l| l.starts_with("drystone: ") && l.contains("comet")));
+}
+
+#[test]
+fn the_reader_of_a_pipe_may_stop_reading() {
+    for arguments in
+        ["scenes", "scenes --schema", "run drop --steps 1", "compare drop --steps 1 --backends reference,cpu"]
+    {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        command.args(arguments.split(' ')).env("DRYSTONE_ADAPTER", "none");
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn the_catalogue_is_listed_with_its_parameters() {
+    let folder = Folder::new();
+    let printed = folder.output("scenes");
+    let listed = folder.json("scenes --json");
+    assert!(array(&listed, "scenes").len() >= 5);
+    for scene in array(&listed, "scenes") {
+        let name = scene["name"].as_str().expect("a name");
+        assert!(printed.lines().any(|l| l == name), "{name} is not in: {printed}");
+        // Every parameter can be given its own default.
+        let assignments = array(scene, "parameters").iter();
+        let assignments = assignments.map(|p| format!("{}={}", p["name"].as_str().expect("a name"), p["default"]));
+        Scene::find(name, &assignments.collect::<Vec<_>>()).expect(name);
+        for p in array(scene, "parameters") {
+            assert!(printed.contains(&format!("-p {}=", p["name"].as_str().expect("a name"))), "{p}");
+        }
+    }
+}
+
+#[test]
+fn the_schema_of_scene_files_is_printed() {
+    let schema: Value = serde_json::from_str(&Folder::new().output("scenes --schema")).expect("JSON");
+    assert_eq!(schema["title"], "Scene");
+    assert!(keys(&schema["properties"]).contains(&"bodies"));
+}
+
+#[test]
+fn adapters_are_listed_as_json_even_if_there_are_none() {
+    assert!(array(&Folder::new().json("adapters --json"), "adapters").is_empty());
+}
+
+#[test]
+fn adapters_are_listed_with_what_they_can_do() {
+    if std::env::var("DRYSTONE_ADAPTER").is_ok_and(|name| name == "none") {
+        return eprintln!("not run: DRYSTONE_ADAPTER=none says that no GPU is wanted");
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+    let output = command.args(["adapters", "--json"]).output().expect("the command starts");
+    let listed: Value = serde_json::from_str(&text(&output.stdout)).expect("JSON");
+    let first = array(&listed, "adapters").first().expect("an adapter, or DRYSTONE_ADAPTER=none to test without");
+    assert_eq!(keys(first), ["api", "buffer_limit", "driver", "exact", "hardware", "kind", "name"]);
+}
+
+#[test]
+fn a_comparison_of_a_backend_with_itself_finds_no_difference() {
+    let folder = Folder::new();
+    let printed = folder.output("compare drop --steps 3 --backends reference,cpu");
+    assert!(printed.lines().any(|l| l == "no difference in any bit"), "{printed}");
+    let found = folder.json("compare drop --steps 3 --backends reference,cpu --json");
+    assert_eq!((array(&found, "steps").len(), &found["first"]), (3, &Value::Null));
+}
