@@ -71,7 +71,7 @@ fn a_run_reports_on_itself_as_json() {
         penetration_max penetration_mean kinetic_energy non_finite first_non_finite";
     let missing: Vec<_> = expected.split_whitespace().filter(|&key| report.get(key).is_none()).collect();
     assert!(missing.is_empty(), "{missing:?} of {:?}", keys(&report));
-    assert_eq!((&report["scene"], &report["backend"]), (&"pile".into(), &"reference".into()));
+    assert_eq!((&report["scene"], &report["backend"]), (&"pile".into(), &"cpu".into()));
     assert_eq!((&report["bodies"], &report["steps"], &report["non_finite"]), (&27.into(), &40.into(), &0.into()));
     assert_eq!((&report["config"]["substeps"], &report["config"]["push_limit"]), (&3.into(), &2.0.into()));
     assert_eq!(array(&report, "step_ms").len(), 40);
@@ -285,7 +285,7 @@ fn adapters_are_listed_with_what_they_can_do() {
 }
 
 #[test]
-fn a_comparison_of_a_backend_with_itself_finds_no_difference() {
+fn a_comparison_of_the_reference_and_the_cpu_finds_no_difference() {
     let folder = Folder::new();
     let printed = folder.output("compare drop --steps 3 --backends reference,cpu");
     assert!(printed.lines().any(|l| l == "no difference in any bit"), "{printed}");

@@ -1,6 +1,6 @@
 //! The same scene gives the same bits, for any number of threads; a settled one computes hardly any contact anew.
 
-use drystone::{Reference, Scene, Simulation, SolverConfig, StepStats, World};
+use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
 
 /// FNV-1a over every bit of every pose and velocity.
 fn hash(world: &World) -> u64 {
@@ -11,13 +11,20 @@ fn hash(world: &World) -> u64 {
     numbers.fold(0xcbf2_9ce4_8422_2325, |h, x| (h ^ u64::from(x.to_bits())).wrapping_mul(0x100_0000_01b3))
 }
 
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn cpu() -> Box<dyn Backend> {
+    Box::new(Cpu::new())
+}
+
 /// A pile of 300 boxes after `steps` steps, run with `threads` threads; impact comes within the first 30.
-fn pile(seed: u32, steps: u32, threads: usize) -> (World, StepStats) {
+fn pile(backend: fn() -> Box<dyn Backend>, seed: u32, steps: u32, threads: usize) -> (World, StepStats) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
         let scene = Scene::find("pile", &["n=300".into(), format!("seed={seed}")]).expect("the scene");
-        let backend = Box::new(Reference::<f32>::new());
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend).expect("good settings");
+        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend()).expect("good settings");
         let mut stats = StepStats::default();
         for _ in 0..steps {
             stats = simulation.step(scene.dt).expect("a step");
@@ -28,23 +35,26 @@ fn pile(seed: u32, steps: u32, threads: usize) -> (World, StepStats) {
 
 #[test]
 fn the_same_run_gives_the_same_bits_and_another_seed_gives_others() {
-    let (world, stats) = pile(1, 90, 1);
-    assert!(stats.manifolds > 300, "the boxes have met: {} manifolds", stats.manifolds);
-    assert_eq!(hash(&world), hash(&pile(1, 90, 1).0));
-    assert_ne!(hash(&world), hash(&pile(2, 90, 1).0));
+    for backend in [reference, cpu] {
+        let (world, stats) = pile(backend, 1, 90, 2);
+        assert!(stats.manifolds > 300, "the boxes have not met: {} manifolds", stats.manifolds);
+        assert_eq!(hash(&world), hash(&pile(backend, 1, 90, 2).0));
+        assert_ne!(hash(&world), hash(&pile(backend, 2, 90, 2).0));
+    }
 }
 
 #[test]
 fn the_number_of_threads_changes_no_bit() {
-    let one = hash(&pile(1, 90, 1).0);
-    for threads in [2, 5] {
-        assert_eq!(one, hash(&pile(1, 90, threads).0), "{threads} threads");
+    let one = hash(&pile(reference, 1, 90, 1).0);
+    for threads in [1, 2, 5] {
+        assert_eq!(one, hash(&pile(reference, 1, 90, threads).0), "reference, {threads} threads");
+        assert_eq!(one, hash(&pile(cpu, 1, 90, threads).0), "cpu, {threads} threads");
     }
 }
 
 #[test]
 fn the_hash_sees_the_last_bit_of_the_last_number() {
-    let (world, _) = pile(1, 1, 1);
+    let (world, _) = pile(reference, 1, 1, 1);
     let mut other = world.clone();
     let last = other.bodies.last_mut().expect("a body");
     last.angular_velocity.z = f32::from_bits(last.angular_velocity.z.to_bits() ^ 1);
@@ -54,9 +64,9 @@ fn the_hash_sees_the_last_bit_of_the_last_number() {
 /// Measured: none of some 1100 pairs after 10 s, all of them in the first step.
 #[test]
 fn a_settled_pile_reuses_its_contacts_and_a_new_one_computes_them() {
-    let (_, first) = pile(1, 1, 2);
+    let (_, first) = pile(cpu, 1, 1, 2);
     assert_eq!(first.computed, first.pairs);
-    let (_, settled) = pile(1, 600, 2);
+    let (_, settled) = pile(cpu, 1, 600, 2);
     println!("{} of {} pairs computed", settled.computed, settled.pairs);
     assert!(settled.computed * 100 < settled.pairs, "{} of {} pairs computed", settled.computed, settled.pairs);
 }
@@ -67,8 +77,7 @@ fn reused_contacts_hold_as_well_as_new_ones() {
     let heights = |recycle_distance: f32| {
         let scene = Scene::find("tower", &["n=8".into()]).expect("the scene");
         let config = SolverConfig { recycle_distance, ..SolverConfig::default() };
-        let backend = Box::new(Reference::<f32>::new());
-        let mut simulation = Simulation::new(scene.world, config, backend).expect("good settings");
+        let mut simulation = Simulation::new(scene.world, config, cpu()).expect("good settings");
         let mut computed = 0;
         for _ in 0..300 {
             computed += simulation.step(scene.dt).expect("a step").computed;
