@@ -93,7 +93,7 @@ fn a_block_stops_sliding_and_spinning_in_the_same_frame() {
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.5)).friction(0.4).position(0.0, 0.1, 0.0);
     let block = world.add(block.velocity(Vec3::X * 2.0, Vec3::Y * 3.0));
     let mut simulation = simulation(world, SolverConfig::default());
-    let (mut slides, mut spins) = (0, 0);
+    let (mut slides, mut spins) = (0_i32, 0_i32);
     for step in 1..=360 {
         simulation.step(1.0 / 240.0).unwrap();
         let body = &simulation.world.bodies[block];
@@ -102,7 +102,7 @@ fn a_block_stops_sliding_and_spinning_in_the_same_frame() {
     }
     println!("slides for {slides} frames, spins for {spins}");
     // A4: one frame of 1/60 s is four of these; the thresholds are passed a little apart.
-    assert!(slides < 360 && (slides as i32 - spins as i32).abs() <= 4, "slides {slides}, spins {spins}");
+    assert!(slides < 360 && (slides - spins).abs() <= 4, "slides {slides}, spins {spins}");
 }
 
 #[test]
