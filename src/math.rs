@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_rotation_by_its_vector_agrees_with_sine_and_cosine() {
-        for angle in [0.0, 1e-6, 0.01, 1.0, 3.0] {
+        for angle in [0.0_f64, 1e-6, 0.01, 1.0, 3.0] {
             let q = exp_rotation(vec3(0.0, angle, 0.0));
             let error: f64 = (q.axis.y - (0.5 * angle).sin()).abs().max((q.w - (0.5 * angle).cos()).abs());
             assert!(error < 1e-6, "angle {angle}: {error:e}");
