@@ -6,11 +6,6 @@ use super::Scene;
 use super::random::SplitMix64;
 use crate::world::{Body, Shape, World};
 
-/// A scene at 60 steps a second.
-fn scene(name: &str, world: World, steps: u32) -> Scene {
-    Scene { name: name.to_owned(), world, dt: 1.0 / 60.0, steps, container: None }
-}
-
 /// A world with a fixed floor, 1 m thick, whose top is at y = 0.
 fn floor(half_x: f32, half_z: f32) -> World {
     let mut world = World::new();
@@ -59,7 +54,7 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
         world.add(body);
     }
     let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
-    Scene { container, ..scene("pile", world, 600) }
+    Scene { container, ..Scene::new("pile", world, 600) }
 }
 
 /// A turn by up to 0.08 rad about a random axis. Plain arithmetic in f64, so that the bits are the same everywhere.
@@ -86,7 +81,7 @@ pub(super) fn pyramid(base: usize) -> Scene {
             world.add(body.clone().position(x, row as f32 + 0.5, 0.0));
         }
     }
-    scene("pyramid", world, 300)
+    Scene::new("pyramid", world, 300).standing()
 }
 
 /// A stack of `n` boxes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
@@ -97,7 +92,7 @@ pub(super) fn tower(n: usize, offset: f32, top_ratio: f32) -> Scene {
         let density = if i + 1 == n { 1000.0 * top_ratio } else { 1000.0 };
         world.add(unit_box().density(density).position(x, i as f32 + 0.5, 0.0));
     }
-    scene("tower", world, 600)
+    Scene::new("tower", world, 600).standing()
 }
 
 /// Rows of bricks of 1 x 0.5 x 0.5 m with 0.05 m between neighbors. Every other row is shifted by half a brick and ends
@@ -121,7 +116,7 @@ pub(super) fn wall(rows: usize, columns: usize) -> Scene {
             lay(&half, end);
         }
     }
-    scene("wall", world, 600)
+    Scene::new("wall", world, 600).standing()
 }
 
 #[cfg(test)]

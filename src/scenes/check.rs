@@ -30,7 +30,7 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
         let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;
         world.add(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
     }
-    Ok(Scene { name: file.name.unwrap_or_else(|| name.to_owned()), world, dt, steps: file.steps, container })
+    Ok(Scene { dt, container, ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps) })
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
