@@ -5,10 +5,12 @@ mod catalogue;
 mod check;
 mod drop;
 mod file;
+mod joint;
 mod random;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
+pub use joint::{BodyRef, JointFile};
 
 use std::ops::Range;
 
