@@ -3,25 +3,9 @@
 use glam::{Quat, Vec3};
 
 use super::Scene;
+use super::parts::{centered, floor, unit_box};
 use super::random::SplitMix64;
-use crate::world::{Body, Shape, World};
-
-/// A world with a fixed floor, 1 m thick, whose top is at y = 0.
-fn floor(half_x: f32, half_z: f32) -> World {
-    let mut world = World::new();
-    let shape = Shape::cuboid(half_x, 0.5, half_z);
-    world.add(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
-    world
-}
-
-fn unit_box() -> Body {
-    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5))
-}
-
-/// Distance of the k-th of `n` things from their middle, in pitches.
-fn centered(k: usize, n: usize) -> f64 {
-    k as f64 - (n - 1) as f64 / 2.0
-}
+use crate::world::{Body, Shape};
 
 /// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
 pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {

@@ -1,14 +1,22 @@
 //! Scenes: a world, how long a step is, and what should hold at the end.
 
+mod basics;
 mod boxes;
 mod catalogue;
 mod check;
 mod drop;
+mod drum;
+mod entries;
 mod file;
 mod joint;
+mod jointed;
+mod masonry;
+mod parts;
 mod random;
+mod stacks;
 
-pub use catalogue::{CATALOGUE, Entry, Parameter};
+pub use catalogue::{Entry, Parameter};
+pub use entries::CATALOGUE;
 pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
 pub use joint::{BodyRef, JointFile};
 
