@@ -1,7 +1,7 @@
-//! What a run got wrong: penetration and speed, in f64.
+//! What a run got wrong: penetration, speed and what fell, in f64.
 
 use crate::collide::Pair;
-use crate::world::{BodyKind, World};
+use crate::world::{Body, BodyKind, World, pose};
 
 /// Overlap over all touching pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,4 +45,47 @@ pub fn fastest(world: &World) -> (f64, usize) {
 pub fn rms_speed(world: &World) -> f64 {
     let mass: f64 = world.bodies.iter().map(|b| f64::from(b.mass.mass)).sum();
     if mass > 0.0 { (2.0 * world.kinetic_energy() / mass).sqrt() } else { 0.0 }
+}
+
+/// Half of the height of the box along the world's axes around a body as it is [m]; 0 without shapes.
+pub fn half_height(body: &Body) -> f64 {
+    let bounds = |c: &crate::world::Collider| {
+        let aabb = c.shape.0.compute_aabb(&(pose(body.position, body.rotation) * pose(c.position, c.rotation)));
+        (f64::from(aabb.mins.y), f64::from(aabb.maxs.y))
+    };
+    let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    body.colliders.iter().map(bounds).reduce(both).map_or(0.0, |(low, high)| 0.5 * (high - low))
+}
+
+/// Whether the center of mass of a body moved by less than half of the height that the body had.
+pub fn in_place(before: &Body, after: &Body) -> bool {
+    let moved = before.center_of_mass().as_dvec3().distance(after.center_of_mass().as_dvec3());
+    moved < half_height(before)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+    use crate::world::Shape;
+
+    #[test]
+    fn height_is_that_of_all_shapes_as_they_are_turned() {
+        let lying = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let plank = Body::dynamic().shape(Shape::cuboid(2.0, 0.5, 1.0));
+        assert!((half_height(&plank) - 0.5).abs() < 1e-6);
+        assert!((half_height(&plank.clone().rotation(lying)) - 2.0).abs() < 1e-6);
+        let compound = plank.shape_at(Shape::ball(0.5), Vec3::new(0.0, 2.0, 0.0), Quat::IDENTITY);
+        assert!((half_height(&compound) - 1.5).abs() < 1e-6);
+        assert_eq!(half_height(&Body::fixed()), 0.0);
+    }
+
+    #[test]
+    fn a_body_is_in_place_until_it_moved_by_half_its_height() {
+        let start = Body::dynamic().shape(Shape::cuboid(2.0, 0.5, 1.0));
+        assert!(in_place(&start, &start.clone().position(0.3, 0.3, 0.2)));
+        assert!(!in_place(&start, &start.clone().position(0.0, 0.0, 0.5)));
+        assert!(!in_place(&start, &start.clone().position(f32::NAN, 0.0, 0.0)));
+    }
 }

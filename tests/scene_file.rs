@@ -309,7 +309,6 @@ fn impossible_values_of_a_scene_are_refused() {
             json!({"container": [[0, 0, 0], [1, 0, 1]]}),
             "container[1] = [1, 0, 1]: must be above container[0] along every axis",
         ),
-        (json!({"joints": [{"x": 1}, 2]}), "joints: 2 given, but joints come in a later version of the format"),
     ] {
         let mut scene = json!({"version": 1, "bodies": []});
         merge(&mut scene, change);
@@ -346,7 +345,8 @@ fn a_scene_is_found_by_the_path_of_its_file_and_named_after_it() {
 #[test]
 fn what_is_neither_a_scene_nor_a_file_is_met_with_the_scenes_there_are() {
     let line = Scene::find("piles", &[]).expect_err("no scene").to_string();
-    assert_eq!(line, "\"piles\" is neither a scene (pile, pyramid, tower, wall, drop) nor a scene file");
+    assert!(line.starts_with("\"piles\" is neither a scene (pile, pyramid, tower, wall, drop, "), "{line}");
+    assert!(line.ends_with(") nor a scene file"), "{line}");
     assert!(matches!(Scene::find("piles.json", &[]), Err(Error::File { .. })));
 }
 
@@ -370,6 +370,9 @@ fn the_schema_describes_every_key() {
     );
     assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
+    let ball = &schema["$defs"]["JointFile"]["oneOf"][0];
+    assert_eq!(keys(ball), "anchor anchors bodies collide type");
+    assert_eq!((&ball["required"], &ball["additionalProperties"]), (&json!(["type", "bodies"]), &json!(false)));
     let types: Vec<_> = every_shape().iter().map(|s| s["type"].clone()).collect();
     let described: Vec<_> = schema["$defs"]["ShapeFile"]["oneOf"].as_array().expect("shapes").iter().collect();
     assert_eq!(described.iter().map(|s| s["properties"]["type"]["const"].clone()).collect::<Vec<_>>(), types);

@@ -2,7 +2,7 @@
 
 mod compare;
 mod list;
-//mod report;
+mod report;
 mod run;
 
 use std::fmt::Display;
@@ -30,7 +30,7 @@ enum Command {
     /// Run a scene on two backends and show how far apart they are.
     Compare(compare::CompareArgs),
     /// Make a page of tables and pictures from runs.
-    //Report(report::ReportArgs),
+    Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
     Scenes(list::ScenesArgs),
     /// List the adapters that can run the shaders.
@@ -138,7 +138,7 @@ pub fn main() -> std::process::ExitCode {
     let result = match cli.command {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
-        //Command::Report(args) => args.run(),
+        Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),
     };

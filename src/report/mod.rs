@@ -1,7 +1,10 @@
-//! What runs came to: one run for people and programs, and pages made from many runs.
+//! What runs came to: one run for people and programs, its motion, and pages made from many runs.
 
 mod plot;
-
+mod rules;
 mod run;
+mod trajectory;
 
-pub use run::{RunReport, StageRow, Trajectory};
+pub use rules::{RUNS, RulesReport, rules};
+pub use run::{RunReport, StageRow, Standing};
+pub use trajectory::Trajectory;

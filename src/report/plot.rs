@@ -2,6 +2,10 @@
 
 use plotters::prelude::*;
 
+/// Colors that differ for the color-blind too (Okabe and Ito).
+const COLORS: [RGBColor; 5] =
+    [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167), RGBColor(0, 0, 0)];
+
 /// One line of a plot.
 pub struct Line {
     /// What the legend calls it.
@@ -70,7 +74,7 @@ macro_rules! draw {
                     .build_cartesian_2d(x_low..x_high, to_y(y_low, y_high))?;
                 chart.configure_mesh().x_desc(axes.x).y_desc(axes.y).light_line_style(WHITE).draw()?;
                 for (i, line) in lines.iter().enumerate() {
-                    let color = Palette99::pick(i).to_rgba();
+                    let color = COLORS[i % COLORS.len()];
                     let points = line.points.iter().copied().filter(keep);
                     chart
                         .draw_series(LineSeries::new(points, color.stroke_width(2)))?

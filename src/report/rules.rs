@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::metrics::{Penetration, in_place, rms_speed};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
-use crate::world::{Body, Shape, World};
+use crate::world::{Body, BodyKind, Shape, World};
 
 use super::plot::{Axes, Line, svg};
 use glam::{Quat, Vec3};
@@ -91,7 +91,7 @@ fn stand(world: &World, settings_text: &str, seconds: f64) -> Result<Standing> {
     for step in 1..=steps {
         simulation.step(DT)?;
         time = f64::from(step) * f64::from(DT);
-        if in_place(world, &simulation.world) < world.dynamic_count() {
+        if in_place_count(world, &simulation.world) < world.dynamic_count() {
             break;
         }
     }
@@ -136,11 +136,11 @@ fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()>
     Ok(())
 }
 
-/// The three ways to treat overlap, with the settings that each needs.
+/// The three ways to treat overlap, with the settings that each needs; 16 sweeps a step each.
 const STABILIZATIONS: [(&str, &str); 3] = [
-    ("none", "substeps=8 relax=0 stabilization=none"),
-    ("baumgarte", "substeps=8 relax=0 stabilization=baumgarte"),
-    ("soft", "substeps=8 stabilization=soft"),
+    ("none", "substeps=1 iterations=16 relax=0 stabilization=none"),
+    ("baumgarte", "substeps=1 iterations=16 relax=0 stabilization=baumgarte"),
+    ("soft", "substeps=8 iterations=1 relax=1 stabilization=soft"),
 ];
 
 fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
@@ -148,7 +148,7 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
     let mut lines = Vec::new();
     let _ = writeln!(
         report.page,
-        "\n## Stabilization\n\n`tower` of 10 boxes for 20 s, 8 substeps. *Energy added*: most that kinetic and potential energy ever rose \
+        "\n## Stabilization\n\n`tower` of 10 boxes for 20 s, 16 sweeps a step: without a bias and with Baumgarte's in one step, soft in 8 substeps of 1 + 1. *Energy added*: most that kinetic and potential energy ever rose \
          above their lowest value before. *Exit speed*: of a box that begins 5 cm deep in the floor.\n\n\
          | stabilization | deepest after 1 s | after 20 s | energy added | rms speed at rest | exit speed |\n|---|---|---|---|---|---|"
     );
@@ -261,7 +261,7 @@ fn creep(rule: &str) -> Result<f64> {
 fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe same block sent off at 2 m/s while it spins at 5 rad/s: under Coulomb's law both end together, and the path is straight.\n\n\
+        "\nThe same block sent off at 2 m/s while it spins at 5 rad/s: under Coulomb's law both end together. (Friction acts below the centre and tips the load forward, so the path is not quite straight; friction per manifold does not see that, nor how sliding weakens the hold on the spin.)\n\n\
          | friction | slides for | spins for | off its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();
@@ -271,7 +271,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
         let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
         let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
         let mut points = Vec::new();
-        for step in 1..=180_u32 {
+        for step in 1..=60_u32 {
             simulation.step(DT)?;
             let time = f64::from(step) * f64::from(DT);
             let body = &simulation.world.bodies[1];
@@ -282,7 +282,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
             points.push((time, v));
         }
         let name = if more.is_empty() { rule.to_owned() } else { format!("{rule}, per manifold") };
-        let end = |t: f64| if t > 2.99 { "3 s and more".into() } else { format!("{t:.3} s") };
+        let end = |t: f64| if t > 0.99 { "1 s and more".into() } else { format!("{t:.3} s") };
         let _ = writeln!(report.page, "| {name} | {} | {} | {:.1} mm |", end(slides), end(spins), aside * 1e3);
         lines.push(Line { name, points });
         after_run();
@@ -325,9 +325,14 @@ fn thrown_body(world: &World) -> usize {
     crate::metrics::fastest(world).1
 }
 
+/// Dynamic bodies that are still in place.
+fn in_place_count(was: &World, is: &World) -> usize {
+    let both = was.bodies.iter().zip(&is.bodies);
+    both.filter(|(b, _)| b.kind == BodyKind::Dynamic).filter(|(was, is)| in_place(was, is)).count()
+}
+
 fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
-    let ball = |w: &World| World { bodies: vec![w.bodies[thrown].clone()], ..World::new() };
-    in_place(was, is) - in_place(&ball(was), &ball(is))
+    in_place_count(was, is) - usize::from(in_place(&was.bodies[thrown], &is.bodies[thrown]))
 }
 
 /// Whether a tower of `n` boxes, with offsets of 1 cm, stands for 20 s.

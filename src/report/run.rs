@@ -1,14 +1,12 @@
-//! What a run was and what it came to: rows for people, JSON for programs, CSV of the motion.
+//! What one run was and what it came to: rows for people, JSON for programs.
 
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::ops::Range;
 
 use serde::Serialize;
 
 use crate::config::SolverConfig;
-use crate::error::{Error, Result};
-use crate::metrics::{fastest, rms_speed};
-use crate::scenes::Scene;
+use crate::metrics::{fastest, in_place, rms_speed};
+use crate::scenes::{Group, Scene};
 use crate::simulation::Simulation;
 use crate::stats::{StepStats, median};
 use crate::world::{BodyKind, World};
@@ -38,6 +36,14 @@ pub struct RunReport {
     pub manifolds: usize,
     /// Contact points of the last step.
     pub points: usize,
+    /// Joints.
+    pub joints: usize,
+    /// Largest distance between the anchors of a joint at the end [m]; none if the scene has no joints.
+    pub joint_gap: Option<f64>,
+    /// Sweeps that were done in all steps, where the settings have a tolerance; else none.
+    pub sweeps: Option<u64>,
+    /// Sweeps that the plans of all steps held, where the settings have a tolerance; else none.
+    pub planned_sweeps: Option<u64>,
     /// Colors of the last step.
     pub colors: usize,
     /// Most manifolds of any step that found no color and were swept alone.
@@ -66,6 +72,10 @@ pub struct RunReport {
     pub energy_gained: f64,
     /// Bodies outside the container at the end; none if the scene has no container.
     pub escaped: Option<usize>,
+    /// Dynamic bodies whose center of mass moved by less than half of their height since the start.
+    pub in_place: usize,
+    /// The same for each group of the scene.
+    pub standing: Vec<Standing>,
     /// Bodies whose pose or velocity is not finite.
     pub non_finite: usize,
     /// The first such body.
@@ -74,6 +84,19 @@ pub struct RunReport {
     stage_times: Vec<[f64; 5]>,
     #[serde(skip)]
     energy_before: f64,
+    #[serde(skip)]
+    stands: bool,
+}
+
+/// How much of a group still stands.
+#[derive(Clone, Debug, Serialize)]
+pub struct Standing {
+    /// Name of the group.
+    pub group: String,
+    /// Its dynamic bodies.
+    pub bodies: usize,
+    /// Those of them that are in place.
+    pub in_place: usize,
 }
 
 /// Time of one stage over a run [ms].
@@ -102,6 +125,10 @@ impl RunReport {
             stage_ms: Vec::new(),
             manifolds: 0,
             points: 0,
+            joints: scene.world.joints.len(),
+            joint_gap: None,
+            sweeps: None,
+            planned_sweeps: None,
             colors: 0,
             overflow: 0,
             reused: 0.0,
@@ -116,10 +143,13 @@ impl RunReport {
             kinetic_energy: 0.0,
             energy_gained: 0.0,
             escaped: None,
+            in_place: 0,
+            standing: Vec::new(),
             non_finite: 0,
             first_non_finite: None,
             stage_times: Vec::new(),
             energy_before: energy(&scene.world),
+            stands: scene.stands,
         }
     }
 
@@ -131,6 +161,10 @@ impl RunReport {
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
         self.manifolds = stats.manifolds;
         self.points = stats.points;
+        if self.config.tolerance > 0.0 {
+            *self.sweeps.get_or_insert(0) += u64::from(stats.sweeps);
+            *self.planned_sweeps.get_or_insert(0) += u64::from(stats.planned_sweeps);
+        }
         self.colors = stats.colors;
         self.overflow = self.overflow.max(stats.overflow);
         self.reused = 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64;
@@ -161,6 +195,18 @@ impl RunReport {
         self.kinetic_energy = world.kinetic_energy();
         self.energy_gained = energy(world) - self.energy_before;
         self.escaped = scene.container.map(|_| scene.escaped(world));
+        self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
+        let counted = |bodies: Range<usize>| {
+            let dynamic = bodies.filter(|&i| world.bodies.get(i).is_some_and(|b| b.kind == BodyKind::Dynamic));
+            let in_place = dynamic.clone().filter(|&i| in_place(&scene.world.bodies[i], &world.bodies[i])).count();
+            (dynamic.count(), in_place)
+        };
+        self.in_place = counted(0..world.bodies.len()).1;
+        let standing = |group: &Group| {
+            let (bodies, in_place) = counted(group.bodies.clone());
+            Standing { group: group.name.clone(), bodies, in_place }
+        };
+        self.standing = scene.groups.iter().map(standing).collect();
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
         self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
     }
@@ -186,6 +232,12 @@ impl RunReport {
                 100.0 * self.reused
             ),
         );
+        if let Some(gap) = self.joint_gap {
+            row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
+        }
+        if let (Some(sweeps), Some(planned)) = (self.sweeps, self.planned_sweeps) {
+            row("sweeps", format!("{sweeps} of {planned}"));
+        }
         if self.overflow > 0 {
             row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
         }
@@ -213,6 +265,14 @@ impl RunReport {
         if let Some(escaped) = self.escaped {
             row("container", format!("{escaped} bodies outside"));
         }
+        if self.stands {
+            row("in place", format!("{} of {}", self.in_place, self.bodies));
+        }
+        if !self.standing.is_empty() {
+            let up = || self.standing.iter().filter(|s| s.in_place == s.bodies);
+            let largest = up().max_by_key(|s| s.bodies).map_or("none", |s| &s.group);
+            row("standing", format!("{} of {} groups; the largest is {largest}", up().count(), self.standing.len()));
+        }
         if let Some(body) = &self.first_non_finite {
             row("non-finite", format!("{} bodies, first {body}", self.non_finite));
         }
@@ -229,54 +289,5 @@ fn body_name(world: &World, index: usize) -> String {
     match world.bodies.get(index) {
         Some(body) if !body.name.is_empty() => format!("{index} {:?}", body.name),
         _ => index.to_string(),
-    }
-}
-
-/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes.
-pub struct Trajectory {
-    path: PathBuf,
-    writer: csv::Writer<File>,
-}
-
-impl Trajectory {
-    /// Begins a file.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub fn create(path: &Path) -> Result<Self> {
-        let file = File::create(path).map_err(Error::file(path))?;
-        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(file) };
-        let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
-        let written = trajectory.writer.write_record(header.split(' '));
-        trajectory.check(written)?;
-        Ok(trajectory)
-    }
-
-    /// Writes the bodies that can move.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
-        for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
-            let (p, q) = (body.center_of_mass(), body.rotation);
-            let (v, w) = (body.linear_velocity, body.angular_velocity);
-            let row =
-                (step, f64::from(step) * f64::from(dt), i, p.to_array(), q.to_array(), v.to_array(), w.to_array());
-            let written = self.writer.serialize(row);
-            self.check(written)?;
-        }
-        Ok(())
-    }
-
-    /// Ends the file.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub fn finish(mut self) -> Result<()> {
-        self.writer.flush().map_err(Error::file(&self.path))
-    }
-
-    fn check(&self, written: csv::Result<()>) -> Result<()> {
-        written.map_err(|e| Error::file(&self.path)(e.into()))
     }
 }

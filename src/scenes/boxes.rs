@@ -3,30 +3,9 @@
 use glam::{Quat, Vec3};
 
 use super::Scene;
+use super::parts::{centered, floor, unit_box};
 use super::random::SplitMix64;
-use crate::world::{Body, Shape, World};
-
-/// A scene at 60 steps a second.
-fn scene(name: &str, world: World, steps: u32) -> Scene {
-    Scene { name: name.to_owned(), world, dt: 1.0 / 60.0, steps, container: None }
-}
-
-/// A world with a fixed floor, 1 m thick, whose top is at y = 0.
-fn floor(half_x: f32, half_z: f32) -> World {
-    let mut world = World::new();
-    let shape = Shape::cuboid(half_x, 0.5, half_z);
-    world.add(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
-    world
-}
-
-fn unit_box() -> Body {
-    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5))
-}
-
-/// Distance of the k-th of `n` things from their middle, in pitches.
-fn centered(k: usize, n: usize) -> f64 {
-    k as f64 - (n - 1) as f64 / 2.0
-}
+use crate::world::{Body, Shape};
 
 /// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
 pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
@@ -59,7 +38,7 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
         world.add(body);
     }
     let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
-    Scene { container, ..scene("pile", world, 600) }
+    Scene { container, ..Scene::new("pile", world, 600) }
 }
 
 /// A turn by up to 0.08 rad about a random axis. Plain arithmetic in f64, so that the bits are the same everywhere.
@@ -86,7 +65,7 @@ pub(super) fn pyramid(base: usize) -> Scene {
             world.add(body.clone().position(x, row as f32 + 0.5, 0.0));
         }
     }
-    scene("pyramid", world, 300)
+    Scene::new("pyramid", world, 300).standing()
 }
 
 /// A stack of `n` boxes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
@@ -97,7 +76,7 @@ pub(super) fn tower(n: usize, offset: f32, top_ratio: f32) -> Scene {
         let density = if i + 1 == n { 1000.0 * top_ratio } else { 1000.0 };
         world.add(unit_box().density(density).position(x, i as f32 + 0.5, 0.0));
     }
-    scene("tower", world, 600)
+    Scene::new("tower", world, 600).standing()
 }
 
 /// Rows of bricks of 1 x 0.5 x 0.5 m with 0.05 m between neighbors. Every other row is shifted by half a brick and ends
@@ -121,7 +100,7 @@ pub(super) fn wall(rows: usize, columns: usize) -> Scene {
             lay(&half, end);
         }
     }
-    scene("wall", world, 600)
+    Scene::new("wall", world, 600).standing()
 }
 
 #[cfg(test)]

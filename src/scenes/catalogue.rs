@@ -1,10 +1,10 @@
-//! Scenes that come with the crate, by name and parameters.
+//! What an entry of the catalogue is: a name, what should hold, parameters.
 
-use super::{Scene, boxes, drop};
+use super::Scene;
 use crate::error::{Error, Result};
 
 /// Most dynamic bodies a scene of the catalogue can be asked for.
-const MOST_BODIES: f64 = 4e6;
+pub(super) const MOST_BODIES: f64 = 4e6;
 
 /// A number that shapes a scene of the catalogue.
 #[derive(Clone, Debug)]
@@ -22,11 +22,11 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    const fn whole(name: &'static str, default: u32, range: (f64, f64), summary: &'static str) -> Self {
+    pub(super) const fn whole(name: &'static str, default: u32, range: (f64, f64), summary: &'static str) -> Self {
         Self { name, default: default as f64, range, whole: true, summary }
     }
 
-    const fn real(name: &'static str, default: f64, range: (f64, f64), summary: &'static str) -> Self {
+    pub(super) const fn real(name: &'static str, default: f64, range: (f64, f64), summary: &'static str) -> Self {
         Self { name, default, range, whole: false, summary }
     }
 
@@ -50,7 +50,7 @@ pub struct Entry {
     /// What can be changed about it.
     pub parameters: &'static [Parameter],
     /// Takes one value for each parameter, in their order.
-    build: fn(&[f64]) -> Result<Scene>,
+    pub(super) build: fn(&[f64]) -> Result<Scene>,
 }
 
 impl Entry {
@@ -85,53 +85,9 @@ impl Entry {
     }
 }
 
-/// Every scene that comes with the crate.
-pub static CATALOGUE: &[Entry] = &[
-    Entry {
-        name: "pile",
-        summary: "n boxes in a jittered grid fall into a container: none leaves, all come to rest, overlap stays small",
-        parameters: &[
-            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
-            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
-            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
-        ],
-        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64)),
-    },
-    Entry {
-        name: "pyramid",
-        summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
-        parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],
-        build: |v| Ok(boxes::pyramid(v[0] as usize)),
-    },
-    Entry {
-        name: "tower",
-        summary: "one stack of boxes, straight or zigzag, with a light or heavy top: it stands up to an offset of 0.2 m",
-        parameters: &[
-            Parameter::whole("n", 10, (1.0, 10_000.0), "number of boxes"),
-            Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
-            Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
-        ],
-        build: |v| Ok(boxes::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
-    },
-    Entry {
-        name: "wall",
-        summary: "a wall of bricks in running bond, half bricks at the ends of every other row: it stands",
-        parameters: &[
-            Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
-            Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
-        ],
-        build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize)),
-    },
-    Entry {
-        name: "drop",
-        summary: "one of every shape falls on a half-space, a triangle mesh and a height field: each rests where it fell",
-        parameters: &[Parameter::real("height", 2.0, (0.0, 20.0), "height of the fall [m]")],
-        build: |v| drop::drop(v[0] as f32),
-    },
-];
-
 #[cfg(test)]
 mod tests {
+    use super::super::CATALOGUE;
     use super::*;
     use crate::world::BodyKind;
 
@@ -156,6 +112,24 @@ mod tests {
             for body in &scene.world.bodies {
                 let usable = body.mass.mass > 0.0 && body.mass.principal_inertia.min_element() > 0.0;
                 assert_eq!(usable, body.kind == BodyKind::Dynamic, "{}: {body:?}", entry.name);
+            }
+        }
+    }
+
+    #[test]
+    fn at_the_ends_of_its_ranges_a_scene_builds_or_is_refused() {
+        for entry in CATALOGUE {
+            for p in entry.parameters {
+                // The most bodies would take a while.
+                let ends = if p.whole { vec![p.range.0] } else { vec![p.range.0, p.range.1] };
+                for end in ends {
+                    match entry.build(&[format!("{}={end}", p.name)]) {
+                        Ok(scene) => {
+                            assert!(scene.world.dynamic_count() > 0 && scene.world.first_non_finite().is_none())
+                        }
+                        Err(e) => assert!(e.to_string().contains("must be at most"), "{e}"),
+                    }
+                }
             }
         }
     }
@@ -195,6 +169,15 @@ mod tests {
         };
         assert!(most("pyramid", 0) * (most("pyramid", 0) + 1.0) / 2.0 <= MOST_BODIES);
         assert!(most("wall", 0) * (most("wall", 1) + 0.5) <= MOST_BODIES);
+        assert!(most("joint-grid", 0).powi(2) <= MOST_BODIES);
+        assert!(most("tallest", 0) * (most("tallest", 0) + 1.0) / 2.0 <= MOST_BODIES);
+        assert!(most("pyramid-heavy", 0) * (most("pyramid-heavy", 0) + 1.0) / 2.0 + 1.0 <= MOST_BODIES);
+    }
+
+    #[test]
+    fn parameters_that_contradict_each_other_are_refused() {
+        assert_eq!(refusal("tallest", "step=31"), "tallest: step = 31: must be at most n = 30");
+        assert_eq!(refusal("bridge", "boxes=21"), "bridge: boxes = 21: must be at most planks = 20");
     }
 
     #[test]

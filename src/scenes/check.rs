@@ -6,6 +6,7 @@ use glam::{Quat, Vec3};
 
 use super::Scene;
 use super::file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
+use super::joint::joint;
 use crate::error::{Error, Result};
 use crate::world::{Body, BodyKind, MassProperties, Shape, World};
 
@@ -19,10 +20,6 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     if file.version != 1 {
         return Err(unknown_version(file.version));
     }
-    if !file.joints.is_empty() {
-        let count = file.joints.len();
-        return Err(Error::input(format!("joints: {count} given, but joints come in a later version of the format")));
-    }
     let dt = one("dt", file.dt, "more than 0 and at most 1", |x| x > 0.0 && x <= 1.0)?;
     let mut world = World { gravity: finite("gravity", file.gravity)?.into(), bodies: Vec::new(), joints: Vec::new() };
     let container = file.container.map(container).transpose()?;
@@ -30,7 +27,11 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
         let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;
         world.add(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
     }
-    Ok(Scene { name: file.name.unwrap_or_else(|| name.to_owned()), world, dt, steps: file.steps, container })
+    for (index, joint_file) in file.joints.iter().enumerate() {
+        let joint = joint(joint_file, &world).map_err(|e| e.within(format_args!("joints[{index}]")))?;
+        world.join(joint);
+    }
+    Ok(Scene { dt, container, ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps) })
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
@@ -202,7 +203,7 @@ fn positive<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32
 }
 
 /// Coordinates.
-fn lengths<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
+pub(super) fn lengths<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
     checked(name, values, "at most 1e9 m in size", |x| x.abs() <= MOST_LENGTH)
 }
 

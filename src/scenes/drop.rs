@@ -38,7 +38,7 @@ pub(super) fn drop(height: f32) -> Result<Scene> {
     place(dumbbell(), "compound", 3.0, 0.5 + height);
 
     let container = Some((Vec3::new(-4.0 * PITCH, 0.0, -DEPTH), Vec3::new(4.0 * PITCH, height + 4.0, DEPTH)));
-    Ok(Scene { name: "drop".to_owned(), world, dt: 1.0 / 60.0, steps: 300, container })
+    Ok(Scene { container, ..Scene::new("drop", world, 300) })
 }
 
 /// A plate of triangles, two pitches long, that falls 0.1 m from left to right.

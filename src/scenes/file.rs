@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use serde_path_to_error::Segment;
 
+use super::joint::JointFile;
 use super::{CATALOGUE, Scene, check};
 use crate::error::{Error, Result};
 use crate::world::BodyKind;
@@ -44,10 +45,9 @@ pub struct SceneFile {
     pub container: Option<[[f64; 3]; 2]>,
     /// The bodies.
     pub bodies: Vec<BodyFile>,
-    /// Joints come in a later version: must be empty.
+    /// The joints between them.
     #[serde(default)]
-    #[schemars(length(max = 0))]
-    pub joints: Vec<Value>,
+    pub joints: Vec<JointFile>,
 }
 
 /// A body of a scene file.

@@ -1,19 +1,31 @@
 //! Scenes: a world, how long a step is, and what should hold at the end.
 
+mod basics;
 mod boxes;
 mod catalogue;
 mod check;
 mod drop;
+mod drum;
+mod entries;
 mod file;
+mod joint;
+mod jointed;
+mod masonry;
+mod parts;
 mod random;
+mod stacks;
 
-pub use catalogue::{CATALOGUE, Entry, Parameter};
+pub use catalogue::{Entry, Parameter};
+pub use entries::CATALOGUE;
 pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
+pub use joint::{BodyRef, JointFile};
+
+use std::ops::Range;
 
 use glam::Vec3;
 
 use crate::error::Result;
-use crate::world::World;
+use crate::world::{BodyKind, World};
 
 /// A world with everything a run needs to know about it.
 #[derive(Clone, Debug)]
@@ -28,9 +40,33 @@ pub struct Scene {
     pub steps: u32,
     /// Lower and upper corner of the space that no dynamic body should leave [m], if the scene has one.
     pub container: Option<(Vec3, Vec3)>,
+    /// Whether every dynamic body should still be in place at the end.
+    pub stands: bool,
+    /// What stands or falls together; empty if the scene does not say.
+    pub groups: Vec<Group>,
+}
+
+/// Bodies that stand or fall together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Name for people.
+    pub name: String,
+    /// Their indices.
+    pub bodies: Range<usize>,
 }
 
 impl Scene {
+    /// A scene at 60 steps a second, without a container, of which nothing is said to stand.
+    pub fn new(name: impl Into<String>, world: World, steps: u32) -> Self {
+        Self { name: name.into(), world, dt: 1.0 / 60.0, steps, container: None, stands: false, groups: Vec::new() }
+    }
+
+    /// Says that every dynamic body should still be in place at the end.
+    pub fn standing(mut self) -> Self {
+        self.stands = true;
+        self
+    }
+
     /// Finds a scene by its catalogue name, else reads the file of that name. `parameters` are `key=value`.
     ///
     /// # Errors
@@ -45,7 +81,7 @@ impl Scene {
     /// Dynamic bodies whose centre of mass is outside the container.
     pub fn escaped(&self, world: &World) -> usize {
         let Some((low, high)) = self.container else { return 0 };
-        let dynamic = world.bodies.iter().filter(|b| b.kind == crate::world::BodyKind::Dynamic);
+        let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
         dynamic.map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
     }
 }

@@ -7,6 +7,7 @@ mod shape;
 pub use body::{Body, BodyKind, Collider, MassProperties, Material};
 pub use joint::BallJoint;
 pub use shape::Shape;
+pub(crate) use shape::pose;
 
 use glam::Vec3;
 

@@ -1,0 +1,53 @@
+//! One body whose motion is known in closed form, and a ball thrown at a stack.
+
+use glam::{Quat, Vec3};
+
+use super::Scene;
+use super::parts::{floor, slope};
+use super::stacks::stack;
+use crate::world::{Body, Shape, World};
+
+/// A ball of radius 0.5 m, its lowest point `height` above a half-space [m].
+pub(super) fn sphere_plane(height: f32) -> Scene {
+    let mut world = World::new();
+    world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)));
+    world.add(Body::dynamic().named("ball").shape(Shape::ball(0.5)).position(0.0, 0.5 + height, 0.0));
+    Scene::new("sphere-plane", world, 300)
+}
+
+/// A flat block on a slope of `degrees`; both have the friction `mu`. Sticks if tan(angle) < mu; else it slides with the
+/// acceleration g (sin(angle) - mu cos(angle)). It is too flat to topple.
+pub(super) fn slide(degrees: f32, mu: f32) -> Scene {
+    let block = Body::dynamic().named("block").shape(Shape::cuboid(0.5, 0.25, 0.5));
+    let scene = on_slope("slide", block, 0.25, degrees, mu);
+    if degrees.to_radians().tan() < mu { scene.standing() } else { scene }
+}
+
+/// A ball on a slope of `degrees`; both have the friction `mu`. Rolls with the acceleration 5/7 g sin(angle) without
+/// slipping if tan(angle) < 7/2 mu.
+pub(super) fn roll(degrees: f32, mu: f32) -> Scene {
+    let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5));
+    on_slope("roll", ball, 0.5, degrees, mu)
+}
+
+/// A body whose center is `height` above a slope that falls towards x.
+fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene {
+    let angle = degrees.to_radians();
+    let mut world = World::new();
+    world.add(slope(angle).friction(mu));
+    let (x, y) = (height * angle.sin(), height * angle.cos());
+    world.add(body.friction(mu).position(x, y, 0.0).rotation(Quat::from_rotation_z(-angle)));
+    Scene::new(name, world, 120)
+}
+
+/// A ball of radius 0.5 m, thrown with a horizontal `speed` [m/s] from 20 m away, meets the middle of a stack of `n`
+/// cubes at the height from which it was thrown.
+pub(super) fn throw(n: usize, speed: f32) -> Scene {
+    const DISTANCE: f32 = 20.0;
+    let mut world = floor(40.0, 10.0);
+    stack(&mut world, n, |_| Vec3::ZERO);
+    let rise = 0.5 * -world.gravity.y * DISTANCE / speed;
+    let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5)).velocity(Vec3::new(speed, rise, 0.0), Vec3::ZERO);
+    world.add(ball.position(-1.0 - DISTANCE, (0.5 * n as f32).max(0.5), 0.0));
+    Scene::new("throw", world, 400)
+}

@@ -1,0 +1,201 @@
+//! The catalogue: every scene that comes with the crate, by name and parameters.
+
+use super::catalogue::{Entry, MOST_BODIES, Parameter};
+use super::{basics, boxes, drop, drum, jointed, masonry, stacks};
+use crate::error::Error;
+
+const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of the slope [degrees]");
+const MU: Parameter = Parameter::real("mu", 0.5, (0.0, 10.0), "friction of all bodies");
+const LIFTED: Parameter = Parameter::real("angle", 90.0, (0.0, 180.0), "start, lifted from where it hangs [degrees]");
+
+/// Every scene that comes with the crate.
+pub static CATALOGUE: &[Entry] = &[
+    Entry {
+        name: "pile",
+        summary: "n boxes in a jittered grid fall into a container: none leaves, all come to rest, overlap stays small",
+        parameters: &[
+            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
+            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
+        ],
+        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64)),
+    },
+    Entry {
+        name: "pyramid",
+        summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
+        parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],
+        build: |v| Ok(boxes::pyramid(v[0] as usize)),
+    },
+    Entry {
+        name: "tower",
+        summary: "one stack of boxes, straight or zigzag, with a light or heavy top: it stands up to an offset of 0.2 m",
+        parameters: &[
+            Parameter::whole("n", 10, (1.0, 10_000.0), "number of boxes"),
+            Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
+            Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
+        ],
+        build: |v| Ok(boxes::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
+    },
+    Entry {
+        name: "wall",
+        summary: "a wall of bricks in running bond, half bricks at the ends of every other row: it stands",
+        parameters: &[
+            Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
+            Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
+        ],
+        build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize)),
+    },
+    Entry {
+        name: "drop",
+        summary: "one of every shape falls on a half-space, a triangle mesh and a height field: each rests where it fell",
+        parameters: &[Parameter::real("height", 2.0, (0.0, 20.0), "height of the fall [m]")],
+        build: |v| drop::drop(v[0] as f32),
+    },
+    Entry {
+        name: "sphere-plane",
+        summary: "a ball falls on a half-space: it comes to rest there",
+        parameters: &[Parameter::real("height", 2.0, (0.0, 100.0), "height of the fall [m]")],
+        build: |v| Ok(basics::sphere_plane(v[0] as f32)),
+    },
+    Entry {
+        name: "stack",
+        summary: "a straight stack of cubes: it stands",
+        parameters: &[Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes")],
+        build: |v| Ok(stacks::aligned(v[0] as usize)),
+    },
+    Entry {
+        name: "misaligned",
+        summary: "a stack of cubes, each off the axis by a fixed random shift: it stands",
+        parameters: &[
+            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
+            Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]"),
+        ],
+        build: |v| Ok(stacks::misaligned(v[0] as usize, v[1])),
+    },
+    Entry {
+        name: "slide",
+        summary: "a block on a slope: it sticks if tan(angle) < mu, else a = g (sin(angle) - mu cos(angle))",
+        parameters: &[ANGLE, MU],
+        build: |v| Ok(basics::slide(v[0] as f32, v[1] as f32)),
+    },
+    Entry {
+        name: "roll",
+        summary: "a ball on a slope: it rolls with a = 5/7 g sin(angle), without slipping if tan(angle) < 7/2 mu",
+        parameters: &[ANGLE, MU],
+        build: |v| Ok(basics::roll(v[0] as f32, v[1] as f32)),
+    },
+    Entry {
+        name: "throw",
+        summary: "a ball is thrown at a stack of cubes: the stack stands until it is hit, then it falls",
+        parameters: &[
+            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
+            Parameter::real("speed", 20.0, (5.0, 100.0), "horizontal speed of the ball [m/s]"),
+        ],
+        build: |v| Ok(basics::throw(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "tallest",
+        summary: "towers of step, 2 step, ... n cubes, one group each: the report names the largest that stands",
+        parameters: &[
+            Parameter::whole("n", 30, (1.0, 2000.0), "cubes of the tallest tower"),
+            Parameter::whole("step", 2, (1.0, 2000.0), "how many more cubes each tower has; at most n"),
+        ],
+        build: |v| {
+            if v[1] > v[0] {
+                return Err(Error::input(format!("step = {}: must be at most n = {}", v[1], v[0])));
+            }
+            Ok(stacks::tallest(v[0] as usize, v[1] as usize))
+        },
+    },
+    Entry {
+        name: "mass-ratio",
+        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 36 mm deep, or 2 with substeps=32",
+        parameters: &[
+            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
+            Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
+        ],
+        build: |v| Ok(stacks::mass_ratio(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "pendulum",
+        summary: "a ball swings from a joint: it comes back to its height",
+        parameters: &[
+            Parameter::real("length", 1.0, (0.1, 100.0), "distance from the joint to the center of the ball [m]"),
+            LIFTED,
+        ],
+        build: |v| Ok(jointed::pendulum(v[0] as f32, v[1] as f32)),
+    },
+    Entry {
+        name: "chain",
+        summary: "a chain with a heavy end swings: its joints stay closed, energy does not grow",
+        parameters: &[
+            Parameter::whole("links", 20, (1.0, 10_000.0), "number of links"),
+            Parameter::real("ratio", 10.0, (1e-6, 1e6), "mass of the end relative to a link"),
+            LIFTED,
+        ],
+        build: |v| Ok(jointed::chain(v[0] as usize, v[1] as f32, v[2] as f32)),
+    },
+    Entry {
+        name: "bridge",
+        summary: "planks on ball joints between two towers carry boxes: joints stay closed, no box falls off",
+        parameters: &[
+            Parameter::whole("planks", 20, (1.0, 1000.0), "number of planks"),
+            Parameter::whole("boxes", 5, (0.0, 1000.0), "number of boxes; at most one a plank"),
+        ],
+        build: |v| {
+            if v[1] > v[0] {
+                return Err(Error::input(format!("boxes = {}: must be at most planks = {}", v[1], v[0])));
+            }
+            Ok(jointed::bridge(v[0] as usize, v[1] as usize))
+        },
+    },
+    Entry {
+        name: "joint-grid",
+        summary: "n x n balls on ball joints swing down from one edge: joints stay closed, energy does not grow",
+        parameters: &[Parameter::whole("n", 20, (1.0, 2000.0), "balls along each side")],
+        build: |v| Ok(jointed::grid(v[0] as usize)),
+    },
+    Entry {
+        name: "arch",
+        summary: "a semicircular arch of wedges without mortar, mu 0.6: it stands from a thickness of 0.12 on",
+        parameters: &[
+            Parameter::whole("voussoirs", 17, (3.0, 201.0), "number of wedges"),
+            Parameter::real("thickness", 0.15, (0.05, 0.5), "thickness relative to the mean radius"),
+        ],
+        build: |v| masonry::arch(v[0] as usize, v[1]),
+    },
+    Entry {
+        name: "card-house",
+        summary: "pairs of thin plates lean at each other, plates across them carry the next storey: it stands",
+        parameters: &[
+            Parameter::whole("storeys", 3, (1.0, 100.0), "number of storeys"),
+            Parameter::real("angle", 20.0, (5.0, 45.0), "lean of the cards from the vertical [degrees]"),
+            MU,
+        ],
+        build: |v| Ok(masonry::card_house(v[0] as usize, v[1], v[2] as f32)),
+    },
+    Entry {
+        name: "dominoes",
+        summary: "a row of dominoes, the first one pushed: all fall",
+        parameters: &[Parameter::whole("n", 30, (1.0, 10_000.0), "number of dominoes")],
+        build: |v| Ok(masonry::dominoes(v[0] as usize)),
+    },
+    Entry {
+        name: "pyramid-heavy",
+        summary: "a plane pyramid of cubes with a heavy one on its tip: it stands",
+        parameters: &[
+            Parameter::whole("base", 10, (1.0, 2800.0), "cubes in the lowest row"),
+            Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the cube on the tip relative to the others"),
+        ],
+        build: |v| Ok(masonry::pyramid_heavy(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "drum",
+        summary: "boxes in a hollow drum that turns about a horizontal axis: none leaves",
+        parameters: &[
+            Parameter::whole("n", 200, (1.0, 1_000_000.0), "number of boxes"),
+            Parameter::real("speed", 1.0, (-10.0, 10.0), "angular speed [rad/s]"),
+        ],
+        build: |v| Ok(drum::drum(v[0] as usize, v[1] as f32)),
+    },
+];

@@ -1,0 +1,28 @@
+//! What many scenes are made of.
+
+use glam::Vec3;
+
+use crate::world::{Body, Shape, World};
+
+/// A world with a fixed floor, 1 m thick, whose top is at y = 0.
+pub(super) fn floor(half_x: f32, half_z: f32) -> World {
+    let mut world = World::new();
+    let shape = Shape::cuboid(half_x, 0.5, half_z);
+    world.add(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
+    world
+}
+
+/// A fixed half-space that falls towards x by `angle` [rad].
+pub(super) fn slope(angle: f32) -> Body {
+    Body::fixed().named("slope").shape(Shape::half_space(Vec3::new(angle.sin(), angle.cos(), 0.0)))
+}
+
+/// A cube of 1 m and 1000 kg.
+pub(super) fn unit_box() -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5))
+}
+
+/// Distance of the k-th of `n` things from their middle, in pitches.
+pub(super) fn centered(k: usize, n: usize) -> f64 {
+    k as f64 - (n as f64 - 1.0) / 2.0
+}

@@ -1,0 +1,175 @@
+//! What the entries of the catalogue say should hold, at default settings and in small.
+
+use drystone::glam::Vec3;
+use drystone::metrics::in_place;
+use drystone::report::RunReport;
+use drystone::{Body, BodyKind, Reference, Scene, Simulation, SolverConfig};
+
+/// A scene of the catalogue, and its simulation after some steps.
+fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
+    let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
+    let scene = Scene::find(name, &parameters).expect(name);
+    let reference = Box::new(Reference::<f32>::new());
+    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect(name);
+    step(&mut simulation, steps);
+    (scene, simulation)
+}
+
+fn step(simulation: &mut Simulation, steps: u32) {
+    for _ in 0..steps {
+        simulation.step(1.0 / 60.0).expect("a step");
+    }
+}
+
+/// The only dynamic body.
+fn only(simulation: &Simulation) -> &Body {
+    simulation.world.bodies.iter().find(|b| b.kind == BodyKind::Dynamic).expect("a dynamic body")
+}
+
+/// Dynamic bodies that are not in place.
+fn fallen(scene: &Scene, simulation: &Simulation) -> usize {
+    let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
+    both.filter(|(before, after)| after.kind == BodyKind::Dynamic && !in_place(before, after)).count()
+}
+
+fn energy(simulation: &Simulation) -> f64 {
+    simulation.world.kinetic_energy() + simulation.world.potential_energy()
+}
+
+#[test]
+fn a_ball_dropped_on_a_half_space_rests_on_it() {
+    let ball = only(&run("sphere-plane", &["height=1"], 120).1).clone();
+    assert!((ball.position.y - 0.5).abs() < 1e-4 && ball.linear_velocity.length() < 1e-4, "{ball:?}");
+}
+
+#[test]
+fn a_block_on_a_slope_sticks_or_slides_with_the_acceleration_of_coulomb() {
+    let (scene, simulation) = run("slide", &["angle=20", "mu=0.4"], 120);
+    let moved = only(&simulation).position.distance(only(&run("slide", &["angle=20"], 0).1).position);
+    assert!(scene.stands && moved < 1e-3, "{moved}");
+    let (scene, simulation) = run("slide", &["angle=20", "mu=0.2"], 120);
+    let (sin, cos) = 20_f32.to_radians().sin_cos();
+    let (speed, exact) = (only(&simulation).linear_velocity.length(), 2.0 * 9.81 * (sin - 0.2 * cos));
+    assert!(!scene.stands && (speed / exact - 1.0).abs() < 0.005, "{speed} m/s, {exact} m/s exactly");
+}
+
+#[test]
+fn a_ball_rolls_down_a_slope_without_slipping() {
+    let ball = only(&run("roll", &["angle=20"], 120).1).clone();
+    let (speed, exact) = (ball.linear_velocity.length(), 2.0 * 9.81 * 5.0 / 7.0 * 20_f32.to_radians().sin());
+    assert!((speed / exact - 1.0).abs() < 0.002, "{speed} m/s, {exact} m/s exactly");
+    let slip = (speed - 0.5 * ball.angular_velocity.length()).abs();
+    assert!(slip < 1e-3 * speed, "{slip} m/s");
+}
+
+#[test]
+fn small_standing_scenes_stand() {
+    for (name, parameters) in [
+        ("stack", vec!["n=8"]),
+        ("misaligned", vec!["n=8"]),
+        ("mass-ratio", vec!["n=6"]),
+        ("pyramid-heavy", vec!["base=4"]),
+        ("card-house", vec!["storeys=2"]),
+        ("arch", vec![]),
+    ] {
+        let (scene, simulation) = run(name, &parameters, 90);
+        assert!(scene.stands);
+        assert_eq!(fallen(&scene, &simulation), 0, "{name}");
+    }
+}
+
+#[test]
+fn an_arch_that_is_too_thin_falls_and_cards_that_are_too_smooth_slip() {
+    for (name, parameter) in [("arch", "thickness=0.09"), ("card-house", "mu=0.2")] {
+        let (scene, simulation) = run(name, &[parameter], 120);
+        assert!(fallen(&scene, &simulation) > 2, "{name}");
+    }
+}
+
+#[test]
+fn a_stack_stands_until_the_ball_hits_it() {
+    let (scene, mut simulation) = run("throw", &["n=6"], 50);
+    assert_eq!(fallen(&scene, &simulation), 1, "the ball moves, the stack does not");
+    step(&mut simulation, 70);
+    assert!(fallen(&scene, &simulation) > 3);
+}
+
+#[test]
+fn the_report_names_the_largest_tower_that_stands() {
+    let (mut scene, mut simulation) = run("tallest", &["n=6", "step=2"], 10);
+    // The tallest one is knocked over on paper.
+    scene.world.bodies[12].position += Vec3::X;
+    let mut report = RunReport::new(&scene, &simulation);
+    report.measure(&scene, &mut simulation);
+    assert_eq!((report.in_place, report.bodies), (11, 12));
+    let standing: Vec<_> = report.standing.iter().map(|s| (s.group.as_str(), s.bodies, s.in_place)).collect();
+    assert_eq!(standing, [("2 cubes", 2, 2), ("4 cubes", 4, 4), ("6 cubes", 6, 5)]);
+    let rows = report.rows();
+    let row = |what: &str| rows.iter().find(|r| r.0 == what).map(|r| r.1.as_str());
+    assert_eq!(row("in place"), Some("11 of 12"));
+    assert_eq!(row("standing"), Some("2 of 3 groups; the largest is 4 cubes"));
+    assert_eq!((row("joints"), row("sweeps")), (None, None));
+}
+
+#[test]
+fn the_report_counts_joints_and_the_sweeps_that_a_tolerance_saved() {
+    let scene = Scene::find("pendulum", &[]).expect("a pendulum");
+    let config = SolverConfig { tolerance: 1e-3, iterations: 8, ..SolverConfig::default() };
+    let reference = Box::new(Reference::<f32>::new());
+    let mut simulation = Simulation::new(scene.world.clone(), config, reference).expect("a simulation");
+    let mut report = RunReport::new(&scene, &simulation);
+    for _ in 0..5 {
+        report.add(&simulation.step(scene.dt).expect("a step"));
+    }
+    report.measure(&scene, &mut simulation);
+    assert_eq!((report.joints, report.joint_gap), (1, Some(simulation.world.joint_gap().into())));
+    let (sweeps, planned) = (report.sweeps.expect("sweeps"), report.planned_sweeps.expect("planned sweeps"));
+    assert!(0 < sweeps && sweeps < planned, "{sweeps} of {planned}");
+    assert!(report.rows().iter().any(|r| r == &("sweeps".to_owned(), format!("{sweeps} of {planned}"))));
+}
+
+#[test]
+fn a_pendulum_keeps_its_energy() {
+    let mut simulation = run("pendulum", &["angle=90"], 0).1;
+    let before = energy(&simulation);
+    let deepest = 9.81 * f64::from(only(&simulation).mass.mass);
+    step(&mut simulation, 300);
+    let lost = (before - energy(&simulation)) / deepest;
+    assert!(lost.abs() < 0.005, "{lost} of what it has at the bottom");
+}
+
+#[test]
+fn jointed_scenes_stay_together_and_gain_no_energy() {
+    for (name, parameters) in [
+        ("chain", ["links=8", "ratio=10"]),
+        ("chain", ["links=8", "angle=0"]),
+        ("bridge", ["planks=10", "boxes=3"]),
+        ("joint-grid", ["n=6", "n=6"]),
+    ] {
+        let mut simulation = run(name, &parameters, 0).1;
+        let before = energy(&simulation);
+        let mut gap = 0.0_f32;
+        for _ in 0..90 {
+            step(&mut simulation, 1);
+            gap = gap.max(simulation.world.joint_gap());
+        }
+        assert!(gap < 0.01, "{name}: {gap} m");
+        assert!(energy(&simulation) < before + 1.0, "{name}");
+    }
+}
+
+#[test]
+fn boxes_stay_on_the_bridge_and_in_the_drum() {
+    for (name, parameters) in [("bridge", ["planks=10", "boxes=5"]), ("drum", ["n=20", "speed=2"])] {
+        let (scene, simulation) = run(name, &parameters, 120);
+        assert_eq!(scene.escaped(&simulation.world), 0, "{name}");
+    }
+}
+
+#[test]
+fn every_domino_falls() {
+    let simulation = run("dominoes", &["n=6"], 160).1;
+    let tilts = simulation.world.bodies[1..].iter().map(|b| (b.rotation * Vec3::Y).y);
+    let upright: Vec<_> = tilts.filter(|&y| y > 0.5).collect();
+    assert!(upright.is_empty(), "{upright:?}");
+}
