@@ -31,14 +31,15 @@ impl Penetration {
 
 /// Speed of the fastest dynamic body [m/s] and its index; NaN counts as fastest.
 pub fn fastest(world: &World) -> (f64, usize) {
-    let mut best = (0.0, 0);
+    // Slower than any, so that a body at rest is named where all are.
+    let mut best = (-1.0, 0);
     for (i, b) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic) {
         let speed = b.linear_velocity.as_dvec3().length();
         if speed > best.0 || speed.is_nan() {
             best = (speed, i);
         }
     }
-    best
+    if best.0 < 0.0 { (0.0, 0) } else { best }
 }
 
 /// Root of the mean square speed, weighted by mass: sqrt(2 E / m) [m/s]. 0 for a world without dynamic bodies.

@@ -5,6 +5,7 @@
 
 mod manifold;
 mod narrow;
+mod query;
 
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
 pub use narrow::Pair;

@@ -2,11 +2,11 @@
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
-use parry3d::query::details::contact_manifold_cuboid_cuboid;
-use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{SharedShape, TypedShape};
 
 use super::manifold::{Manifold, ManifoldPoint};
+use super::query::{Found, convex_contact};
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -92,8 +92,9 @@ pub(super) struct Margins {
 /// Memory that one thread reuses from pair to pair.
 #[derive(Default)]
 pub(super) struct Scratch {
-    one: ContactManifold<(), ()>,
-    many: Vec<ContactManifold<(), ()>>,
+    one: Found,
+    again: Found,
+    many: Vec<Found>,
     candidates: Vec<ManifoldPoint>,
     old: Vec<Manifold>,
 }
@@ -195,21 +196,14 @@ impl Pair {
         let pose_a = Pose::from_parts(a.position, a.rotation) * ca.local;
         let pose_b = Pose::from_parts(b.position, b.rotation) * cb.local;
         let pos12 = pose_a.inv_mul(&pose_b);
-        let Scratch { one, many, candidates, old } = scratch;
-        let found: &[ContactManifold<(), ()>] = if ca.is_composite() || cb.is_composite() {
+        let Scratch { one, again, many, candidates, old } = scratch;
+        let found: &[Found] = if ca.is_composite() || cb.is_composite() {
             many.clear();
             // An unsupported pair (two meshes) cannot occur: both would be fixed.
             let _ = DefaultQueryDispatcher.contact_manifolds(&pos12, &*ca.shape, &*cb.shape, look, many, &mut None);
             many
         } else {
-            one.clear();
-            if let (Some(box_a), Some(box_b)) = (ca.shape.as_cuboid(), cb.shape.as_cuboid()) {
-                contact_manifold_cuboid_cuboid(&pos12, box_a, box_b, look, one);
-            } else {
-                let dispatcher = DefaultQueryDispatcher;
-                let _ =
-                    dispatcher.contact_manifold_convex_convex(&pos12, &*ca.shape, &*cb.shape, None, None, look, one);
-            }
+            convex_contact((&ca.shape, &cb.shape), &pos12, look, size, one, again);
             std::slice::from_ref(one)
         };
 
@@ -238,7 +232,7 @@ impl Pair {
 
 /// A point of parry's as one of ours; none if it is not finite or too far away.
 fn candidate(
-    m: &ContactManifold<(), ()>,
+    m: &Found,
     p: &TrackedContact<()>,
     [(ca, a), (cb, b)]: [(&ColliderInfo, &Moving); 2],
     look: f32,
