@@ -34,6 +34,9 @@ pub enum FrictionAt {
 }
 
 /// Whether a manifold solves its normals or its friction first.
+///
+/// It hardly matters: over the standing scenes overlap and speed at rest agree to a few percent. In towers normals first drift
+/// a little less (zigzag of 20: 33 against 38 mm in 10 s), in walls friction first does (3.4 against 5.7 mm).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionOrder {

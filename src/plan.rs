@@ -158,6 +158,14 @@ impl StepPlan {
     }
 
     /// Sweeps in the order of the course sheet: joints, then contacts.
+    ///
+    /// Joints have colors of their own. Colored together with the contacts they need as many (bridge: 6 + 2 apart, 8
+    /// together; chain 3 + 0 and 3), and one kernel would have to hold both.
+    ///
+    /// With a tolerance every sweep is preceded by `begin_sweep`, and a sweep that is no longer needed is skipped on the flag
+    /// that it leaves in a buffer: nothing is read back. A pile of 500 with up to 16 sweeps a substep and 1e-2 m/s took 0.66
+    /// of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch was not taken: each such call
+    /// adds a validating dispatch of its own, about the price of the empty one that it saves.
     fn sweeps(&mut self, count: u32, rules: Rules, joints: &[Range<u32>], contacts: &[Range<u32>]) {
         for sweep in 0..count {
             if rules.measured {
