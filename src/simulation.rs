@@ -43,9 +43,10 @@ impl Simulation {
     /// A simulation of `world` that has not moved yet.
     ///
     /// # Errors
-    /// A setting is out of range.
+    /// A setting is out of range or contradicts another; a body or joint of the world is not fit to be simulated.
     pub fn new(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
+        world.check()?;
         Ok(Self {
             detector: Detector::new(&world),
             world,

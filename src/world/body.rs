@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::shape::{Shape, pose};
+use crate::error::{Error, Result};
 
 /// Who decides how a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -291,6 +292,35 @@ impl Body {
     /// Angular velocity along the principal axes.
     fn principal_spin(&self) -> DVec3 {
         (self.rotation * self.mass.principal_frame).as_dquat().inverse() * self.angular_velocity.as_dvec3()
+    }
+
+    /// Refuses what no step can be made of.
+    pub(super) fn check(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::input(what));
+        if !self.is_finite() || !self.force.is_finite() {
+            return refuse("pose, velocity and force must be finite".into());
+        }
+        if (self.rotation.length() - 1.0).abs() > 1e-3 {
+            return refuse(format!("rotation = {}: must have unit length", self.rotation));
+        }
+        let Material { friction, restitution } = self.material;
+        if !(friction >= 0.0 && friction.is_finite() && (0.0..=1.0).contains(&restitution)) {
+            return refuse(format!(
+                "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
+            ));
+        }
+        if self.kind != BodyKind::Fixed && self.colliders.iter().any(|c| !c.shape.has_volume()) {
+            return refuse("half-spaces, meshes and height fields are for fixed bodies".into());
+        }
+        let MassProperties { mass, principal_inertia, .. } = self.mass;
+        let has_mass = |x: f32| x > 0.0 && x.is_finite();
+        if self.kind == BodyKind::Dynamic && !(has_mass(mass) && principal_inertia.to_array().into_iter().all(has_mass))
+        {
+            return refuse(format!(
+                "mass = {mass} kg, inertia = {principal_inertia} kg m²: must be positive and finite"
+            ));
+        }
+        Ok(())
     }
 
     /// Whether pose and velocity are finite.

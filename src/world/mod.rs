@@ -11,6 +11,8 @@ pub(crate) use shape::pose;
 
 use glam::Vec3;
 
+use crate::error::{Error, Result};
+
 /// A set of rigid bodies under one gravity.
 #[derive(Clone, Debug)]
 pub struct World {
@@ -64,6 +66,33 @@ impl World {
     /// Largest distance between the two anchors of any joint [m].
     pub fn joint_gap(&self) -> f32 {
         self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
+    }
+
+    /// Refuses what no step can be made of: numbers that are not finite, dynamic bodies without mass, moving bodies with shapes
+    /// that only fixed ones can have, joints to bodies that are not there.
+    ///
+    /// # Errors
+    /// One line that names the body, or the joint.
+    pub fn check(&self) -> Result<()> {
+        if !self.gravity.is_finite() {
+            return Err(Error::input(format!("gravity = {}: must be finite", self.gravity)));
+        }
+        for (i, body) in self.bodies.iter().enumerate() {
+            body.check().map_err(|e| Error::input(format!("body {i} {:?}: {e}", body.name)))?;
+        }
+        for (i, joint) in self.joints.iter().enumerate() {
+            let bodies = self.bodies.len();
+            if joint.body_a >= bodies || joint.body_b.is_some_and(|b| b >= bodies) {
+                return Err(Error::input(format!("joint {i}: names a body beyond the last of {bodies}")));
+            }
+            if joint.body_b == Some(joint.body_a) {
+                return Err(Error::input(format!("joint {i}: ties body {} to itself", joint.body_a)));
+            }
+            if !(joint.anchor_a.is_finite() && joint.anchor_b.is_finite()) {
+                return Err(Error::input(format!("joint {i}: its anchors must be finite")));
+            }
+        }
+        Ok(())
     }
 
     /// Number of dynamic bodies.

@@ -1,0 +1,42 @@
+//! Worlds that no step can be made of are refused, by name and in one line.
+
+use drystone::glam::{Quat, Vec3};
+use drystone::{BallJoint, Body, Reference, Shape, Simulation, SolverConfig, World};
+
+fn cube() -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).named("cube")
+}
+
+fn refusal(change: impl FnOnce(&mut World)) -> Option<String> {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.add(cube());
+    change(&mut world);
+    let made = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
+    made.err().map(|e| e.to_string())
+}
+
+#[test]
+fn a_good_world_is_taken() {
+    assert_eq!(refusal(|_| ()), None);
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_by_name() {
+    type Change = fn(&mut World);
+    let cases: [(&str, Change); 9] = [
+        ("gravity", |w| w.gravity.y = f32::NAN),
+        ("body 1 \"cube\": pose", |w| w.bodies[1].position.x = f32::INFINITY),
+        ("body 1 \"cube\": rotation", |w| w.bodies[1].rotation = Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)),
+        ("body 1 \"cube\": friction", |w| w.bodies[1].material.friction = -1.0),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 0.0),
+        ("body 2 \"\": mass", |w| drop(w.add(Body::dynamic()))),
+        ("body 2 \"\": half-spaces", |w| drop(w.add(Body::kinematic().shape(Shape::half_space(Vec3::Y))))),
+        ("joint 0: names", |w| w.joints.push(BallJoint::new(1, Vec3::ZERO, 7, Vec3::ZERO))),
+        ("joint 0: ties", |w| w.joints.push(BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO))),
+    ];
+    for (start, change) in cases {
+        let line = refusal(change).unwrap_or_else(|| panic!("{start}: was taken"));
+        assert!(line.starts_with(start) && !line.contains('\n'), "{line}");
+    }
+}
