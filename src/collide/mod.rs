@@ -109,7 +109,12 @@ impl Detector {
             v: b.linear_velocity,
             w: b.angular_velocity,
         }));
-        let margins = Margins { speculative: config.speculative_margin, recycle: config.recycle_distance, dt };
+        let margins = Margins {
+            speculative: config.speculative_margin,
+            recycle: config.recycle_distance,
+            fall: world.gravity.length() * dt * dt,
+            dt,
+        };
         self.broad_phase(margins);
         self.narrow_phase(margins)
     }
@@ -125,7 +130,7 @@ impl Detector {
         let tight = |c: &ColliderInfo| {
             let body = &self.moving[c.body as usize];
             let pose = Pose::from_parts(body.position, body.rotation) * c.local;
-            let mut aabb = c.shape.compute_aabb(&pose).loosened(margins.speculative * c.size);
+            let mut aabb = c.shape.compute_aabb(&pose).loosened(margins.speculative * c.size + margins.fall);
             let sweep = body.v * margins.dt;
             aabb.mins += sweep.min(glam::Vec3::ZERO);
             aabb.maxs += sweep.max(glam::Vec3::ZERO);

@@ -86,6 +86,8 @@ impl Moving {
 pub(super) struct Margins {
     pub speculative: f32,
     pub recycle: f32,
+    /// How far gravity moves a body in one step [m].
+    pub fall: f32,
     pub dt: f32,
 }
 
@@ -141,7 +143,7 @@ impl Pair {
         let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
         let size = ca.size.min(cb.size);
         let approach = (b.v - a.v).length() + cb.reach * (b.w - a.w).length();
-        let base = margins.speculative * size;
+        let base = margins.speculative * size + margins.fall;
         let look = base + (approach * margins.dt).min(2.0 * size);
 
         if let Some([a_then, b_then]) = &self.computed_at {
