@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 9] = [
     &["math", "error", "stats"],
     &["world", "config"],
     &["collide", "graph", "scenes"],
-    &["problem"],
+    &["problem", "contacts"],
     &["kernels", "plan", "metrics"],
     &["backend"],
     &["simulation"],
