@@ -35,6 +35,7 @@ pub mod metrics;
 pub mod plan;
 pub mod problem;
 pub mod report;
+pub mod residuals;
 pub mod scenes;
 pub mod simulation;
 pub mod stats;

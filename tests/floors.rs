@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 9] = [
     &["world", "config"],
     &["collide", "graph", "scenes"],
     &["problem", "contacts"],
-    &["kernels", "plan", "metrics"],
+    &["kernels", "plan", "metrics", "residuals"],
     &["backend"],
     &["simulation"],
     &["report", "compare"],
