@@ -38,6 +38,7 @@ pub mod report;
 pub mod residuals;
 pub mod scenes;
 pub mod simulation;
+pub mod solver;
 pub mod stats;
 pub mod world;
 

@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 9] = [
     &["collide", "graph", "scenes"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals"],
-    &["backend"],
+    &["backend", "solver"],
     &["simulation"],
     &["report", "compare"],
     &["main", "cli"],

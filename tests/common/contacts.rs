@@ -1,7 +1,10 @@
-//! Contact problems whose solution is known.
+//! Contact problems whose solution is known, and how long a solver takes to find it.
 
 use drystone::ContactProblem;
 use drystone::contacts::{FreeBody, PointContact, Velocity};
+use drystone::math::Scalar;
+use drystone::residuals::Measure;
+use drystone::solver::{Method, Order, Solver};
 use glam::{DMat3, DVec3};
 
 /// Step length of the problems [s].
@@ -37,4 +40,27 @@ pub fn tower(masses: &[f64]) -> ContactProblem {
 pub fn bearing(masses: &[f64]) -> Vec<DVec3> {
     let above = |i: usize| masses[i..].iter().sum::<f64>() * GRAVITY * STEP / 4.0;
     (0..masses.len()).flat_map(|i| [DVec3::X * above(i); 4]).collect()
+}
+
+/// Sweeps until e_vel is less than each of `errors`; none if `most` sweeps do not do it.
+pub fn sweeps_to<S: Scalar>(
+    problem: &ContactProblem,
+    (method, order): (Method, Order),
+    errors: &[f64],
+    most: u32,
+) -> Vec<Option<u32>> {
+    let measure = Measure::new(problem);
+    let mut solver = Solver::<S>::new(problem, method, order);
+    let mut found = vec![None; errors.len()];
+    for sweep in 1..=most {
+        solver.advance();
+        let reached = measure.of(&solver.impulses(), &solver.velocities()).e_vel;
+        for (found, _) in found.iter_mut().zip(errors).filter(|(found, error)| found.is_none() && reached < **error) {
+            *found = Some(sweep);
+        }
+        if found.iter().all(Option::is_some) {
+            break;
+        }
+    }
+    found
 }
