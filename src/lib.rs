@@ -15,6 +15,9 @@
 //! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
 //! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
 //! to be compared with.
+//!
+//! One solve by itself, without bodies' poses: a [`ContactProblem`] from a file, swept by a [`solver::Solver`], and what is
+//! left of its error in [`residuals::Residuals`].
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]

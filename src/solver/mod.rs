@@ -36,6 +36,17 @@ pub enum Method {
     Accelerated,
 }
 
+/// The numbers that a solver calculates in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Double precision.
+    #[default]
+    F64,
+    /// Single precision, as on a GPU.
+    F32,
+}
+
 /// A contact problem while it is solved.
 #[derive(Clone, Debug)]
 pub struct Solver<S> {
