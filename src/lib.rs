@@ -15,6 +15,9 @@
 //! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
 //! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
 //! to be compared with.
+//!
+//! One solve by itself, without bodies' poses: a [`ContactProblem`] from a file, swept by a [`solver::Solver`], and what is
+//! left of its error in [`residuals::Residuals`].
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
@@ -26,6 +29,7 @@ pub mod cli;
 pub mod collide;
 pub mod compare;
 pub mod config;
+pub mod contacts;
 pub mod error;
 pub mod graph;
 pub mod kernels;
@@ -34,8 +38,10 @@ pub mod metrics;
 pub mod plan;
 pub mod problem;
 pub mod report;
+pub mod residuals;
 pub mod scenes;
 pub mod simulation;
+pub mod solver;
 pub mod stats;
 pub mod world;
 
@@ -43,6 +49,7 @@ pub use backend::Backend;
 pub use backend::cpu::{Cpu, Reference};
 pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
+pub use contacts::ContactProblem;
 pub use error::{Error, Result};
 pub use glam;
 pub use plan::StepPlan;

@@ -45,6 +45,8 @@ pub trait Scalar: Lane + PartialOrd {
     fn from_f32(x: f32) -> Self;
     /// To storage, rounded to nearest.
     fn to_f32(self) -> f32;
+    /// The same number in `f64`, for measuring.
+    fn to_f64(self) -> f64;
 }
 
 macro_rules! scalar_lane {
@@ -104,6 +106,10 @@ impl Scalar for f32 {
     fn to_f32(self) -> f32 {
         self
     }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self.into()
+    }
 }
 
 impl Scalar for f64 {
@@ -114,6 +120,10 @@ impl Scalar for f64 {
     #[inline(always)]
     fn to_f32(self) -> f32 {
         self as f32
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
     }
 }
 

@@ -4,6 +4,7 @@ mod compare;
 mod list;
 mod report;
 mod run;
+mod solve;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -15,7 +16,7 @@ use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
 
-/// Contact between rigid bodies: run scenes, compare backends.
+/// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
 #[command(name = "drystone", version, about, max_term_width = 110)]
 struct Cli {
@@ -29,6 +30,8 @@ enum Command {
     Run(run::RunArgs),
     /// Run a scene on two backends and show how far apart they are.
     Compare(compare::CompareArgs),
+    /// Solve a contact problem and show how its error falls with the sweeps.
+    Solve(solve::SolveArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -138,6 +141,7 @@ pub fn main() -> std::process::ExitCode {
     let result = match cli.command {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
+        Command::Solve(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),

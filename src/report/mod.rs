@@ -3,8 +3,10 @@
 mod plot;
 mod rules;
 mod run;
+mod solve;
 mod trajectory;
 
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{RunReport, StageRow, Standing};
+pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};
 pub use trajectory::Trajectory;

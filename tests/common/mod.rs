@@ -1,6 +1,7 @@
 //! What several test files share. Each file uses a part of it.
 #![allow(dead_code)]
 
+pub mod contacts;
 pub mod difference;
 pub mod gpu;
 pub mod kernels;

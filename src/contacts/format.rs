@@ -1,0 +1,195 @@
+//! Contact problems as text: docs/contacts-format.md.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::str::{FromStr, Lines, SplitWhitespace};
+
+use glam::{DMat3, DVec3};
+
+use super::{ContactProblem, FreeBody, PointContact, Velocity};
+use crate::error::{Error, Result};
+
+impl ContactProblem {
+    /// From a file.
+    ///
+    /// # Errors
+    /// It cannot be read, or is not a contact problem; names file, line and value.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
+        Self::parse(&text).map_err(|e| e.within(path.display()))
+    }
+
+    /// From text.
+    ///
+    /// # Errors
+    /// It is not a contact problem; names line and value.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut reader = Reader { lines: text.lines(), line: 0 };
+        let mut problem = Self::default();
+        reader.row("contacts", |f| match f.take::<u32>("version")? {
+            1 => Ok(()),
+            version => Err(Error::input(format!("version {version}: only 1 is known"))),
+        })?;
+        problem.name = reader.next("the name")?.trim().to_owned();
+        let (bodies, contacts) = reader.row("bodies", |f| {
+            let bodies = f.take::<u32>("number of bodies")?;
+            f.word("contacts")?;
+            Ok((bodies, f.take::<u32>("number of contacts")?))
+        })?;
+        for _ in 0..bodies {
+            problem.bodies.push(reader.row("b", body)?);
+        }
+        for _ in 0..contacts {
+            problem.contacts.push(reader.row("c", |f| contact(f, bodies))?);
+        }
+        reader.end()?;
+        Ok(problem)
+    }
+
+    /// Into a file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        std::fs::write(path.as_ref(), self.to_text()).map_err(Error::file(path.as_ref()))
+    }
+
+    /// As text; every number is read back to the same bits.
+    pub fn to_text(&self) -> String {
+        let name = self.name.replace(char::is_control, " ");
+        let (bodies, contacts) = (self.bodies.len(), self.contacts.len());
+        let mut text = format!("contacts 1\n{name}\nbodies {bodies} contacts {contacts}\n");
+        let mut row = |head: String, numbers: &[f64]| {
+            text.push_str(&head);
+            for x in numbers {
+                // Shortest text that is read back to the same bits.
+                write!(text, " {x:?}").expect("a string takes everything");
+            }
+            text.push('\n');
+        };
+        for FreeBody { mass, inertia: i, free } in &self.bodies {
+            let inertia = [i.x_axis.x, i.y_axis.x, i.z_axis.x, i.y_axis.y, i.z_axis.y, i.z_axis.z];
+            row("b".into(), &[&[*mass], &inertia[..], &free.linear.to_array(), &free.angular.to_array()].concat());
+        }
+        for c in &self.contacts {
+            let index = |body: Option<u32>| body.map_or(-1, i64::from);
+            let vectors = [c.offset, c.frame[0], c.frame[1], c.frame[2], c.r_a, c.r_b].map(|x| x.to_array());
+            row(format!("c {} {}", index(c.a), index(c.b)), &[&[c.friction], vectors.as_flattened()].concat());
+        }
+        text
+    }
+}
+
+fn body(f: &mut Fields) -> Result<FreeBody> {
+    let mass = f.number("mass")?;
+    if mass <= 0.0 {
+        return Err(Error::input(format!("mass {mass:?}: must be more than 0")));
+    }
+    let [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
+    // Pivots of the elimination: all positive if, and only if, every rotation has energy.
+    let (p_yy, p_yz, p_zz) = (yy - xy * xy / xx, yz - xy * xz / xx, zz - xz * xz / xx);
+    if !(xx > 0.0 && p_yy > 0.0 && p_zz - p_yz * p_yz / p_yy > 0.0) {
+        let inertia = [xx, xy, xz, yy, yz, zz];
+        return Err(Error::input(format!("inertia {inertia:?}: must be positive definite")));
+    }
+    let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+    let free = Velocity { linear: f.vector("velocity")?, angular: f.vector("angular velocity")? };
+    Ok(FreeBody { mass, inertia, free })
+}
+
+fn contact(f: &mut Fields, bodies: u32) -> Result<PointContact> {
+    let [a, b] = [f.body("a", bodies)?, f.body("b", bodies)?];
+    if a == b {
+        let which = a.map_or("two fixed bodies".into(), |i| format!("body {i} with itself"));
+        return Err(Error::input(format!("a contact of {which}")));
+    }
+    let friction = f.number("friction")?;
+    if friction < 0.0 {
+        return Err(Error::input(format!("friction {friction:?}: must not be negative")));
+    }
+    let offset = f.vector("offset")?;
+    let frame = [f.vector("normal")?, f.vector("first tangent")?, f.vector("second tangent")?];
+    if (frame[0].length() - 1.0).abs() > 1e-6 {
+        return Err(Error::input(format!("normal {:?}: must have length 1", frame[0].to_array())));
+    }
+    Ok(PointContact { a, b, friction, offset, frame, r_a: f.vector("arm of a")?, r_b: f.vector("arm of b")? })
+}
+
+/// The lines of a text, counted.
+struct Reader<'a> {
+    lines: Lines<'a>,
+    line: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn next(&mut self, expected: &str) -> Result<&'a str> {
+        self.line += 1;
+        let end = || Error::input(format!("line {}: ends where {expected} should be", self.line));
+        self.lines.next().ok_or_else(end)
+    }
+
+    /// A line that begins with `head`, all of whose fields `take` takes.
+    fn row<T>(&mut self, head: &str, take: impl FnOnce(&mut Fields) -> Result<T>) -> Result<T> {
+        let mut fields = Fields { words: self.next(&format!("{head:?}"))?.split_whitespace() };
+        let taken = fields.word(head).and_then(|()| take(&mut fields)).and_then(|row| match fields.words.next() {
+            Some(word) => Err(Error::input(format!("{word:?} is one field too many"))),
+            None => Ok(row),
+        });
+        taken.map_err(|e| e.within(format!("line {}", self.line)))
+    }
+
+    /// Nothing but blank lines follows.
+    fn end(mut self) -> Result<()> {
+        match self.lines.by_ref().inspect(|_| self.line += 1).find(|line| !line.trim().is_empty()) {
+            Some(line) => Err(Error::input(format!("line {}: {line:?} after the last contact", self.line))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The fields of one line.
+struct Fields<'a> {
+    words: SplitWhitespace<'a>,
+}
+
+impl Fields<'_> {
+    fn word(&mut self, expected: &str) -> Result<()> {
+        match self.words.next() {
+            Some(word) if word == expected => Ok(()),
+            Some(word) => Err(Error::input(format!("{word:?} where {expected:?} should be"))),
+            None => Err(Error::input(format!("ends where {expected:?} should be"))),
+        }
+    }
+
+    fn take<T: FromStr>(&mut self, what: &str) -> Result<T> {
+        let word = self.words.next().ok_or_else(|| Error::input(format!("ends where {what} should be")))?;
+        word.parse().map_err(|_| Error::input(format!("{what} {word:?}: cannot be read")))
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64> {
+        let x: f64 = self.take(what)?;
+        if x.is_finite() { Ok(x) } else { Err(Error::input(format!("{what} {x:?}: must be finite"))) }
+    }
+
+    fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
+        let mut numbers = [0.0; N];
+        for x in &mut numbers {
+            *x = self.number(what)?;
+        }
+        Ok(numbers)
+    }
+
+    fn vector(&mut self, what: &str) -> Result<DVec3> {
+        self.numbers(what).map(DVec3::from_array)
+    }
+
+    /// Index of a body; none for -1.
+    fn body(&mut self, what: &str, bodies: u32) -> Result<Option<u32>> {
+        match self.take::<i64>(what)? {
+            -1 => Ok(None),
+            i if (0..i64::from(bodies)).contains(&i) => Ok(Some(i as u32)),
+            i => Err(Error::input(format!("body {what} = {i}: must be -1 or one of 0 to {}", i64::from(bodies) - 1))),
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! One contact problem by itself, at the level of velocities and in f64: what a solver sees after detection.
+//!
+//! With J the rows of all contacts and M the masses, a solver looks for impulses r so that
+//!
+//! ```text
+//! v = v_free + M⁻¹ Jᵀ r        u = J v + w        for each contact, with r = (r_n, r_t) and u = (u_n, u_t):
+//! 0 <= u_n,  0 <= r_n,  u_n r_n = 0               Signorini: they push, and only where they touch
+//! |r_t| <= mu r_n,  r_t = -mu r_n u_t/|u_t| where |u_t| > 0                       Coulomb
+//! ```
+//!
+//! The rows are those of docs/derivation.md, sections 2 and 6. As text: docs/contacts-format.md.
+
+mod format;
+mod operator;
+
+pub use operator::Operator;
+
+use glam::{DMat3, DVec3};
+
+/// Bodies that may move, and their contacts with each other and with what is fixed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactProblem {
+    /// Its name, on one line.
+    pub name: String,
+    /// The bodies that can move.
+    pub bodies: Vec<FreeBody>,
+    /// Their contacts, one a point.
+    pub contacts: Vec<PointContact>,
+}
+
+/// A body that can move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeBody {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Inertia about the center of mass, world axes [kg m²].
+    pub inertia: DMat3,
+    /// How it would move at the end of the step without contacts, all forces included.
+    pub free: Velocity,
+}
+
+/// How a body moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Velocity {
+    /// Of the center of mass [m/s].
+    pub linear: DVec3,
+    /// World axes [rad/s].
+    pub angular: DVec3,
+}
+
+/// One point at which two bodies touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointContact {
+    /// The body that the normal points away from; none if it is fixed.
+    pub a: Option<u32>,
+    /// The body that the normal points to; none if it is fixed.
+    pub b: Option<u32>,
+    /// Coulomb coefficient mu.
+    pub friction: f64,
+    /// Added to the relative velocity, in the contact's coordinates: restitution, gap over step length [m/s].
+    pub offset: DVec3,
+    /// The coordinates of the contact: unit normal from a to b, first and second tangent, world axes. Tangents are used
+    /// as they are, whether or not they are orthonormal.
+    pub frame: [DVec3; 3],
+    /// From the center of mass of a to the point, world axes [m]; of no effect if a is fixed.
+    pub r_a: DVec3,
+    /// From the center of mass of b to the point, world axes [m]; of no effect if b is fixed.
+    pub r_b: DVec3,
+}
+
+impl PointContact {
+    /// A world vector in the contact's coordinates: normal, first and second tangent.
+    pub fn coordinates(&self, x: DVec3) -> DVec3 {
+        DVec3::from_array(self.frame.map(|d| d.dot(x)))
+    }
+
+    /// The impulse on b [N s], world axes, that belongs to coordinates `r`.
+    pub fn impulse(&self, r: DVec3) -> DVec3 {
+        self.frame[0] * r.x + self.frame[1] * r.y + self.frame[2] * r.z
+    }
+}

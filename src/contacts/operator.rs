@@ -1,0 +1,79 @@
+//! From impulses to velocities: v = v_free + M⁻¹ Jᵀ r and u = J v + w, in f64.
+
+use glam::{DMat3, DVec3};
+
+use super::{ContactProblem, Velocity};
+
+/// A problem with the inverse of its masses.
+#[derive(Clone, Debug)]
+pub struct Operator<'a> {
+    problem: &'a ContactProblem,
+    /// Inverse inertia of each body, world axes [1/(kg m²)].
+    inverse_inertia: Vec<DMat3>,
+}
+
+impl<'a> Operator<'a> {
+    /// Of a problem.
+    pub fn new(problem: &'a ContactProblem) -> Self {
+        // Scaled to order 1, so that the determinant of a small body's inertia does not vanish.
+        let inverse = |i: DMat3| {
+            let scale = 3.0 / (i.x_axis.x + i.y_axis.y + i.z_axis.z);
+            (i * scale).inverse() * scale
+        };
+        Self { problem, inverse_inertia: problem.bodies.iter().map(|b| inverse(b.inertia)).collect() }
+    }
+
+    /// The problem.
+    pub fn problem(&self) -> &'a ContactProblem {
+        self.problem
+    }
+
+    /// Inverse inertia of a body, world axes [1/(kg m²)].
+    pub fn inverse_inertia(&self, body: usize) -> DMat3 {
+        self.inverse_inertia[body]
+    }
+
+    /// The velocity of each body under the impulses of all contacts, each in its contact's coordinates [N s].
+    ///
+    /// # Panics
+    /// There is not one impulse a contact.
+    pub fn velocities(&self, impulses: &[DVec3]) -> Vec<Velocity> {
+        assert_eq!(impulses.len(), self.problem.contacts.len(), "one impulse a contact");
+        let mut velocities: Vec<_> = self.problem.bodies.iter().map(|b| b.free).collect();
+        for (contact, &r) in self.problem.contacts.iter().zip(impulses) {
+            let p = contact.impulse(r);
+            for (body, arm, p) in [(contact.a, contact.r_a, -p), (contact.b, contact.r_b, p)] {
+                if let Some(body) = body.map(|i| i as usize) {
+                    velocities[body].linear += p / self.problem.bodies[body].mass;
+                    velocities[body].angular += self.inverse_inertia[body] * arm.cross(p);
+                }
+            }
+        }
+        velocities
+    }
+
+    /// The relative velocity u at a contact, offset included, in its coordinates [m/s].
+    pub fn relative_velocity(&self, contact: usize, velocities: &[Velocity]) -> DVec3 {
+        let contact = &self.problem.contacts[contact];
+        let at = |body: Option<u32>, arm: DVec3| {
+            body.map_or(DVec3::ZERO, |i| velocities[i as usize].linear + velocities[i as usize].angular.cross(arm))
+        };
+        contact.coordinates(at(contact.b, contact.r_b) - at(contact.a, contact.r_a)) + contact.offset
+    }
+
+    /// The block W_ii of W = J M⁻¹ Jᵀ [1/kg]: how u at a contact answers to the contact's own impulse.
+    pub fn block(&self, contact: usize) -> DMat3 {
+        let contact = &self.problem.contacts[contact];
+        let mut block = [[0.0; 3]; 3];
+        for (body, arm) in [(contact.a, contact.r_a), (contact.b, contact.r_b)] {
+            let Some(body) = body.map(|i| i as usize) else { continue };
+            for (column, d) in block.iter_mut().zip(contact.frame) {
+                for (entry, e) in column.iter_mut().zip(contact.frame) {
+                    let turned = self.inverse_inertia[body] * arm.cross(d);
+                    *entry += d.dot(e) / self.problem.bodies[body].mass + turned.dot(arm.cross(e));
+                }
+            }
+        }
+        DMat3::from_cols_array_2d(&block)
+    }
+}

@@ -1,0 +1,133 @@
+//! What one solve of a contact problem came to, sweep by sweep.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::contacts::ContactProblem;
+use crate::math::Scalar;
+use crate::residuals::{Measure, Residuals};
+use crate::solver::{Method, Order, Precision, Solver};
+
+/// Errors `e_vel` whose sweeps are reported.
+const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+
+/// How a contact problem is solved, and when that ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolveSettings {
+    /// What is done with the sweeps.
+    pub method: Method,
+    /// In which order they go.
+    pub order: Order,
+    /// In which numbers.
+    pub precision: Precision,
+    /// Most sweeps.
+    pub sweeps: u32,
+    /// Error `e_vel` below which no more are done; 0 does them all.
+    pub tolerance: f64,
+}
+
+/// Report of one solve; its fields are the keys of the JSON object.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolveReport {
+    /// Name of the problem.
+    pub problem: String,
+    /// Bodies that can move.
+    pub bodies: usize,
+    /// Contacts.
+    pub contacts: usize,
+    /// What was done with the sweeps.
+    pub method: Method,
+    /// Their order.
+    pub order: Order,
+    /// Their numbers.
+    pub precision: Precision,
+    /// Colors of that order.
+    pub colors: usize,
+    /// Sweeps that were done; they end early where the numbers are not finite.
+    pub sweeps: u32,
+    /// Time of the sweeps on one core, without measuring [ms].
+    pub ms: f64,
+    /// When the error first fell below 1e-1 to 1e-4.
+    pub reached: Vec<Reached>,
+    /// After each power of two of sweeps, and the last.
+    pub curve: Vec<CurveRow>,
+}
+
+/// When `e_vel` first fell below an error.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Reached {
+    /// The error.
+    pub e_vel: f64,
+    /// Sweeps until then; none if it did not.
+    pub sweeps: Option<u32>,
+    /// Their time [ms].
+    pub ms: Option<f64>,
+}
+
+/// What is left after some sweeps.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CurveRow {
+    /// Sweeps.
+    pub sweeps: u32,
+    /// Their time [ms].
+    pub ms: f64,
+    /// What they leave.
+    #[serde(flatten)]
+    pub residuals: Residuals,
+}
+
+impl SolveReport {
+    /// Solves a problem.
+    pub fn new(problem: &ContactProblem, settings: &SolveSettings) -> Self {
+        match settings.precision {
+            Precision::F64 => Self::in_numbers::<f64>(problem, settings),
+            Precision::F32 => Self::in_numbers::<f32>(problem, settings),
+        }
+    }
+
+    /// Whether any number of the end is not finite.
+    pub fn is_spoiled(&self) -> bool {
+        self.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan())
+    }
+
+    fn in_numbers<S: Scalar>(problem: &ContactProblem, settings: &SolveSettings) -> Self {
+        let &SolveSettings { method, order, precision, sweeps, tolerance } = settings;
+        let measure = Measure::new(problem);
+        let mut solver = Solver::<S>::new(problem, method, order);
+        let mut report = Self {
+            problem: problem.name.clone(),
+            bodies: problem.bodies.len(),
+            contacts: problem.contacts.len(),
+            method,
+            order,
+            precision,
+            colors: solver.colors(),
+            sweeps: 0,
+            ms: 0.0,
+            reached: ERRORS.map(|e_vel| Reached { e_vel, sweeps: None, ms: None }).to_vec(),
+            curve: Vec::new(),
+        };
+        let mut time = Duration::ZERO;
+        for sweep in 1..=sweeps {
+            let begin = Instant::now();
+            solver.advance();
+            time += begin.elapsed();
+            let ms = time.as_secs_f64() * 1e3;
+            let residuals = measure.of(&solver.impulses(), &solver.velocities());
+            let e_vel = residuals.e_vel;
+            (report.sweeps, report.ms) = (sweep, ms);
+            for reached in report.reached.iter_mut().filter(|r| r.sweeps.is_none() && e_vel < r.e_vel) {
+                (reached.sweeps, reached.ms) = (Some(sweep), Some(ms));
+            }
+            let last = sweep == sweeps || e_vel < tolerance || e_vel.is_nan();
+            if last || sweep.is_power_of_two() {
+                report.curve.push(CurveRow { sweeps: sweep, ms, residuals });
+            }
+            if last {
+                break;
+            }
+        }
+        report
+    }
+}

@@ -1,0 +1,189 @@
+//! How far impulses are from solving a contact problem, in f64, from the problem and the impulses alone.
+//!
+//! The natural map of a contact compares its impulse r with the projection on Coulomb's cone K of r less a step along the
+//! velocity, F = r - P_K(r - rho (u + mu |u_t| n)); it is zero exactly at a solution, for every rho > 0 (De Saxcé and
+//! Feng 1998; Acary, Brémond and Huber 2018).
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::contacts::{ContactProblem, Operator, Velocity};
+
+/// What impulses leave unsolved. All numbers are NaN if any of them is not finite.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Residuals {
+    /// The natural map in velocities: the norm of F/rho over all contacts with rho = 3/trace(W_ii), over the norm of
+    /// the free relative velocities. Independent of units; the number to steer by.
+    pub e_vel: f64,
+    /// The natural map with rho = 1, as published error curves have it: impulses and velocities are added as numbers, so it
+    /// depends on units.
+    pub e_fclib: f64,
+    /// Largest share of one contact in `e_vel`, |F|/rho [m/s].
+    pub vmax: f64,
+    /// Which contact that is; none without contacts.
+    pub worst_contact: Option<usize>,
+    /// Fastest approach of two surfaces that touch [m/s].
+    pub pen_rate: f64,
+    /// Largest |u_n r_n| [J]: contacts that push while they part.
+    pub compl: f64,
+    /// Farthest that an impulse is outside of its cone, |r_t| - mu r_n or -r_n [N s].
+    pub cone: f64,
+    /// Largest |u_t · r_t + mu r_n |u_t|| [J]: friction that does not oppose its slip with all it has.
+    pub diss: f64,
+    /// Drift of the velocities that a solver carried along from those of its impulses, over the free velocities, both in the
+    /// norm of kinetic energy.
+    pub eom: f64,
+}
+
+impl Residuals {
+    /// Of `impulses`, one a contact in its coordinates [N s]. To measure many times, keep a [`Measure`].
+    ///
+    /// # Panics
+    /// There is not one impulse a contact.
+    pub fn of(problem: &ContactProblem, impulses: &[DVec3]) -> Self {
+        let measure = Measure::new(problem);
+        measure.of(impulses, &measure.operator.velocities(impulses))
+    }
+
+    fn numbers_mut(&mut self) -> [&mut f64; 8] {
+        let Self { e_vel, e_fclib, vmax, worst_contact: _, pen_rate, compl, cone, diss, eom } = self;
+        [e_vel, e_fclib, vmax, pen_rate, compl, cone, diss, eom]
+    }
+
+    /// NaN spoils everything: no number that is left looks better than it is.
+    fn spoiled(mut self) -> Self {
+        if self.numbers_mut().iter().any(|x| !x.is_finite()) {
+            self.numbers_mut().into_iter().for_each(|x| *x = f64::NAN);
+        }
+        self
+    }
+}
+
+/// A problem with what does not depend on the impulses.
+pub struct Measure<'a> {
+    operator: Operator<'a>,
+    /// rho of each contact: 3/trace(W_ii) [kg].
+    steps: Vec<f64>,
+    /// Norm of the relative velocities without impulses [m/s].
+    free_norm: f64,
+}
+
+impl<'a> Measure<'a> {
+    /// Of a problem.
+    pub fn new(problem: &'a ContactProblem) -> Self {
+        let operator = Operator::new(problem);
+        let trace = |m: DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
+        let steps = (0..problem.contacts.len()).map(|i| 3.0 / trace(operator.block(i))).collect();
+        let free: Vec<_> = problem.bodies.iter().map(|b| b.free).collect();
+        let squares = (0..problem.contacts.len()).map(|i| operator.relative_velocity(i, &free).length_squared());
+        let free_norm = squares.sum::<f64>().sqrt();
+        Self { operator, steps, free_norm }
+    }
+
+    /// Of `impulses`, one a contact in its coordinates [N s], and the velocities that a solver carried along with them.
+    ///
+    /// # Panics
+    /// There is not one impulse a contact and one velocity a body.
+    pub fn of(&self, impulses: &[DVec3], carried: &[Velocity]) -> Residuals {
+        assert_eq!(carried.len(), self.operator.problem().bodies.len(), "one velocity a body");
+        let velocities = self.operator.velocities(impulses);
+        let (mut squares, mut squares_at_one) = (0.0, 0.0);
+        let (mut worst, mut approach, mut complement, mut cone, mut dissipation) =
+            (Largest::default(), Largest::default(), Largest::default(), Largest::default(), Largest::default());
+        let contacts = self.operator.problem().contacts.iter();
+        for (i, ((contact, &r), &rho)) in contacts.zip(impulses).zip(&self.steps).enumerate() {
+            let mu = contact.friction;
+            let u = self.operator.relative_velocity(i, &velocities);
+            let (r_t, u_t) = (DVec2::new(r.y, r.z), DVec2::new(u.y, u.z));
+            let residual = natural_map(mu, r, u, rho).length() / rho;
+            squares += residual * residual;
+            squares_at_one += natural_map(mu, r, u, 1.0).length_squared();
+            worst.add(i, residual);
+            approach.add(i, -u.x);
+            complement.add(i, (u.x * r.x).abs());
+            cone.add(i, r_t.length() - mu * r.x);
+            cone.add(i, -r.x);
+            dissipation.add(i, (u_t.dot(r_t) + mu * r.x * u_t.length()).abs());
+        }
+        Residuals {
+            e_vel: ratio(squares.sqrt(), self.free_norm),
+            e_fclib: ratio(squares_at_one.sqrt(), self.free_norm),
+            vmax: worst.value,
+            worst_contact: worst.place,
+            pen_rate: approach.value,
+            compl: complement.value,
+            cone: cone.value,
+            diss: dissipation.value,
+            eom: self.drift(&velocities, carried),
+        }
+        .spoiled()
+    }
+
+    fn drift(&self, velocities: &[Velocity], carried: &[Velocity]) -> f64 {
+        let (mut apart, mut whole) = (0.0, 0.0);
+        for (body, (v, carried)) in self.operator.problem().bodies.iter().zip(velocities.iter().zip(carried)) {
+            let twice_energy = |v: DVec3, w: DVec3| body.mass * v.length_squared() + w.dot(body.inertia * w);
+            apart += twice_energy(carried.linear - v.linear, carried.angular - v.angular);
+            whole += twice_energy(body.free.linear, body.free.angular);
+        }
+        ratio(apart.sqrt(), whole.sqrt())
+    }
+}
+
+/// r - P_K(r - rho (u + mu |u_t| n)).
+fn natural_map(mu: f64, r: DVec3, u: DVec3, rho: f64) -> DVec3 {
+    let slip = DVec2::new(u.y, u.z).length();
+    r - projected_on_cone(mu, r - (u + DVec3::X * (mu * slip)) * rho)
+}
+
+/// The point of |x_t| <= mu x_n that is nearest to x.
+fn projected_on_cone(mu: f64, x: DVec3) -> DVec3 {
+    let length = DVec2::new(x.y, x.z).length();
+    if mu * length <= -x.x {
+        DVec3::ZERO
+    } else if length <= mu * x.x {
+        x
+    } else {
+        let normal = (x.x + mu * length) / (1.0 + mu * mu);
+        let scale = mu * normal / length;
+        DVec3::new(normal, x.y * scale, x.z * scale)
+    }
+}
+
+/// 0 of nothing is nothing.
+fn ratio(x: f64, y: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x / y }
+}
+
+/// The largest of some numbers, 0 if all are less, NaN if any is.
+#[derive(Default)]
+struct Largest {
+    value: f64,
+    place: Option<usize>,
+}
+
+impl Largest {
+    fn add(&mut self, place: usize, x: f64) {
+        if x > self.value || x.is_nan() || self.place.is_none() {
+            *self = Self { value: if x <= 0.0 { 0.0 } else { x }, place: Some(place) };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_projection_is_the_nearest_point_of_the_cone() {
+        let mu = 0.5;
+        for x in [DVec3::new(1.0, 2.0, -1.0), DVec3::new(-0.1, 1.0, 0.0), DVec3::new(-3.0, 1.0, 1.0), DVec3::X] {
+            let nearest = projected_on_cone(mu, x);
+            assert!(DVec2::new(nearest.y, nearest.z).length() <= mu * nearest.x * (1.0 + 1e-15) + 1e-300);
+            for k in 0..1000 {
+                let (angle, normal) = (0.1 * f64::from(k), 0.01 * f64::from(k % 400));
+                let other = DVec3::new(normal, mu * normal * angle.cos(), mu * normal * angle.sin());
+                assert!(nearest.distance(x) <= other.distance(x), "{x}: {other} is nearer than {nearest}");
+            }
+        }
+    }
+}
