@@ -5,6 +5,7 @@ mod layout;
 mod prepare;
 pub mod softness;
 mod store;
+mod weigh;
 
 pub use layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
