@@ -173,11 +173,16 @@ impl Prepared {
         let (bodies, masses) = (&problem.bodies, &problem.masses);
         let h = problem.params.substep;
         chunks.into_par_iter().for_each(|(rows, order, points, impulses)| {
-            let mut next = 0;
+            // Headers first: they depend on nothing but their manifold, so the waits for memory overlap.
             for (row, &contact) in rows.iter_mut().zip(order) {
                 let (pair, manifold) = source(contact);
-                let (a, b) = (pair.body_a as usize, pair.body_b as usize);
-                prepare_header(row, pair, manifold, [&world.bodies[a], &world.bodies[b]], config);
+                let bodies = [pair.body_a, pair.body_b].map(|i| &world.bodies[i as usize]);
+                prepare_header(row, pair, manifold, bodies, config);
+            }
+            let mut next = 0;
+            for (row, &contact) in rows.iter().zip(order) {
+                let manifold = source(contact).1;
+                let (a, b) = (row.body_a as usize, row.body_b as usize);
                 let sides = Sides { bodies: [&bodies[a], &bodies[b]], masses: [&masses[a], &masses[b]] };
                 let kept = manifold.masses.unwrap_or_default();
                 let end = next + manifold.points().len();
