@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
+use super::groups::Group;
 use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
@@ -46,20 +47,6 @@ impl State {
 pub(super) fn load_mass(row: &Row8) -> Mass<f32> {
     let [xx, xy, xz, inv_mass, yy, yz, zz, _] = row.0;
     Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
-}
-
-/// Eight contacts of one color with as many points each.
-#[derive(Clone, Default)]
-pub(super) struct Group {
-    pub body_a: [u32; 8],
-    pub body_b: [u32; 8],
-    /// Rows of the problem that the lanes hold; `u32::MAX` where there is none.
-    pub rows: [u32; 8],
-    pub contact: [Row8; 10],
-    /// Where its points begin, in `points` and `impulses`.
-    pub first_point: u32,
-    /// Points, the patch included.
-    pub points: u32,
 }
 
 /// An array of eight, without a closure: a closure would be compiled for the plain instruction set.
