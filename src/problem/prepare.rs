@@ -34,8 +34,8 @@ pub struct Prepared {
     pub(super) joint_impulses: Vec<Vec3>,
 }
 
-/// Contacts that one task prepares.
-const CHUNK: usize = 256;
+/// Contacts that one task prepares, or pairs that it gives impulses back to.
+pub(super) const CHUNK: usize = 256;
 
 impl Prepared {
     /// Gives every manifold of `pairs` a color and remembers it there.

@@ -76,8 +76,7 @@ impl Groups {
         self.all.clear();
         self.colors.clear();
         // Patches stand in the problem whether a pass asks for them or not.
-        let last = problem.contacts.last();
-        let patch = u32::from(last.is_some_and(|c| ((c.first_point + c.point_count) as usize) < problem.points.len()));
+        let patch = u32::from(problem.has_patches());
         let mut next_point = 0;
         for color in problem.contact_colors() {
             self.colors.push(self.all.len() as u32);
