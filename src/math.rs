@@ -157,6 +157,7 @@ pub fn reciprocal<L: Lane>(x: L) -> L {
 }
 
 /// Three numbers.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vec3<L> {
     /// First component.

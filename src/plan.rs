@@ -209,14 +209,13 @@ impl Pass {
             Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
-                let contacts = &problem.contacts[rows];
-                let points: usize = contacts.iter().map(|c| c.point_count as usize).sum();
-                let patches = if rules.patch { contacts.len() } else { 0 };
+                let (contacts, points) = (rows.len(), problem.point_count(rows));
+                let patches = if rules.patch { contacts } else { 0 };
                 let writes = !matches!(self.kernel, Kernel::WarmStart(_));
                 let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
                 // Friction at points goes over them a second time; per manifold it adds one row.
                 let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
-                contacts.len() * (size_of::<ContactRow>() + PAIR) + (points + again + patches) * once
+                contacts * (size_of::<ContactRow>() + PAIR) + (points + again + patches) * once
             }
         };
         bytes as u64

@@ -98,7 +98,7 @@ impl Simulation {
         stats.pairs = found.pairs;
         stats.computed = found.computed;
         stats.manifolds = self.problem.contacts.len();
-        stats.points = self.problem.contacts.iter().map(|c| c.point_count as usize).sum();
+        stats.points = self.problem.point_count(0..stats.manifolds);
         stats.joints = self.problem.joints.len();
         stats.colors = self.prepared.coloring.color_count();
         stats.overflow = self.prepared.coloring.overflow as usize;

@@ -1,5 +1,6 @@
 //! The same scene gives the same bits, for any number of threads; a settled one computes hardly any contact anew.
 
+use drystone::problem::effective::{EffectiveMass, InverseMass};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
 
 /// FNV-1a over every bit of every pose and velocity.
@@ -90,4 +91,25 @@ fn reused_contacts_hold_as_well_as_new_ones() {
     println!("{few} and {many} manifolds computed, heights {difference:.1e} m apart");
     assert!(10 * few < many, "{few} {many}");
     assert!(difference < 1e-5, "{difference}");
+}
+
+#[test]
+fn a_reused_manifold_keeps_the_masses_that_its_arms_have() {
+    let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), cpu()).expect("a simulation");
+    let mut reused = 0;
+    for _ in 0..80 {
+        let stats = simulation.step(1.0 / 60.0).expect("a step");
+        reused += stats.pairs - stats.computed;
+        let problem = simulation.problem();
+        for row in &problem.contacts {
+            let inverse = [row.body_a, row.body_b].map(|b| InverseMass::of(&problem.masses[b as usize]));
+            let effective = EffectiveMass { inverse: &inverse, row };
+            for p in &problem.points[row.first_point as usize..][..row.point_count as usize] {
+                let (r_a, r_b) = (p.r_a.into(), p.r_b.into());
+                assert_eq!([p.normal_mass, p.tangent_mass], [effective.normal(r_a, r_b), effective.tangent(r_a, r_b)]);
+            }
+        }
+    }
+    assert!(reused > 1000, "{reused}");
 }

@@ -7,7 +7,7 @@ mod manifold;
 mod narrow;
 mod query;
 
-pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
+pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, PointMass};
 pub use narrow::Pair;
 
 use std::collections::{HashMap, HashSet};

@@ -57,6 +57,7 @@ pub struct Inertia<L> {
 }
 
 /// Double of the WGSL struct `Contact`, without the indices.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact<L> {
     /// Unit normal from a to b.
@@ -73,15 +74,16 @@ pub struct Contact<L> {
     pub radius_b: L,
 }
 
-/// Double of the WGSL struct `Point`.
+/// Double of the WGSL struct `Point`; in the order of `PointRow`, as the lanes have it in memory.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point<L> {
     /// Arm of a.
     pub r_a: Vec3<L>,
-    /// Arm of b.
-    pub r_b: Vec3<L>,
     /// Separation when the step begins.
     pub separation: L,
+    /// Arm of b.
+    pub r_b: Vec3<L>,
     /// Effective mass along the normal; of a patch, about it.
     pub normal_mass: L,
     /// Effective mass of the tangential step.
@@ -105,7 +107,8 @@ pub struct Joint<L> {
     pub gap: Vec3<L>,
 }
 
-/// Double of the WGSL struct `Impulse`.
+/// Double of the WGSL struct `Impulse`, in its order.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Impulse<L> {
     /// Along the normal.

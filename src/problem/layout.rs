@@ -96,6 +96,11 @@ pub struct ContactRow {
 }
 
 impl ContactRow {
+    /// A row of nothing but a normal and the tangents that belong to it.
+    pub fn framed(normal: Vec3) -> Self {
+        Self { normal: normal.to_array(), tangent: normal.any_orthonormal_vector().to_array(), ..Self::default() }
+    }
+
     /// The two tangents; together with the normal a right-handed frame.
     pub fn tangents(&self) -> (Vec3, Vec3) {
         let tangent_1 = Vec3::from_array(self.tangent);

@@ -5,6 +5,7 @@ mod layout;
 mod prepare;
 pub mod softness;
 mod store;
+mod weigh;
 
 pub use layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
@@ -63,6 +64,18 @@ impl StepProblem {
         self.colors[colors.start as usize] as usize..self.colors[colors.end as usize] as usize
     }
 
+    /// Whether a patch follows the points of every contact.
+    pub fn has_patches(&self) -> bool {
+        self.contacts.last().is_some_and(|c| ((c.first_point + c.point_count) as usize) < self.points.len())
+    }
+
+    /// Number of points of some neighboring contacts, patches left out.
+    pub fn point_count(&self, contacts: Range<usize>) -> usize {
+        let begins = |contact: usize| self.contacts.get(contact).map_or(self.points.len(), |c| c.first_point as usize);
+        let patches = if self.has_patches() { contacts.len() } else { 0 };
+        begins(contacts.end) - begins(contacts.start) - patches
+    }
+
     /// Whether any contact has friction.
     pub fn has_friction(&self) -> bool {
         self.contacts.iter().any(|c| c.friction > 0.0)
@@ -76,5 +89,26 @@ impl StepProblem {
     /// Whether any contact is made by a round surface, whose radius its rows carry.
     pub fn has_round_shapes(&self) -> bool {
         self.contacts.iter().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_counted_without_patches() {
+        for patch in [0, 1] {
+            let counts = [3, 1, 4, 2];
+            let mut problem = StepProblem::default();
+            let mut next = 0;
+            for point_count in counts {
+                problem.contacts.push(ContactRow { first_point: next, point_count, ..ContactRow::default() });
+                next += point_count + patch;
+            }
+            problem.points.resize(next as usize, PointRow::default());
+            assert_eq!(problem.has_patches(), patch == 1);
+            assert_eq!([0..4, 1..3, 2..4, 4..4].map(|rows| problem.point_count(rows)), [10, 5, 6, 0]);
+        }
     }
 }

@@ -10,7 +10,8 @@ use super::layout::{
     Softness,
 };
 use super::softness::softness;
-use crate::collide::{Manifold, ManifoldPoint, Pair};
+use super::weigh::{middle, weigh};
+use crate::collide::{MAX_POINTS, Manifold, ManifoldPoint, Pair, PointMass};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig, Stabilization};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use crate::world::{BallJoint, Body, BodyKind, World};
@@ -33,8 +34,8 @@ pub struct Prepared {
     pub(super) joint_impulses: Vec<Vec3>,
 }
 
-/// Contacts that one task prepares.
-const CHUNK: usize = 256;
+/// Contacts that one task prepares, or pairs that it gives impulses back to.
+pub(super) const CHUNK: usize = 256;
 
 impl Prepared {
     /// Gives every manifold of `pairs` a color and remembers it there.
@@ -80,7 +81,7 @@ impl Prepared {
     pub fn prepare(
         &mut self,
         world: &World,
-        pairs: &[Pair],
+        pairs: &mut [Pair],
         config: &SolverConfig,
         dt: f32,
         problem: &mut StepProblem,
@@ -109,6 +110,7 @@ impl Prepared {
         }
         self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
         self.prepare_joints(world, problem);
+        weigh(pairs, &problem.masses, config.friction, self.patches);
         self.prepare_contacts(world, pairs, config, problem);
         problem.params.point_count = problem.points.len() as u32;
     }
@@ -168,27 +170,30 @@ impl Prepared {
             (own_impulses, impulses) = impulses.split_at_mut(count);
             chunks.push((rows, order, own_points, own_impulses));
         }
-        let masses = &problem.masses;
+        let (bodies, masses) = (&problem.bodies, &problem.masses);
         let h = problem.params.substep;
         chunks.into_par_iter().for_each(|(rows, order, points, impulses)| {
-            let mut next = 0;
+            // Headers first: they depend on nothing but their manifold, so the waits for memory overlap.
             for (row, &contact) in rows.iter_mut().zip(order) {
                 let (pair, manifold) = source(contact);
                 let bodies = [pair.body_a, pair.body_b].map(|i| &world.bodies[i as usize]);
                 prepare_header(row, pair, manifold, bodies, config);
-                let inverse = [pair.body_a, pair.body_b].map(|i| InverseMass::of(&masses[i as usize]));
-                let accelerations =
-                    [pair.body_a, pair.body_b].map(|i| Vec3::from_array(masses[i as usize].acceleration));
-                let effective = EffectiveMass { inverse: &inverse, row };
+            }
+            let mut next = 0;
+            for (row, &contact) in rows.iter().zip(order) {
+                let manifold = source(contact).1;
+                let (a, b) = (row.body_a as usize, row.body_b as usize);
+                let sides = Sides { bodies: [&bodies[a], &bodies[b]], masses: [&masses[a], &masses[b]] };
+                let kept = manifold.masses.unwrap_or_default();
                 let end = next + manifold.points().len();
-                for (p, (point, impulse)) in
-                    manifold.points().iter().zip(points[next..].iter_mut().zip(&mut impulses[next..]))
+                for ((p, kept), (point, impulse)) in
+                    manifold.points().iter().zip(kept).zip(points[next..].iter_mut().zip(&mut impulses[next..]))
                 {
-                    *point = prepare_point(&effective, p, bodies, accelerations, h, config.friction);
+                    *point = prepare_point(row, p, kept, &sides, h, config.friction);
                     *impulse = if config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
                 }
                 if patch {
-                    points[end] = prepare_patch(&effective, &mut points[next..end]);
+                    points[end] = prepare_patch(kept[MAX_POINTS], &mut points[next..end]);
                     impulses[end] =
                         if config.warm_start { carried_over_patch(row, manifold) } else { ImpulseRow::default() };
                 }
@@ -253,14 +258,17 @@ fn prepare_bodies(world: &World, config: &SolverConfig, problem: &mut StepProble
 
 fn prepare_header(row: &mut ContactRow, pair: &Pair, manifold: &Manifold, [a, b]: [&Body; 2], config: &SolverConfig) {
     let material = a.material.combine(b.material);
-    row.normal = manifold.normal.to_array();
-    row.tangent = manifold.normal.any_orthonormal_vector().to_array();
-    row.friction = if config.friction == FrictionRule::None { 0.0 } else { material.friction };
-    row.restitution = material.restitution;
-    row.body_a = pair.body_a;
-    row.body_b = pair.body_b;
-    row.radius_a = manifold.radius_a;
-    row.radius_b = manifold.radius_b;
+    *row = ContactRow {
+        friction: if config.friction == FrictionRule::None { 0.0 } else { material.friction },
+        restitution: material.restitution,
+        body_a: pair.body_a,
+        body_b: pair.body_b,
+        first_point: row.first_point,
+        point_count: row.point_count,
+        radius_a: manifold.radius_a,
+        radius_b: manifold.radius_b,
+        ..ContactRow::framed(manifold.normal)
+    };
 }
 
 fn carried_over(row: &ContactRow, p: &ManifoldPoint) -> ImpulseRow {
@@ -285,37 +293,42 @@ fn carried_over_patch(row: &ContactRow, manifold: &Manifold) -> ImpulseRow {
     }
 }
 
+/// The rows of the two bodies of a contact.
+struct Sides<'a> {
+    bodies: [&'a BodyRow; 2],
+    masses: [&'a MassRow; 2],
+}
+
 fn prepare_point(
-    effective: &EffectiveMass,
+    row: &ContactRow,
     p: &ManifoldPoint,
-    [a, b]: [&Body; 2],
-    accelerations: [Vec3; 2],
+    kept: PointMass,
+    Sides { bodies: [a, b], masses }: &Sides,
     h: f32,
     rule: FrictionRule,
 ) -> PointRow {
     let (r_a, r_b) = (p.r_a, p.r_b);
-    let velocity = |body: &Body, r: Vec3| match body.kind {
-        BodyKind::Fixed => Vec3::ZERO,
-        _ => body.linear_velocity + body.angular_velocity.cross(r),
-    };
+    let velocity = |body: &BodyRow, r: Vec3| Vec3::from_array(body.v) + Vec3::from_array(body.w).cross(r);
     let u = velocity(b, r_b) - velocity(a, r_a);
-    let normal = Vec3::from_array(effective.row.normal);
-    let pull = (accelerations[1] - accelerations[0]).dot(normal);
-    let (tangent_1, tangent_2) = effective.row.tangents();
+    let normal = Vec3::from_array(row.normal);
+    let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
+    let pull = (pull_b - pull_a).dot(normal);
+    let (tangent_1, tangent_2) = row.tangents();
     // A point that does not slip yet takes the first tangent.
     let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
-    let tangent_mass = match rule {
-        FrictionRule::None => 0.0,
-        FrictionRule::Slip => effective.along(r_a, r_b, tangent_1 * slip.x + tangent_2 * slip.y),
-        FrictionRule::Box | FrictionRule::Disc => effective.tangent(r_a, r_b),
+    let tangent_mass = if rule == FrictionRule::Slip {
+        let effective = EffectiveMass { inverse: &masses.map(InverseMass::of), row };
+        effective.along(r_a, r_b, tangent_1 * slip.x + tangent_2 * slip.y)
+    } else {
+        kept.tangent
     };
     PointRow {
         r_a: r_a.to_array(),
         separation: p.separation,
         r_b: r_b.to_array(),
-        normal_mass: effective.normal(r_a, r_b),
+        normal_mass: kept.normal,
         tangent_mass,
-        approach_velocity: velocity_at_impact(u.dot(normal), pull, p.separation, h, effective.row.restitution),
+        approach_velocity: velocity_at_impact(u.dot(normal), pull, p.separation, h, row.restitution),
         slip_1: slip.x,
         slip_2: slip.y,
     }
@@ -338,19 +351,17 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
 }
 
 /// The row that stands for the friction of all `points`, which learn how far from it they are.
-fn prepare_patch(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
-    let middle = |arm: fn(&PointRow) -> [f32; 3]| {
-        points.iter().map(|p| Vec3::from_array(arm(p))).sum::<Vec3>() / points.len() as f32
-    };
-    let (r_a, r_b) = (middle(|p| p.r_a), middle(|p| p.r_b));
+fn prepare_patch(kept: PointMass, points: &mut [PointRow]) -> PointRow {
+    let arms = |arm: fn(&PointRow) -> [f32; 3]| middle(points.iter().map(|p| Vec3::from_array(arm(p))));
+    let (r_a, r_b) = (arms(|p| p.r_a), arms(|p| p.r_b));
     for p in points.iter_mut() {
         p.slip_1 = Vec3::from_array(p.r_a).distance(r_a);
     }
     PointRow {
         r_a: r_a.to_array(),
         r_b: r_b.to_array(),
-        normal_mass: effective.twist(),
-        tangent_mass: effective.tangent(r_a, r_b),
+        normal_mass: kept.normal,
+        tangent_mass: kept.tangent,
         ..PointRow::default()
     }
 }

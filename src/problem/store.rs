@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::prepare::Prepared;
+use super::prepare::{CHUNK, Prepared};
 use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
 use crate::world::{BodyKind, World};
@@ -24,21 +24,26 @@ impl Prepared {
         for (&i, row) in self.joint_coloring.order.iter().zip(&problem.joint_impulses) {
             self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
         }
-        for (&(i, k), &row) in self.contacts.iter().zip(&self.row_of) {
-            let contact = &problem.contacts[row as usize];
-            let (tangent_1, tangent_2) = contact.tangents();
-            let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-            let manifold = &mut pairs[i as usize].manifolds[k as usize];
-            let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
-            for (point, impulse) in manifold.points_mut().iter_mut().zip(&problem.impulses[first..end]) {
-                point.normal_impulse = impulse.normal;
-                point.friction_impulse = friction(impulse);
+        let begin = |pair: usize| self.contacts.partition_point(|contact| (contact.0 as usize) < pair);
+        pairs.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, pairs)| {
+            let first_pair = chunk * CHUNK;
+            let own = begin(first_pair)..begin(first_pair + pairs.len());
+            for (&(i, k), &row) in self.contacts[own.clone()].iter().zip(&self.row_of[own]) {
+                let contact = &problem.contacts[row as usize];
+                let (tangent_1, tangent_2) = contact.tangents();
+                let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+                let manifold = &mut pairs[i as usize - first_pair].manifolds[k as usize];
+                let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
+                for (point, impulse) in manifold.points_mut().iter_mut().zip(&problem.impulses[first..end]) {
+                    point.normal_impulse = impulse.normal;
+                    point.friction_impulse = friction(impulse);
+                }
+                // With friction per manifold the row after the points is the patch's.
+                if self.patches {
+                    manifold.twist_impulse = problem.impulses[end].normal;
+                    manifold.friction_impulse = friction(&problem.impulses[end]);
+                }
             }
-            // With friction per manifold the row after the points is the patch's.
-            if self.patches {
-                manifold.twist_impulse = problem.impulses[end].normal;
-                manifold.friction_impulse = friction(&problem.impulses[end]);
-            }
-        }
+        });
     }
 }

@@ -23,6 +23,7 @@ pub trait Lane8: Lane {
 
 /// Eight numbers in plain Rust: right on every target, and what the compiler makes of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(transparent)]
 pub struct Portable(Row8);
 
 /// Applies an operation to each of eight pairs.
@@ -120,6 +121,7 @@ pub mod avx2 {
 
     /// One register.
     #[derive(Clone, Copy, Debug)]
+    #[repr(transparent)]
     pub struct Avx2(__m256);
 
     // SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has

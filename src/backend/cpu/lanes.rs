@@ -9,16 +9,17 @@ use std::sync::atomic::AtomicBool;
 
 use super::super::Backend;
 use super::begin_sweep;
+use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, Group, InstructionSet, State, load_mass, spread};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spread};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::{Inertia, Joint, Pair, StepParams};
 use crate::math::Vec3;
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, ImpulseRow, PointRow, StepProblem};
+use crate::problem::{ConvergenceRow, StepProblem};
 
 /// The backend of the processor.
 pub struct Cpu {
@@ -26,11 +27,7 @@ pub struct Cpu {
     bodies: Vec<State>,
     masses: Vec<Row8>,
     accelerations: Vec<Row8>,
-    groups: Vec<Group>,
-    /// Where the groups of each color begin.
-    colors: Vec<u32>,
-    points: Vec<[Row8; 12]>,
-    impulses: Vec<[Row8; 4]>,
+    groups: Groups,
     convergence: ConvergenceRow,
     inertias: Vec<Inertia<f32>>,
     joints: Vec<Joint<f32>>,
@@ -60,10 +57,7 @@ impl Cpu {
             bodies: Vec::new(),
             masses: Vec::new(),
             accelerations: Vec::new(),
-            groups: Vec::new(),
-            colors: Vec::new(),
-            points: Vec::new(),
-            impulses: Vec::new(),
+            groups: Groups::default(),
             convergence: ConvergenceRow::default(),
             inertias: Vec::new(),
             joints: Vec::new(),
@@ -71,7 +65,7 @@ impl Cpu {
         }
     }
 
-    fn load(&mut self, problem: &StepProblem, patch: bool) {
+    fn load(&mut self, problem: &StepProblem) {
         let rows8 = |row: &crate::problem::BodyRow| {
             let all: &[f32; 16] = bytemuck::cast_ref(row);
             let half = |at: usize| Row8(std::array::from_fn(|i| all[at + i]));
@@ -100,82 +94,12 @@ impl Cpu {
         self.joint_impulses.clear();
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
-        self.load_contacts(problem, patch);
-    }
-
-    fn load_contacts(&mut self, problem: &StepProblem, patch: bool) {
-        self.groups.clear();
-        self.points.clear();
-        self.impulses.clear();
-        self.colors.clear();
-        let nobody = problem.bodies.len() as u32;
-        for color in problem.contact_colors() {
-            self.colors.push(self.groups.len() as u32);
-            for count in 1..=4 {
-                let mut lanes = [u32::MAX; 8];
-                let mut filled = 0;
-                for row in problem.rows_of(&(color..color + 1)) {
-                    if problem.contacts[row].point_count != count {
-                        continue;
-                    }
-                    lanes[filled] = row as u32;
-                    filled += 1;
-                    if filled == 8 {
-                        self.load_group(problem, lanes, count, patch, nobody);
-                        (lanes, filled) = ([u32::MAX; 8], 0);
-                    }
-                }
-                if filled > 0 {
-                    self.load_group(problem, lanes, count, patch, nobody);
-                }
-            }
-        }
-        self.colors.push(self.groups.len() as u32);
-    }
-
-    fn load_group(&mut self, problem: &StepProblem, rows: [u32; 8], count: u32, patch: bool, nobody: u32) {
-        let first_point = self.points.len() as u32;
-        let points = count + u32::from(patch);
-        let mut group =
-            Group { body_a: [nobody; 8], body_b: [nobody; 8], rows, first_point, points, ..Group::default() };
-        self.points.resize(self.points.len() + points as usize, [Row8::default(); 12]);
-        self.impulses.resize(self.points.len(), [Row8::default(); 4]);
-        for (lane, &row) in rows.iter().enumerate().filter(|r| *r.1 != u32::MAX) {
-            let c = &problem.contacts[row as usize];
-            (group.body_a[lane], group.body_b[lane]) = (c.body_a, c.body_b);
-            let [nx, ny, nz] = c.normal;
-            let [tx, ty, tz] = c.tangent;
-            let values = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
-            for (wide, value) in group.contact.iter_mut().zip(values) {
-                wide.0[lane] = value;
-            }
-            let from = c.first_point as usize;
-            for k in 0..points as usize {
-                let point: &[f32; 12] = bytemuck::cast_ref::<PointRow, _>(&problem.points[from + k]);
-                for (wide, value) in self.points[first_point as usize + k].iter_mut().zip(point) {
-                    wide.0[lane] = *value;
-                }
-                let impulse: &[f32; 4] = bytemuck::cast_ref(&problem.impulses[from + k]);
-                for (wide, value) in self.impulses[first_point as usize + k].iter_mut().zip(impulse) {
-                    wide.0[lane] = *value;
-                }
-            }
-        }
-        self.groups.push(group);
+        self.groups.load(problem);
     }
 
     fn store(&self, problem: &mut StepProblem) {
         self.store_bodies(problem);
-        for group in &self.groups {
-            for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != u32::MAX) {
-                let to = problem.contacts[row as usize].first_point as usize;
-                for k in 0..group.points as usize {
-                    let wide = &self.impulses[group.first_point as usize + k];
-                    let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
-                    problem.impulses[to + k] = ImpulseRow { normal, tangent_1, tangent_2, peak };
-                }
-            }
-        }
+        self.groups.store(problem);
         for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
             row.linear = impulse.store();
         }
@@ -194,7 +118,7 @@ impl Cpu {
         match pass.kernel {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::ClearImpulses => {
-                for impulse in &mut self.impulses {
+                for impulse in &mut self.groups.impulses {
                     impulse[..3].fill(Row8::default());
                 }
             }
@@ -209,16 +133,17 @@ impl Cpu {
                 let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
                 // Colors of one pass are swept one after another.
                 for color in if skipped { 0..0 } else { pass.colors.clone() } {
-                    let groups = self.colors[color as usize] as usize..self.colors[color as usize + 1] as usize;
+                    let colors = &self.groups.colors;
+                    let groups = colors[color as usize] as usize..colors[color as usize + 1] as usize;
                     let moving = AtomicBool::new(false);
                     let work = ContactWork {
                         kernel: pass.kernel,
                         params: &problem.params,
                         bodies: Shared::new(&mut self.bodies),
                         masses: &self.masses,
-                        groups: &self.groups,
-                        points: &self.points,
-                        impulses: Shared::new(&mut self.impulses),
+                        groups: &self.groups.all,
+                        points: &self.groups.points,
+                        impulses: Shared::new(&mut self.groups.impulses),
                         moving: &moving,
                     };
                     spread(groups, &|range| work.run(self.instructions, range));
@@ -290,10 +215,7 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        // Patches stand in the problem whether a pass asks for them or not.
-        let contacts_and_patches =
-            problem.points.len() - problem.contacts.iter().map(|c| c.point_count as usize).sum::<usize>();
-        self.load(problem, contacts_and_patches > 0);
+        self.load(problem);
         for pass in passes {
             self.run_pass(problem, pass);
         }

@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// A slice whose elements are handed out for writing through a shared reference.
 ///
@@ -34,6 +35,16 @@ impl<'a, T: Copy> Shared<'a, T> {
     pub unsafe fn read(&self, i: usize) -> T {
         assert!(i < self.len);
         unsafe { *self.start.add(i) }
+    }
+
+    /// Some elements, to write in place.
+    ///
+    /// # Safety
+    /// No other thread reads or writes them meanwhile.
+    #[inline(always)]
+    pub unsafe fn slice(&self, range: Range<usize>) -> &'a mut [T] {
+        assert!(range.start <= range.end && range.end <= self.len);
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(range.start), range.len()) }
     }
 
     /// Writes one element.

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
+use super::groups::Group;
 use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
@@ -48,20 +49,6 @@ pub(super) fn load_mass(row: &Row8) -> Mass<f32> {
     Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
 }
 
-/// Eight contacts of one color with as many points each.
-#[derive(Clone, Default)]
-pub(super) struct Group {
-    pub body_a: [u32; 8],
-    pub body_b: [u32; 8],
-    /// Rows of the problem that the lanes hold; `u32::MAX` where there is none.
-    pub rows: [u32; 8],
-    pub contact: [Row8; 10],
-    /// Where its points begin, in `points` and `impulses`.
-    pub first_point: u32,
-    /// Points, the patch included.
-    pub points: u32,
-}
-
 /// An array of eight, without a closure: a closure would be compiled for the plain instruction set.
 macro_rules! eight {
     ($lane:ident => $value:expr) => {
@@ -101,9 +88,6 @@ macro_rules! eight {
         ]
     };
 }
-
-/// Most points of a group, the patch included.
-const MOST_POINTS: usize = 5;
 
 /// Groups that one task takes at least: some ten microseconds of work.
 const TASK_GROUPS: usize = 64;
@@ -252,30 +236,20 @@ impl ContactWork<'_> {
             mass_b: wide_mass::<L>(self.masses, b),
             moving: L::constant(0.0),
         };
-        let contact = wide_contact::<L>(&group.contact);
         let rules = self.kernel.rules().unwrap_or_default();
-        let first = group.first_point as usize;
-        // A patch that the rules do not ask for stays out.
-        let count = group.points as usize;
-        let mut points = [Point::<L>::default(); MOST_POINTS];
-        let mut impulses = [Impulse::<L>::default(); MOST_POINTS];
-        for k in 0..count {
-            points[k] = wide_point(&self.points[first + k]);
-            // SAFETY: the impulses of a group are its own.
-            impulses[k] = wide_impulse(&unsafe { self.impulses.read(first + k) });
-        }
-        let (points, impulses) = (&points[..count], &mut impulses[..count]);
+        let rows = group.first_point as usize..(group.first_point + group.points) as usize;
+        // Used where they lie: copied, they are most of what a sweep moves.
+        // SAFETY: the rows of lanes are `repr(C)` and hold nothing else; the impulses of a group are its own.
+        let (contact, points, impulses) = unsafe {
+            let contact: &[Contact<L>] = as_lanes(std::slice::from_ref(&group.contact));
+            let points: &[Point<L>] = as_lanes(&self.points[rows.clone()]);
+            let impulses: &mut [Impulse<L>] = as_lanes_mut(self.impulses.slice(rows));
+            (&contact[0], points, impulses)
+        };
         match self.kernel {
-            Kernel::WarmStart(_) => warm_start(rules, &mut pair, &contact, points, impulses),
-            Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, &contact, points, impulses),
-            _ => restitute_contact(rules, params, &mut pair, &contact, points, impulses),
-        }
-        if !matches!(self.kernel, Kernel::WarmStart(_)) {
-            for (k, i) in impulses.iter().enumerate() {
-                let row = [i.normal.store(), i.tangent_1.store(), i.tangent_2.store(), i.peak.store()];
-                // SAFETY: as above.
-                unsafe { self.impulses.write(first + k, row) };
-            }
+            Kernel::WarmStart(_) => warm_start(rules, &mut pair, contact, points, impulses),
+            Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, contact, points, impulses),
+            _ => restitute_contact(rules, params, &mut pair, contact, points, impulses),
         }
         self.store_velocities(a, &pair.a, &state_a, &pair.mass_a);
         self.store_velocities(b, &pair.b, &state_b, &pair.mass_b);
@@ -332,46 +306,26 @@ fn wide_mass<L: Lane8>(masses: &[Row8], bodies: [usize; 8]) -> Mass<L> {
     Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
 }
 
+/// Rows of eight as rows of lanes, in the same order.
+///
+/// # Safety
+/// `T` is `repr(C)` and holds `N` lanes and nothing else.
 #[inline(always)]
-fn wide_vec3<L: Lane8>(rows: &[Row8], at: usize) -> Vec3<L> {
-    vec3(L::load(&rows[at]), L::load(&rows[at + 1]), L::load(&rows[at + 2]))
+unsafe fn as_lanes<T, const N: usize>(rows: &[[Row8; N]]) -> &[T] {
+    const { assert!(size_of::<T>() == size_of::<[Row8; N]>() && align_of::<T>() <= align_of::<Row8>()) };
+    // SAFETY: the caller's promise; a lane is eight numbers.
+    unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len()) }
 }
 
+/// The same, to write.
+///
+/// # Safety
+/// As above.
 #[inline(always)]
-fn wide_contact<L: Lane8>(rows: &[Row8; 10]) -> Contact<L> {
-    Contact {
-        normal: wide_vec3(rows, 0),
-        tangent: wide_vec3(rows, 3),
-        friction: L::load(&rows[6]),
-        restitution: L::load(&rows[7]),
-        radius_a: L::load(&rows[8]),
-        radius_b: L::load(&rows[9]),
-    }
-}
-
-/// In the order of the fields of `PointRow`.
-#[inline(always)]
-fn wide_point<L: Lane8>(rows: &[Row8; 12]) -> Point<L> {
-    Point {
-        r_a: wide_vec3(rows, 0),
-        separation: L::load(&rows[3]),
-        r_b: wide_vec3(rows, 4),
-        normal_mass: L::load(&rows[7]),
-        tangent_mass: L::load(&rows[8]),
-        approach_velocity: L::load(&rows[9]),
-        slip_1: L::load(&rows[10]),
-        slip_2: L::load(&rows[11]),
-    }
-}
-
-#[inline(always)]
-fn wide_impulse<L: Lane8>(rows: &[Row8; 4]) -> Impulse<L> {
-    Impulse {
-        normal: L::load(&rows[0]),
-        tangent_1: L::load(&rows[1]),
-        tangent_2: L::load(&rows[2]),
-        peak: L::load(&rows[3]),
-    }
+unsafe fn as_lanes_mut<T, const N: usize>(rows: &mut [[Row8; N]]) -> &mut [T] {
+    const { assert!(size_of::<T>() == size_of::<[Row8; N]>() && align_of::<T>() <= align_of::<Row8>()) };
+    // SAFETY: as above.
+    unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len()) }
 }
 
 /// Once a task, so that closures do no harm.

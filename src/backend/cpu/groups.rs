@@ -1,0 +1,135 @@
+//! Contacts in groups of eight lanes: from the rows of a problem, and back.
+
+#![allow(unsafe_code)]
+
+use super::lane8::Row8;
+use super::shared::Shared;
+use super::sweep::spread;
+use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
+
+/// Eight contacts of one color with as many points each.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Group {
+    pub body_a: [u32; 8],
+    pub body_b: [u32; 8],
+    /// Rows of the problem that the lanes hold; `NO_ROW` where there is none.
+    rows: [u32; 8],
+    pub contact: [Row8; 10],
+    /// Where its points begin, in `points` and `impulses`.
+    pub first_point: u32,
+    /// Points, the patch included.
+    pub points: u32,
+}
+
+const NO_ROW: u32 = u32::MAX;
+
+/// The contacts of a problem, color by color.
+#[derive(Default)]
+pub(super) struct Groups {
+    pub all: Vec<Group>,
+    /// Where the groups of each color begin.
+    pub colors: Vec<u32>,
+    pub points: Vec<[Row8; 12]>,
+    pub impulses: Vec<[Row8; 4]>,
+}
+
+impl Groups {
+    /// Takes over the contacts of a problem.
+    pub fn load(&mut self, problem: &StepProblem) {
+        self.deal(problem);
+        let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
+        self.points.resize(count, [Row8::default(); 12]);
+        self.impulses.resize(count, [Row8::default(); 4]);
+        let (points, impulses) = (Shared::new(&mut self.points), Shared::new(&mut self.impulses));
+        let (len, all) = (self.all.len(), Shared::new(&mut self.all));
+        spread(0..len, &|range| {
+            // SAFETY: tasks have different groups.
+            for group in unsafe { all.slice(range) } {
+                let rows = group.first_point as usize..(group.first_point + group.points) as usize;
+                // SAFETY: groups have different points.
+                let (points, impulses) = unsafe { (points.slice(rows.clone()), impulses.slice(rows)) };
+                group.fill(problem, points, impulses);
+            }
+        });
+    }
+
+    /// Gives the impulses back.
+    pub fn store(&self, problem: &mut StepProblem) {
+        let (contacts, impulses) = (&problem.contacts, Shared::new(&mut problem.impulses));
+        spread(0..self.all.len(), &|range| {
+            for group in &self.all[range] {
+                for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                    let to = contacts[row as usize].first_point as usize;
+                    for k in 0..group.points as usize {
+                        let wide = &self.impulses[group.first_point as usize + k];
+                        let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
+                        // SAFETY: a contact is in one lane of one group, and its impulses are its own.
+                        unsafe { impulses.write(to + k, ImpulseRow { normal, tangent_1, tangent_2, peak }) };
+                    }
+                }
+            }
+        });
+    }
+
+    /// Deals the contacts of each color out to groups by their number of points, in one walk.
+    fn deal(&mut self, problem: &StepProblem) {
+        self.all.clear();
+        self.colors.clear();
+        // Patches stand in the problem whether a pass asks for them or not.
+        let patch = u32::from(problem.has_patches());
+        let mut next_point = 0;
+        for color in problem.contact_colors() {
+            self.colors.push(self.all.len() as u32);
+            let mut open = [[NO_ROW; 8]; 4];
+            let mut filled = [0; 4];
+            let mut close = |rows: &mut [u32; 8], points: u32| {
+                self.all.push(Group { rows: *rows, first_point: next_point, points, ..Group::default() });
+                next_point += points;
+                *rows = [NO_ROW; 8];
+            };
+            for row in problem.rows_of(&(color..color + 1)) {
+                let count = problem.contacts[row].point_count;
+                let (rows, filled) = (&mut open[count as usize - 1], &mut filled[count as usize - 1]);
+                rows[*filled] = row as u32;
+                *filled += 1;
+                if *filled == 8 {
+                    close(rows, count + patch);
+                    *filled = 0;
+                }
+            }
+            for (rows, count) in open.iter_mut().zip(1..).filter(|open| open.0[0] != NO_ROW) {
+                close(rows, count + patch);
+            }
+        }
+        self.colors.push(self.all.len() as u32);
+    }
+}
+
+impl Group {
+    /// Lanes without a contact hold one of nobody with nobody: a body more than the problem has.
+    fn fill(&mut self, problem: &StepProblem, points: &mut [[Row8; 12]], impulses: &mut [[Row8; 4]]) {
+        let nobody = problem.bodies.len() as u32;
+        let nothing = ContactRow { body_a: nobody, body_b: nobody, first_point: NO_ROW, ..ContactRow::default() };
+        let (no_point, no_impulse) = (PointRow::default(), ImpulseRow::default());
+        for lane in 0..8 {
+            let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);
+            (self.body_a[lane], self.body_b[lane]) = (c.body_a, c.body_b);
+            let ([nx, ny, nz], [tx, ty, tz]) = (c.normal, c.tangent);
+            let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
+            set_lane(&mut self.contact, lane, &header);
+            for (k, (point, impulse)) in points.iter_mut().zip(impulses.iter_mut()).enumerate() {
+                let from = c.first_point as usize + k;
+                set_lane(point, lane, bytemuck::cast_ref(problem.points.get(from).unwrap_or(&no_point)));
+                set_lane(impulse, lane, bytemuck::cast_ref(problem.impulses.get(from).unwrap_or(&no_impulse)));
+            }
+        }
+    }
+}
+
+/// Writes one lane of some rows.
+#[inline(always)]
+fn set_lane<const N: usize>(rows: &mut [Row8; N], lane: usize, values: &[f32; N]) {
+    for (row, value) in rows.iter_mut().zip(values) {
+        row.0[lane] = *value;
+    }
+}
