@@ -7,12 +7,12 @@ use std::sync::Mutex;
 
 use box3d_sys::*;
 use drystone::glam::{Mat3, Quat, Vec3};
+use drystone::report::front::{Contender, Setting};
 use drystone::world::{BodyKind, Collider};
-use drystone::{Body, Result, Scene, World};
+use drystone::{Body, Error, Result, Scene, World};
 use rapier3d::parry::shape::{TriMesh, TypedShape};
 
-use crate::Contender;
-use crate::contender::unknown_shape;
+use crate::entrant::setting;
 
 /// Sides of the hull that stands for something round.
 const SIDES: i32 = 32;
@@ -26,7 +26,8 @@ pub(crate) struct Box3d {
     bodies: Vec<b3BodyId>,
     /// What shapes refer to for as long as they are there.
     meshes: Vec<*mut b3MeshData>,
-    substeps: i32,
+    substeps: u32,
+    hertz: f32,
     dt: f32,
     world: World,
 }
@@ -44,7 +45,7 @@ impl Box3d {
             def.contactHertz = hertz;
             def.workerCount = threads as u32;
             let id = b3CreateWorld(&def);
-            Self { id, bodies: Vec::new(), meshes: Vec::new(), substeps: substeps as i32, dt: scene.dt, world }
+            Self { id, bodies: Vec::new(), meshes: Vec::new(), substeps, hertz, dt: scene.dt, world }
         };
         // Half a side of the box for a half-space: twice as far as anything is, and some.
         let reach = 2.0 * new.world.bodies.iter().map(|b| b.position.length()).fold(50.0, f32::max);
@@ -71,7 +72,7 @@ impl Box3d {
             let id = b3CreateBody(self.id, &def);
             self.bodies.push(id);
             for collider in &body.colliders {
-                let shape = || unknown_shape("box3d", index, &collider.shape);
+                let shape = || Error::input(format!("box3d has no shape like {:?} of body {index}", collider.shape));
                 let mesh = add_shape(id, body, collider, reach).ok_or_else(shape)?;
                 self.meshes.extend(mesh);
             }
@@ -193,6 +194,10 @@ fn ring(radius: f32) -> impl Iterator<Item = Vec3> {
 }
 
 impl Contender for Box3d {
+    fn setting(&self) -> Setting {
+        setting("box3d", self.substeps, self.hertz)
+    }
+
     fn step(&mut self) -> Result<()> {
         // SAFETY: world and bodies are there until this is dropped.
         unsafe {
@@ -200,7 +205,7 @@ impl Contender for Box3d {
             for (body, &id) in self.world.bodies.iter().zip(&self.bodies).filter(|(b, _)| b.force != Vec3::ZERO) {
                 b3Body_ApplyForceToCenter(id, vec3(body.force), true);
             }
-            b3World_Step(self.id, self.dt, self.substeps);
+            b3World_Step(self.id, self.dt, self.substeps as i32);
         }
         Ok(())
     }

@@ -1,17 +1,20 @@
 //! `drystone-peers SCENE...`: drystone, Rapier and Box3D on the same scenes, time beside errors.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Parser;
 use comfy_table::{CellAlignment, Table, presets};
+use drystone::report::front::{Row, blocks, race};
 use drystone::{Error, Result, Scene};
-use drystone_peers::{Engine, Race, Row, Setting};
+use drystone_peers::{Engine, Entrant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs scenes with drystone, Rapier and Box3D, each at its defaults and at the settings asked for.
 ///
-/// Time is the median over the steps; of several repetitions, their median and in brackets the least and the greatest.
+/// They step in turns. Time is the median over blocks of 10 steps, in brackets its quartiles; ratio is that to the first row in
+/// the same blocks. Times and overlaps are of the second half of a run.
 #[derive(Parser)]
 #[command(max_term_width = 110)]
 struct Args {
@@ -30,9 +33,6 @@ struct Args {
     /// Threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=32))]
     threads: u16,
-    /// How often everything is run.
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
-    repetitions: u32,
     /// Steps; a scene says how many if this does not.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
@@ -57,20 +57,22 @@ fn parse_frequency(text: &str) -> std::result::Result<Frequency, String> {
 
 impl Args {
     /// Each engine at its defaults, then at what was asked for, each once.
-    fn settings(&self, dt: f32) -> Vec<Setting> {
-        let mut settings: Vec<Setting> = Vec::new();
+    fn entrants(&self, dt: f32) -> Vec<Entrant> {
+        let mut entrants: Vec<Entrant> = Vec::new();
         for &engine in &self.engines {
             let asked = self
                 .substeps
                 .iter()
-                .flat_map(|&substeps| self.frequency.iter().map(move |f| Setting { engine, substeps, frequency: f.0 }));
-            for setting in std::iter::once(Setting::default_of(engine)).chain(asked) {
-                if settings.iter().all(|s| s.label(dt) != setting.label(dt)) {
-                    settings.push(setting);
+                .flat_map(|&substeps| self.frequency.iter().map(move |f| Entrant { engine, substeps, frequency: f.0 }));
+            for entrant in std::iter::once(Entrant::default_of(engine)).chain(asked) {
+                let same =
+                    |e: &Entrant| (e.engine, e.substeps, e.hertz(dt)) == (engine, entrant.substeps, entrant.hertz(dt));
+                if !entrants.iter().any(same) {
+                    entrants.push(entrant);
                 }
             }
         }
-        settings
+        entrants
     }
 
     fn scene(&self, text: &str) -> Result<Scene> {
@@ -89,118 +91,70 @@ impl Args {
     fn run(&self) -> Result<()> {
         let threads = usize::from(self.threads);
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Error::input)?;
+        // Names this run: seconds since 1970.
+        let run = SystemTime::now().duration_since(UNIX_EPOCH).map_err(Error::input)?.as_secs().to_string();
         // Every scene is read before the first is run.
         let scenes = self.scenes.iter().map(|text| self.scene(text)).collect::<Result<Vec<_>>>()?;
-        let mut records = Vec::new();
+        let mut all = Vec::new();
         for scene in &scenes {
-            let settings = self.settings(scene.dt);
-            let race = Race { scene, settings: &settings, threads, repetitions: self.repetitions };
-            let steps = settings.len() as u64 * u64::from(self.repetitions) * u64::from(scene.steps);
-            let bar = ProgressBar::new(steps).with_style(
-                ProgressStyle::with_template("{msg} {bar:40} {percent} %  {eta} left").expect("a fixed template"),
-            );
+            let build = |entrant: Entrant| entrant.build(scene, threads);
+            let mut contenders = self.entrants(scene.dt).into_iter().map(build).collect::<Result<Vec<_>>>()?;
+            let style =
+                ProgressStyle::with_template("{msg} {bar:40} {percent} %  {eta} left").expect("a fixed template");
+            let bar = ProgressBar::new(contenders.len() as u64 * u64::from(blocks(scene.steps))).with_style(style);
             bar.set_message(scene.name.clone());
-            let rows = race.run(|steps| bar.inc(steps.into()))?;
+            let rows = race(scene, &mut contenders, &run, &mut || bar.inc(1))?;
             bar.finish_and_clear();
-            print_table(scene, &rows, self.threads);
-            records.extend(rows.iter().map(|row| record(scene, row, self.threads)));
+            print_table(scene, &rows);
+            all.extend(rows);
         }
         match &self.csv {
-            Some(path) => write_csv(path, &records),
+            Some(path) => write_csv(path, &all),
             None => Ok(()),
         }
     }
 }
 
-fn print_table(scene: &Scene, rows: &[Row], threads: u16) {
-    let bodies = scene.world.dynamic_count();
-    println!("{}: {bodies} dynamic bodies, {} steps, threads {threads}", scene.name, scene.steps);
+fn print_table(scene: &Scene, rows: &[Row]) {
+    let Some(first) = rows.first() else { return };
+    println!("{}: {} dynamic bodies, {} steps, threads {}", scene.name, first.bodies, first.steps, first.threads);
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     table.set_header([
         "",
         "ms a step",
         "",
+        "ratio",
         "deepest mm",
         "mean mm",
         "rms mm/s",
         "drift mm",
         "in place",
         "gap mm",
-        "out",
     ]);
     for row in rows {
-        let ([ms, least, greatest], score) = (row.spread(), row.score);
         let mm = |x: f64| format!("{:.3}", x * 1e3);
         table.add_row([
-            row.setting.label(scene.dt),
-            format!("{ms:.4}"),
-            format!("({least:.4} {greatest:.4})"),
-            mm(score.penetration.max),
-            mm(score.penetration.mean),
-            mm(score.rms_speed),
-            mm(score.drift),
-            format!("{}/{bodies}", score.in_place),
-            mm(score.joint_gap),
-            score.escaped.to_string(),
+            row.setting().label(),
+            format!("{:.4}", row.ms),
+            format!("({:.4} {:.4})", row.ms_low, row.ms_high),
+            format!("{:.2}", row.ratio),
+            mm(row.penetration_max),
+            mm(row.penetration_mean),
+            mm(row.speed_rms),
+            mm(row.drift),
+            row.in_place.map_or_else(String::new, |n| format!("{n}/{}", row.bodies)),
+            row.joint_gap.map_or_else(String::new, mm),
         ]);
     }
     table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     println!("{table}\n");
 }
 
-const COLUMNS: [&str; 18] = [
-    "scene",
-    "engine",
-    "substeps",
-    "contact_hertz",
-    "threads",
-    "bodies",
-    "steps",
-    "repetitions",
-    "ms",
-    "ms_least",
-    "ms_greatest",
-    "penetration_max_m",
-    "penetration_mean_m",
-    "rms_speed_m_s",
-    "drift_m",
-    "in_place",
-    "joint_gap_m",
-    "escaped",
-];
-
-fn record(scene: &Scene, row: &Row, threads: u16) -> Vec<String> {
-    let (setting, score, [ms, least, greatest]) = (row.setting, row.score, row.spread());
-    vec![
-        scene.name.clone(),
-        format!("{:?}", setting.engine).to_lowercase(),
-        setting.substeps.to_string(),
-        setting.hertz(scene.dt).to_string(),
-        threads.to_string(),
-        scene.world.dynamic_count().to_string(),
-        scene.steps.to_string(),
-        row.ms.len().to_string(),
-        ms.to_string(),
-        least.to_string(),
-        greatest.to_string(),
-        score.penetration.max.to_string(),
-        score.penetration.mean.to_string(),
-        score.rms_speed.to_string(),
-        score.drift.to_string(),
-        score.in_place.to_string(),
-        score.joint_gap.to_string(),
-        score.escaped.to_string(),
-    ]
-}
-
 /// Whole or not at all: written next to the file, then moved there.
-fn write_csv(path: &std::path::Path, records: &[Vec<String>]) -> Result<()> {
+fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS).map_err(Error::input)?;
-    for record in records {
-        writer.write_record(record).map_err(Error::input)?;
-    }
+    rows.iter().try_for_each(|row| writer.serialize(row)).map_err(Error::input)?;
     let text = writer.into_inner().map_err(Error::input)?;
     let unfinished = path.with_extension("part");
     std::fs::write(&unfinished, text).map_err(Error::file(&unfinished))?;

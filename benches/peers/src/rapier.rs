@@ -1,10 +1,11 @@
 //! rapier3d, from a drystone world and back.
 
+use drystone::report::front::{Contender, Setting};
 use drystone::world::{BodyKind, MassProperties as Mass};
 use drystone::{Body, Error, Result, Scene, World};
 use rapier3d::prelude::*;
 
-use crate::Contender;
+use crate::entrant::setting;
 
 /// A scene in Rapier's hands.
 pub(crate) struct Rapier {
@@ -79,6 +80,12 @@ fn set_threads(_physics: &mut PhysicsWorld, threads: usize) -> Result<()> {
 }
 
 impl Contender for Rapier {
+    fn setting(&self) -> Setting {
+        let parameters = &self.physics.integration_parameters;
+        let hertz = parameters.contact_softness.natural_frequency;
+        setting("rapier", parameters.num_solver_iterations as u32, hertz)
+    }
+
     fn step(&mut self) -> Result<()> {
         self.physics.step();
         Ok(())

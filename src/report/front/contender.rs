@@ -55,7 +55,10 @@ impl Setting {
             sweeps: config.iterations,
             method: "plain".into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
-            more: String::new(),
+            more: match config.contact_frequency {
+                usual if usual == SolverConfig::default().contact_frequency => String::new(),
+                frequency => format!("frequency {frequency}"),
+            },
         }
     }
 
