@@ -1,6 +1,8 @@
 //! The command line: parse, one library call, print.
 
 mod compare;
+#[cfg(feature = "fclib")]
+mod export;
 mod list;
 mod report;
 mod run;
@@ -32,6 +34,9 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
+    /// Write a contact problem for other solvers.
+    #[cfg(feature = "fclib")]
+    Export(export::ExportArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -142,6 +147,8 @@ pub fn main() -> std::process::ExitCode {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
+        #[cfg(feature = "fclib")]
+        Command::Export(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),
