@@ -52,6 +52,8 @@ pub struct Manifold {
     pub twist_impulse: f32,
     /// Friction impulse on b, with friction per manifold, world axes [N s].
     pub friction_impulse: Vec3,
+    /// How far the springs of its soft contacts are compressed while the surfaces just touch [m].
+    pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
     /// How hard its points are to move, and last their patch; none until that was computed. It stays while the manifold is
@@ -73,6 +75,7 @@ impl Manifold {
             radius_b: 0.0,
             twist_impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            preload: 0.0,
             color: None,
             masses: None,
             points,
@@ -96,6 +99,7 @@ impl Manifold {
         self.color = old.color;
         self.twist_impulse = old.twist_impulse;
         self.friction_impulse = old.friction_impulse;
+        self.preload = old.preload;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {

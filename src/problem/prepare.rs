@@ -28,6 +28,8 @@ pub struct Prepared {
     pub coloring: Coloring,
     /// Whether every manifold has a row for friction of its own.
     pub(super) patches: bool,
+    /// Share of the overlap at rest that this step takes out.
+    pub(super) preload_share: f32,
     joint_edges: Vec<Edge>,
     pub(super) joint_coloring: Coloring,
     /// Impulse of each joint at the end of the step before.
@@ -102,6 +104,7 @@ impl Prepared {
             tolerance: config.tolerance,
             ..Params::default()
         };
+        self.preload_share = 1.0 - 1.0 / (1.0 + config.preload_rate * dt);
         problem.convergence = ConvergenceRow::default();
         problem.colors.clone_from(&self.coloring.offsets);
         problem.first_joint_color = problem.colors.len() as u32;
@@ -189,7 +192,7 @@ impl Prepared {
                 for ((p, kept), (point, impulse)) in
                     manifold.points().iter().zip(kept).zip(points[next..].iter_mut().zip(&mut impulses[next..]))
                 {
-                    *point = prepare_point(row, p, kept, &sides, h, config.friction);
+                    *point = prepare_point(row, p, manifold.preload, kept, &sides, h, config.friction);
                     *impulse = if config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
                 }
                 if patch {
@@ -302,6 +305,7 @@ struct Sides<'a> {
 fn prepare_point(
     row: &ContactRow,
     p: &ManifoldPoint,
+    preload: f32,
     kept: PointMass,
     Sides { bodies: [a, b], masses }: &Sides,
     h: f32,
@@ -324,7 +328,7 @@ fn prepare_point(
     };
     PointRow {
         r_a: r_a.to_array(),
-        separation: p.separation,
+        separation: p.separation - preload,
         r_b: r_b.to_array(),
         normal_mass: kept.normal,
         tangent_mass,

@@ -3,10 +3,14 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
+use super::layout::ContactRow;
 use super::prepare::{CHUNK, Prepared};
 use super::{ImpulseRow, StepProblem};
-use crate::collide::Pair;
+use crate::collide::{Manifold, Pair};
 use crate::world::{BodyKind, World};
+
+/// Most that a manifold is preloaded, relative to the overlap at rest of what it bears.
+const LARGEST_PRELOAD: f32 = 2.0;
 
 impl Prepared {
     /// Writes poses and velocities into the world, and impulses into the manifolds that the rows came from.
@@ -38,6 +42,7 @@ impl Prepared {
                     point.normal_impulse = impulse.normal;
                     point.friction_impulse = friction(impulse);
                 }
+                manifold.preload = preload(manifold, contact, problem, self.preload_share);
                 // With friction per manifold the row after the points is the patch's.
                 if self.patches {
                     manifold.twist_impulse = problem.impulses[end].normal;
@@ -46,4 +51,21 @@ impl Prepared {
             }
         });
     }
+}
+
+/// How much a manifold is preloaded after a step, by the impulses that it bore.
+///
+/// At rest its springs are compressed by what it bears: the overlap of a soft contact. That much, as a mean over the points, its
+/// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are for
+/// everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
+fn preload(manifold: &Manifold, contact: &ContactRow, problem: &StepProblem, share: f32) -> f32 {
+    let moves = |body: u32| problem.masses[body as usize].inv_mass > 0.0;
+    let both = moves(contact.body_a) && moves(contact.body_b);
+    let compliance = if both { problem.params.movable } else { problem.params.fixed }.compliance();
+    let masses = manifold.masses.unwrap_or_default();
+    let points = manifold.points();
+    let sag: f32 = points.iter().zip(masses).map(|(p, m)| p.normal_impulse * compliance / m.normal).sum();
+    let sag = sag / points.len().max(1) as f32;
+    // What is borne no more is not held up either.
+    (manifold.preload + share * (sag - manifold.preload)).min(LARGEST_PRELOAD * sag)
 }
