@@ -17,7 +17,7 @@ pub enum Engine {
 }
 
 /// An engine and the two settings that all three have.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Entrant {
     /// The engine.
     pub engine: Engine,
@@ -26,6 +26,8 @@ pub struct Entrant {
     /// Frequency of the contact spring times the length of a substep; none is the engine's own: 0.125 for drystone, 30 Hz for the
     /// others whatever the substeps. Box3D takes 0.125 for anything above.
     pub frequency: Option<f32>,
+    /// Other settings of drystone, as `key=value`.
+    pub set: Vec<String>,
 }
 
 impl Entrant {
@@ -35,7 +37,7 @@ impl Entrant {
             Engine::Drystone => SolverConfig::default().substeps,
             Engine::Rapier | Engine::Box3d => 4,
         };
-        Self { engine, substeps, frequency: None }
+        Self { engine, substeps, frequency: None, set: Vec::new() }
     }
 
     /// Frequency of the contact spring between two bodies that move [Hz], for steps of `dt` seconds.
@@ -60,6 +62,7 @@ impl Entrant {
             Engine::Drystone => {
                 let mut config = SolverConfig { substeps: self.substeps, ..SolverConfig::default() };
                 config.contact_frequency = self.frequency.unwrap_or(config.contact_frequency);
+                self.set.iter().try_for_each(|assignment| config.set(assignment))?;
                 Box::new(Drystone::new(scene, "cpu", &config)?)
             }
             Engine::Rapier => Box::new(Rapier::new(scene, self.substeps, hertz, threads)?),

@@ -30,6 +30,9 @@ struct Args {
     /// Contact frequencies to run with each of the substeps, times the length of a substep; `own` is what an engine does by itself.
     #[arg(long, value_delimiter = ',', default_value = "0.125", value_parser = parse_frequency)]
     frequency: Vec<Frequency>,
+    /// Settings of drystone, as key=value,key=value; each time this is given adds a row with them.
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    set: Vec<String>,
     /// Threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=32))]
     threads: u16,
@@ -60,14 +63,15 @@ impl Args {
     fn entrants(&self, dt: f32) -> Vec<Entrant> {
         let mut entrants: Vec<Entrant> = Vec::new();
         for &engine in &self.engines {
-            let asked = self
-                .substeps
-                .iter()
-                .flat_map(|&substeps| self.frequency.iter().map(move |f| Entrant { engine, substeps, frequency: f.0 }));
-            for entrant in std::iter::once(Entrant::default_of(engine)).chain(asked) {
-                let same =
-                    |e: &Entrant| (e.engine, e.substeps, e.hertz(dt)) == (engine, entrant.substeps, entrant.hertz(dt));
-                if !entrants.iter().any(same) {
+            let usual = Entrant::default_of(engine);
+            let asked = self.substeps.iter().flat_map(|&substeps| {
+                self.frequency.iter().map(move |f| Entrant { substeps, frequency: f.0, ..Entrant::default_of(engine) })
+            });
+            let set = |text: &String| Entrant { set: text.split(',').map(str::to_owned).collect(), ..usual.clone() };
+            let set = self.set.iter().filter(|_| engine == Engine::Drystone).map(set);
+            for entrant in std::iter::once(usual.clone()).chain(asked).chain(set) {
+                let named = |e: &Entrant| (e.engine, e.substeps, e.hertz(dt).round(), e.set.clone());
+                if entrants.iter().all(|e| named(e) != named(&entrant)) {
                     entrants.push(entrant);
                 }
             }
@@ -90,7 +94,11 @@ impl Args {
 
     fn run(&self) -> Result<()> {
         let threads = usize::from(self.threads);
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Error::input)?;
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .use_current_thread()
+            .build_global()
+            .map_err(Error::input)?;
         // Names this run: seconds since 1970.
         let run = SystemTime::now().duration_since(UNIX_EPOCH).map_err(Error::input)?.as_secs().to_string();
         // Every scene is read before the first is run.

@@ -57,7 +57,7 @@ fn published_overlaps_are_met() {
 fn another_stiffness_gives_another_overlap() {
     let scene = Scene::find("tower", &[]).expect("a scene");
     for engine in [Engine::Rapier, Engine::Box3d] {
-        let stiffer = Entrant { engine, substeps: 8, frequency: Some(0.125) };
+        let stiffer = Entrant { substeps: 8, frequency: Some(0.125), ..Entrant::default_of(engine) };
         let mut contender = stiffer.build(&scene, 1).expect("an engine");
         (0..scene.steps).for_each(|_| contender.step().expect("a step"));
         let deepest = penetration(contender.world()).max * 1e3;
