@@ -25,8 +25,8 @@ fn parsed(source: &str) -> naga::Module {
 mod layouts {
     use super::*;
     use drystone::problem::{
-        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
-        PassColors, PointRow, Softness,
+        BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+        Params, PassColors, PointRow, Softness,
     };
 
     const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
@@ -54,6 +54,7 @@ mod layouts {
     fn in_rust() -> BTreeMap<String, Layout> {
         layouts! {
             Body = BodyRow { v w dp dq }
+            Free = FreeRow { v w }
             Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {

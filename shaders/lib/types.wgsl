@@ -2,6 +2,8 @@
 
 struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
 
+struct Free { v: vec3f, w: vec3f }
+
 struct Mass {
     inv_inertia_x: vec3f, inv_mass: f32,
     inv_inertia_yz: vec3f,

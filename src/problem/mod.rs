@@ -8,7 +8,7 @@ mod store;
 mod weigh;
 
 pub use layout::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
     PassColors, PointRow, Softness,
 };
 pub use prepare::Prepared;
