@@ -19,22 +19,13 @@ pub struct ManifoldPoint {
     /// Distance along the normal now, negative when overlapping [m].
     pub separation: f32,
     /// The same when the manifold was computed.
-    pub(super) computed_separation: f32,
+    pub(crate) computed_separation: f32,
     /// parry's features of a and b; 0 if unknown.
     pub features: u64,
     /// Normal impulse of the last substep [N s].
     pub normal_impulse: f32,
     /// Friction impulse on b of the last substep, world axes [N s].
     pub friction_impulse: Vec3,
-}
-
-/// How hard one point is to move [kg]. Written by `problem`, which knows masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PointMass {
-    /// Along the normal; of a patch, about it [kg m²].
-    pub normal: f32,
-    /// Along the tangents.
-    pub tangent: f32,
 }
 
 /// The contact of two bodies over one pair of convex parts.
@@ -56,9 +47,6 @@ pub struct Manifold {
     pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
-    /// How hard its points are to move, and last their patch; none until that was computed. It stays while the manifold is
-    /// reused, as normal and arms do.
-    pub masses: Option<[PointMass; MAX_POINTS + 1]>,
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
 }
@@ -77,7 +65,6 @@ impl Manifold {
             friction_impulse: Vec3::ZERO,
             preload: 0.0,
             color: None,
-            masses: None,
             points,
             count: count as u8,
         }
