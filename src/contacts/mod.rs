@@ -14,6 +14,7 @@
 mod fclib;
 mod format;
 mod operator;
+mod step;
 
 pub use operator::Operator;
 
