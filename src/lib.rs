@@ -43,6 +43,8 @@ pub mod scenes;
 pub mod simulation;
 pub mod solver;
 pub mod stats;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod world;
 
 pub use backend::Backend;

@@ -2,6 +2,8 @@
 
 mod compare;
 mod list;
+#[cfg(feature = "view")]
+mod render;
 mod report;
 mod run;
 mod solve;
@@ -32,6 +34,9 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
+    /// Draw a scene: one picture, an animation, or every scene of the catalogue.
+    #[cfg(feature = "view")]
+    Render(render::RenderArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -142,6 +147,8 @@ pub fn main() -> std::process::ExitCode {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
+        #[cfg(feature = "view")]
+        Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),
