@@ -34,6 +34,7 @@ pub mod error;
 pub mod graph;
 pub mod kernels;
 pub mod math;
+pub mod maze;
 pub mod metrics;
 pub mod plan;
 pub mod problem;

@@ -2,6 +2,7 @@
 
 mod compare;
 mod list;
+mod play;
 #[cfg(feature = "view")]
 mod render;
 mod report;
@@ -34,6 +35,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
+    /// Play a game.
+    Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
     #[cfg(feature = "view")]
     Render(render::RenderArgs),
@@ -147,6 +150,7 @@ pub fn main() -> std::process::ExitCode {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
+        Command::Play(args) => args.run(),
         #[cfg(feature = "view")]
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
