@@ -33,6 +33,7 @@ pub mod contacts;
 pub mod error;
 pub mod graph;
 pub mod kernels;
+pub mod load;
 pub mod math;
 pub mod maze;
 pub mod metrics;

@@ -8,6 +8,8 @@ use crate::world::{Body, BodyKind, World};
 pub struct Penetration {
     /// Deepest [m].
     pub max: f64,
+    /// Depth that 95 % of the same manifolds do not exceed [m].
+    pub p95: f64,
     /// Mean over the manifolds whose surfaces are within their margin of each other, of each one's deepest point [m].
     pub mean: f64,
 }
@@ -21,11 +23,14 @@ impl Penetration {
                 .map(|p| f64::from(-p.separation))
                 .fold(0.0, |x: f64, y| if y > x || y.is_nan() { y } else { x })
         };
-        let depths: Vec<f64> = pairs.iter().flat_map(|p| &p.manifolds).map(deepest).collect();
-        let max = depths.iter().copied().fold(0.0, |x: f64, y| if y > x || y.is_nan() { y } else { x });
+        let mut depths: Vec<f64> = pairs.iter().flat_map(|p| &p.manifolds).map(deepest).collect();
+        // NaN sorts last, so that it spoils the largest.
+        depths.sort_by(f64::total_cmp);
+        let max = depths.last().copied().unwrap_or(0.0);
+        let p95 = depths.get((depths.len() * 95).div_ceil(100).saturating_sub(1)).copied().unwrap_or(0.0);
         // Not a sum, which is -0 for none.
         let mean = depths.iter().fold(0.0, |total, depth| total + depth) / depths.len().max(1) as f64;
-        Self { max, mean }
+        Self { max, p95, mean }
     }
 }
 
@@ -62,6 +67,19 @@ pub fn half_height(body: &Body) -> f64 {
 pub fn in_place(before: &Body, after: &Body) -> bool {
     let moved = before.center_of_mass().as_dvec3().distance(after.center_of_mass().as_dvec3());
     moved < half_height(before)
+}
+
+/// Largest horizontal distance of a dynamic body's center of mass from where it was `before` [m].
+pub fn drift(before: &World, after: &World) -> f64 {
+    let moved = |(was, is): (&Body, &Body)| (is.center_of_mass() - was.center_of_mass()).as_dvec3();
+    let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);
+    dynamic.map(moved).map(|d| d.x.hypot(d.z)).fold(0.0, |x, y| if y > x || y.is_nan() { y } else { x })
+}
+
+/// Dynamic bodies of `after` that are in place, see [`in_place`].
+pub fn in_place_count(before: &World, after: &World) -> usize {
+    let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);
+    dynamic.filter(|(was, is)| in_place(was, is)).count()
 }
 
 #[cfg(test)]

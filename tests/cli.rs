@@ -68,7 +68,7 @@ fn array<'a>(value: &'a Value, key: &str) -> &'a Vec<Value> {
 fn a_run_reports_on_itself_as_json() {
     let report = Folder::new().json("run pile -p n=27 --steps 40 --json --substeps 3 --set push_limit=2");
     let expected = "scene backend adapter bodies steps dt config step_ms stage_ms manifolds points colors overflow \
-        penetration_max penetration_mean kinetic_energy non_finite first_non_finite";
+        penetration_max penetration_p95 penetration_mean kinetic_energy non_finite first_non_finite";
     let missing: Vec<_> = expected.split_whitespace().filter(|&key| report.get(key).is_none()).collect();
     assert!(missing.is_empty(), "{missing:?} of {:?}", keys(&report));
     assert_eq!((&report["scene"], &report["backend"]), (&"pile".into(), &"cpu".into()));

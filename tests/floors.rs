@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 9] = [
     &["math", "error", "stats"],
     &["world", "config"],
-    &["collide", "graph", "scenes"],
+    &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals"],
     &["backend", "solver"],

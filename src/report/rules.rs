@@ -6,10 +6,10 @@ use std::path::Path;
 use crate::backend::cpu::Reference;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
-use crate::metrics::{Penetration, in_place, rms_speed};
+use crate::metrics::{Penetration, drift, in_place, in_place_count, rms_speed};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
-use crate::world::{Body, BodyKind, Shape, World};
+use crate::world::{Body, Shape, World};
 
 use super::plot::{Axes, Line, svg};
 use glam::{Quat, Vec3};
@@ -95,13 +95,9 @@ fn stand(world: &World, settings_text: &str, seconds: f64) -> Result<Standing> {
             break;
         }
     }
-    let drift = world.bodies.iter().zip(&simulation.world.bodies).map(|(was, is)| {
-        let moved = is.center_of_mass() - was.center_of_mass();
-        f64::from(moved.x.hypot(moved.z))
-    });
     Ok(Standing {
         seconds: time,
-        drift: drift.fold(0.0, f64::max),
+        drift: drift(world, &simulation.world),
         rms_speed: rms_speed(&simulation.world),
         penetration: simulation.penetration().max,
     })
@@ -330,11 +326,6 @@ fn thrown_body(world: &World) -> usize {
 }
 
 /// Dynamic bodies that are still in place.
-fn in_place_count(was: &World, is: &World) -> usize {
-    let both = was.bodies.iter().zip(&is.bodies);
-    both.filter(|(b, _)| b.kind == BodyKind::Dynamic).filter(|(was, is)| in_place(was, is)).count()
-}
-
 fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
     in_place_count(was, is) - usize::from(in_place(&was.bodies[thrown], &is.bodies[thrown]))
 }

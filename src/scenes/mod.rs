@@ -8,6 +8,7 @@ mod drop;
 mod drum;
 mod entries;
 mod file;
+mod hash;
 mod joint;
 mod jointed;
 mod masonry;

@@ -99,12 +99,27 @@ impl Shape {
 
     /// Whether the shape has a finite volume, so that a body with it can have mass from density.
     pub fn has_volume(&self) -> bool {
-        self.0.as_halfspace().is_none() && self.0.as_trimesh().is_none() && self.0.as_heightfield().is_none()
+        !self.is_half_space() && self.0.as_trimesh().is_none() && self.0.as_heightfield().is_none()
+    }
+
+    /// Whether this is a ball.
+    pub fn is_ball(&self) -> bool {
+        self.0.as_ball().is_some()
+    }
+
+    /// Whether this is a half-space.
+    pub fn is_half_space(&self) -> bool {
+        self.0.as_halfspace().is_some()
     }
 
     /// Half extents if this is a cuboid [m].
     pub fn as_cuboid(&self) -> Option<Vec3> {
         self.0.as_cuboid().map(|c| c.half_extents)
+    }
+
+    /// Every number that makes the shape, as text.
+    pub(crate) fn geometry(&self) -> String {
+        format!("{:?}", self.0.as_typed_shape())
     }
 
     /// Radius of the smallest sphere around the shape's own origin that contains it [m]; infinite for a half-space.
@@ -115,7 +130,7 @@ impl Shape {
 
     /// Half of the smallest side of the shape's own bounding box [m]; infinite for a half-space.
     pub fn smallest_half_extent(&self) -> f32 {
-        if self.0.as_halfspace().is_some() {
+        if self.is_half_space() {
             return f32::INFINITY;
         }
         let extents = self.0.compute_local_aabb().half_extents();

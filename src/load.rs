@@ -1,0 +1,259 @@
+//! What bears what: the load on the heaviest interface of a world, and how many substeps keep its overlap small.
+//!
+//! A soft contact at rest overlaps by s = F/(m w²), F the force on one of its points, m the mass that the point feels and
+//! w = 2 pi times the contact frequency, which is tied to the substep (docs/derivation.md, section 5). So the overlap of
+//! whatever stands falls with the square of the substeps, and is known before the first step.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3};
+
+use crate::config::{SolverConfig, Stabilization};
+use crate::error::{Error, Result};
+use crate::world::{Body, BodyKind, World, pose};
+
+/// Most substeps that the settings take.
+const MOST_SUBSTEPS: f64 = 4096.0;
+/// Bodies whose tops are within this of the highest one below bear together, relative to the height of what they bear.
+const LEVEL: f64 = 0.1;
+
+/// The interface that sinks in deepest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// The body that is borne.
+    pub upper: usize,
+    /// The body that bears it.
+    pub lower: usize,
+    /// Force between the two [N].
+    pub force: f64,
+    /// Overlap times the square of w [m/s²]: the force on one point over the mass that the point feels.
+    pub stress: f64,
+}
+
+impl Load {
+    /// The deepest interface of `world` if it stands as it is, or falls straight down; none if no body bears another.
+    ///
+    /// Every body hands on its weight, and what it bears itself, to the bodies below it in proportion to the area by which
+    /// their bounding boxes overlap seen from above. A ball touches in one point, everything else in four corners.
+    pub fn heaviest(world: &World, config: &SolverConfig) -> Option<Self> {
+        let boxes = upright_boxes(world);
+        let grid = Grid::new(&boxes);
+        let gravity = world.gravity.as_dvec3().length();
+        let weight = |b: &Body| f64::from(b.mass.mass) * gravity;
+        let mut borne: Vec<f64> = world.bodies.iter().map(weight).collect();
+        let mut from_the_top: Vec<usize> =
+            (0..boxes.len()).filter(|&i| world.bodies[i].kind == BodyKind::Dynamic && !boxes[i].is_empty()).collect();
+        from_the_top.sort_by(|&i, &j| boxes[j].low.y.total_cmp(&boxes[i].low.y).then(i.cmp(&j)));
+        let mut heaviest: Option<Self> = None;
+        for upper in from_the_top {
+            let below = grid.supports(&boxes, upper);
+            let total: f64 = below.iter().map(|s| s.1).sum();
+            for (lower, area) in below {
+                let force = borne[upper] * area / total;
+                borne[lower] += force;
+                let stress = stress(world, &boxes, upper, lower, force, config);
+                if heaviest.is_none_or(|h| stress > h.stress) {
+                    heaviest = Some(Self { upper, lower, force, stress });
+                }
+            }
+        }
+        heaviest
+    }
+
+    /// Overlap with `substeps` in a step of `dt` seconds [m].
+    pub fn overlap(&self, substeps: u32, dt: f32, config: &SolverConfig) -> f64 {
+        let w = TAU * f64::from(config.contact_frequency) * f64::from(substeps) / f64::from(dt);
+        self.stress / (w * w)
+    }
+
+    /// Fewest substeps of a step of `dt` seconds with which the overlap is at most `most` [m].
+    ///
+    /// # Errors
+    /// There are more than the settings take, or contacts are not soft, so that no law says how deep they get.
+    pub fn substeps(&self, most: f64, dt: f32, config: &SolverConfig) -> Result<u32> {
+        if config.stabilization != Stabilization::Soft {
+            return Err(Error::input("a largest penetration is a promise of soft contacts: set stabilization=soft"));
+        }
+        let substeps = (self.overlap(1, dt, config) / most).sqrt().ceil().max(1.0);
+        if substeps <= MOST_SUBSTEPS {
+            return Ok(substeps as u32);
+        }
+        let (upper, lower, force) = (self.upper, self.lower, self.force);
+        Err(Error::input(format!(
+            "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
+             substeps, more than {MOST_SUBSTEPS}; shorten the step",
+            most * 1e3
+        )))
+    }
+}
+
+/// Force on one point over the mass that it feels, and over the square of what its frequency is multiplied by.
+fn stress(world: &World, boxes: &[Box3], upper: usize, lower: usize, force: f64, config: &SolverConfig) -> f64 {
+    let up = up(world);
+    let overlap = boxes[upper].overlap_from_above(&boxes[lower]);
+    let one_point = [upper, lower].iter().any(|&i| world.bodies[i].colliders.iter().all(|c| c.shape.is_ball()));
+    let at = if one_point { overlap.center() } else { overlap.high };
+    let at = up.transpose() * DVec3::new(at.x, boxes[upper].low.y, at.z);
+    let normal = up.transpose() * DVec3::Y;
+    let inverse_mass: f64 = [upper, lower].iter().map(|&i| inverse_mass_at(&world.bodies[i], at, normal)).sum();
+    let ratio = if world.bodies[lower].kind == BodyKind::Dynamic { 1.0 } else { config.fixed_contact_frequency_ratio };
+    force / if one_point { 1.0 } else { 4.0 } * inverse_mass / f64::from(ratio * ratio)
+}
+
+/// 1/m of a point of a body along `normal` [1/kg].
+fn inverse_mass_at(body: &Body, at: DVec3, normal: DVec3) -> f64 {
+    if body.kind != BodyKind::Dynamic {
+        return 0.0;
+    }
+    let turn = (at - body.center_of_mass().as_dvec3()).cross(normal);
+    let inverse_inertia: DMat3 = body.mass.world_inverse_inertia(body.rotation).as_dmat3();
+    1.0 / f64::from(body.mass.mass) + turn.dot(inverse_inertia * turn)
+}
+
+/// Rotation of the world that turns gravity to -Y.
+fn up(world: &World) -> DMat3 {
+    let up = -world.gravity.as_dvec3().normalize_or(DVec3::NEG_Y);
+    DMat3::from_quat(glam::DQuat::from_rotation_arc(up, DVec3::Y))
+}
+
+/// A box along the axes that [`up`] turns to.
+#[derive(Clone, Copy)]
+struct Box3 {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Box3 {
+    fn is_empty(&self) -> bool {
+        !self.low.cmple(self.high).all()
+    }
+
+    fn center(&self) -> DVec3 {
+        0.5 * (self.low + self.high)
+    }
+
+    fn overlap_from_above(&self, other: &Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
+    }
+}
+
+/// The bounding box of each body; empty without shapes. A half-space is as wide as the world.
+fn upright_boxes(world: &World) -> Vec<Box3> {
+    let turn = up(world).as_mat3();
+    let rotation = glam::Quat::from_mat3(&turn);
+    let empty = Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    let of = |b: &Body| {
+        b.colliders.iter().fold(empty, |all, c| {
+            let at = pose(turn * b.position, rotation * b.rotation) * pose(c.position, c.rotation);
+            let (low, high) = if c.shape.is_half_space() {
+                (DVec3::NEG_INFINITY, DVec3::new(f64::INFINITY, at.translation.y.into(), f64::INFINITY))
+            } else {
+                let aabb = c.shape.0.compute_aabb(&at);
+                (aabb.mins.as_dvec3(), aabb.maxs.as_dvec3())
+            };
+            Box3 { low: all.low.min(low), high: all.high.max(high) }
+        })
+    };
+    world.bodies.iter().map(of).collect()
+}
+
+/// Boxes by the column of square cells, seen from above, in which their centers are.
+struct Grid {
+    cell: f64,
+    columns: HashMap<(i64, i64), Vec<usize>>,
+    /// Those that are wider than a cell.
+    wide: Vec<usize>,
+}
+
+impl Grid {
+    fn new(boxes: &[Box3]) -> Self {
+        let width = |b: &Box3| (b.high.x - b.low.x).max(b.high.z - b.low.z);
+        let mut widths: Vec<f64> = boxes.iter().filter(|b| !b.is_empty()).map(width).collect();
+        widths.sort_by(f64::total_cmp);
+        // Wide enough for most, narrow enough for few to share a column.
+        let cell = 2.0 * widths.get(widths.len() / 2).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+        let mut grid = Self { cell, columns: HashMap::new(), wide: Vec::new() };
+        for (i, b) in boxes.iter().enumerate().filter(|(_, b)| !b.is_empty()) {
+            if width(b) <= cell {
+                grid.columns.entry(grid.column(b.center())).or_default().push(i);
+            } else {
+                grid.wide.push(i);
+            }
+        }
+        grid
+    }
+
+    fn column(&self, at: DVec3) -> (i64, i64) {
+        ((at.x / self.cell).floor() as i64, (at.z / self.cell).floor() as i64)
+    }
+
+    /// The bodies that bear `upper`, with the areas by which they overlap it from above.
+    fn supports(&self, boxes: &[Box3], upper: usize) -> Vec<(usize, f64)> {
+        let above = &boxes[upper];
+        let height = above.high.y - above.low.y;
+        let area = |i: usize| {
+            let shared = above.overlap_from_above(&boxes[i]);
+            (shared.high.x - shared.low.x).max(0.0) * (shared.high.z - shared.low.z).max(0.0)
+        };
+        // A narrow box that overlaps has its center at most a cell further out.
+        let (first, last) = (self.column(above.low - self.cell), self.column(above.high + self.cell));
+        let near = (first.0..=last.0).flat_map(|x| (first.1..=last.1).filter_map(move |z| self.columns.get(&(x, z))));
+        let lower = |i: &usize| *i != upper && boxes[*i].high.y < above.low.y + 0.5 * height;
+        let below: Vec<_> = near.flatten().chain(&self.wide).copied().filter(lower).map(|i| (i, area(i))).collect();
+        let below: Vec<_> = below.into_iter().filter(|s| s.1 > 0.0).collect();
+        let top = below.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
+        below.into_iter().filter(|s| boxes[s.0].high.y >= top - LEVEL * height).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::Scene;
+
+    fn heaviest(scene: &str, parameters: &[&str]) -> (Load, Scene) {
+        let parameters: Vec<String> = parameters.iter().map(|p| p.to_string()).collect();
+        let scene = Scene::find(scene, &parameters).unwrap();
+        (Load::heaviest(&scene.world, &SolverConfig::default()).expect("a load"), scene)
+    }
+
+    #[test]
+    fn the_lowest_pair_of_a_tower_sinks_in_deepest() {
+        let (load, scene) = heaviest("tower", &["n=10"]);
+        assert_eq!((load.upper, load.lower), (2, 1));
+        assert!((load.force - 9.0 * 9810.0).abs() < 1.0);
+        // A corner between two cubes feels an eighth of a cube.
+        assert!((load.stress - load.force / 4.0 / 125.0).abs() < 1e-3 * load.stress);
+        let config = SolverConfig::default();
+        // accuracy of the law: tower of 10 at 30 Hz, 4.97 mm
+        let overlap = load.overlap(4, scene.dt, &config);
+        assert!((overlap - 4.97e-3).abs() < 0.01e-3, "{overlap}");
+        let substeps = load.substeps(1e-3, scene.dt, &config).unwrap();
+        assert!(load.overlap(substeps, scene.dt, &config) <= 1e-3);
+        assert!(load.overlap(substeps - 1, scene.dt, &config) > 1e-3);
+    }
+
+    #[test]
+    fn a_pyramid_hands_its_weight_to_both_sides() {
+        // Its lowest rows bear ten rows' weight over eleven boxes.
+        let (load, _) = heaviest("pyramid", &["base=20"]);
+        let mean = 9810.0 * (19.0 * 20.0 / 2.0) / 20.0;
+        assert!(load.force > 0.4 * mean && load.force < 1.5 * mean, "{load:?}");
+    }
+
+    #[test]
+    fn gravity_may_point_anywhere_and_a_floor_may_be_a_half_space() {
+        let mut world = World::new();
+        world.gravity = glam::Vec3::new(9.81, 0.0, 0.0);
+        world.add(Body::fixed().shape(crate::Shape::half_space(glam::Vec3::NEG_X)));
+        for x in [-0.5, -1.5] {
+            world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 3.0, 0.0));
+        }
+        let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
+        assert_eq!((load.upper, load.lower), (2, 1));
+        assert!((load.force - 9810.0).abs() < 0.1);
+        world.gravity = glam::Vec3::ZERO;
+        assert_eq!(Load::heaviest(&world, &SolverConfig::default()).map(|l| l.force), Some(0.0));
+    }
+}

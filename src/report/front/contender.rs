@@ -1,0 +1,111 @@
+//! What takes part in a race: an engine with its settings.
+
+use serde::{Deserialize, Serialize};
+
+use crate::backend::Backend;
+use crate::backend::cpu::{Cpu, Reference};
+use crate::backend::gpu::{AdapterChoice, Gpu};
+use crate::config::{FrictionRule, SolverConfig};
+use crate::error::{Error, Result};
+use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::world::World;
+
+/// An engine with its settings, stepping one scene.
+pub trait Contender {
+    /// What it is.
+    fn setting(&self) -> Setting;
+
+    /// One step of the scene's length; the only call that is timed.
+    ///
+    /// # Errors
+    /// The engine gave up.
+    fn step(&mut self) -> Result<()>;
+
+    /// The world after the last step: the bodies of the scene in their order, with their poses and velocities.
+    fn world(&mut self) -> &World;
+}
+
+/// An engine and its settings, as text and numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Setting {
+    /// Name of the engine.
+    pub engine: String,
+    /// What it runs on: `reference`, `cpu`, `gpu`.
+    pub backend: String,
+    /// Substeps of a step.
+    pub substeps: u32,
+    /// Sweeps of a substep.
+    pub sweeps: u32,
+    /// What is done with the sweeps.
+    pub method: String,
+    /// Friction rule.
+    pub friction: String,
+    /// What else is not at its default.
+    pub more: String,
+}
+
+impl Setting {
+    /// A point of drystone's own grid.
+    pub fn drystone(backend: &str, config: &SolverConfig) -> Self {
+        Self {
+            engine: "drystone".into(),
+            backend: backend.into(),
+            substeps: config.substeps,
+            sweeps: config.iterations,
+            method: "plain".into(),
+            friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
+            more: String::new(),
+        }
+    }
+
+    /// One line for people.
+    pub fn label(&self) -> String {
+        let Self { engine, backend, substeps, sweeps, method, friction, more } = self;
+        let mut label = format!("{engine} {backend} {substeps}x{sweeps}");
+        for (word, usual) in [(method, "plain"), (friction, "disc"), (more, "")] {
+            if word != usual {
+                label = format!("{label} {word}");
+            }
+        }
+        label
+    }
+}
+
+/// Drystone itself.
+pub struct Drystone {
+    simulation: Simulation,
+    backend: String,
+    dt: f32,
+}
+
+impl Drystone {
+    /// On `reference`, `cpu` or `gpu`.
+    ///
+    /// # Errors
+    /// No such backend, no adapter, or settings that contradict each other.
+    pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
+        let runs: Box<dyn Backend> = match backend {
+            "reference" => Box::new(Reference::<f32>::new()),
+            "cpu" => Box::new(Cpu::new()),
+            "gpu" => Box::new(Gpu::new(AdapterChoice::Best, false)?),
+            other => return Err(Error::input(format!("backend {other:?}: must be reference, cpu or gpu"))),
+        };
+        let simulation = Simulation::new(scene.world.clone(), config.clone(), runs)?;
+        Ok(Self { simulation, backend: backend.into(), dt: scene.dt })
+    }
+}
+
+impl Contender for Drystone {
+    fn setting(&self) -> Setting {
+        Setting::drystone(&self.backend, self.simulation.config())
+    }
+
+    fn step(&mut self) -> Result<()> {
+        self.simulation.step(self.dt).map(drop)
+    }
+
+    fn world(&mut self) -> &World {
+        &self.simulation.world
+    }
+}
