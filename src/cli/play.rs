@@ -61,18 +61,29 @@ impl MazeArgs {
         let map = Map::find(&self.board)?;
         let mut config = SolverConfig::default();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
-        let (backend, _) = choose(self.backend, 1, self.exact)?;
+        let begin = |map, config| Game::new(map, config, choose(self.backend, 1, self.exact)?.0);
         if let Some(path) = &self.script {
             let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
             let script = Script::parse(&path.display().to_string(), &text)?;
-            return self.print(&play(Game::new(map, config, backend)?, &script)?);
+            return self.print(&play(begin(map, config)?, &script)?);
         }
         if let Some(path) = &self.pilot {
-            let script = pilot(Game::new(map, config, backend)?)?;
+            let script = pilot(begin(map, config)?)?;
             write(path, &script.text())?;
             return print(path.display());
         }
-        window(Game::new(map, config, backend)?)
+        self.window(map, config)
+    }
+
+    #[cfg(feature = "view")]
+    fn window(&self, map: Map, config: SolverConfig) -> Result<()> {
+        use crate::view::{Labyrinth, window};
+        window::run(Box::new(Labyrinth::new(map, config, self.backend)?))
+    }
+
+    #[cfg(not(feature = "view"))]
+    fn window(&self, _: Map, _: SolverConfig) -> Result<()> {
+        Err(Error::input("play maze: a window needs a build with `--features view`; --script FILE plays without one"))
     }
 
     fn print(&self, played: &crate::maze::Played) -> Result<()> {
@@ -99,8 +110,4 @@ fn write(path: &Path, text: &str) -> Result<()> {
         let _ = std::fs::remove_file(&hidden);
     }
     written.map_err(Error::file(path))
-}
-
-fn window(_game: Game) -> Result<()> {
-    Err(Error::input("play maze: give --script FILE; a window needs a build with `--features view`"))
 }
