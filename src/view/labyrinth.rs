@@ -1,15 +1,17 @@
 //! The maze game in a window: arrow keys or the mouse tilt the board, a clock runs, R starts again.
 
-use glam::{Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 use winit::keyboard::{Key, NamedKey};
 
 use super::camera::{Bounds, Camera};
+use super::canvas::{Canvas, Picture};
 use super::colors::Rgba;
+use super::renderer::Shot;
 use super::window::{Pointer, Show};
 use crate::backend::{BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::Result;
-use crate::maze::{BALL, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
+use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
 use crate::world::World;
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];
@@ -18,6 +20,42 @@ const WALL_COLOR: Rgba = [150, 98, 58, 255];
 const BALL_COLOR: Rgba = [206, 210, 218, 255];
 /// Steps that a picture waits for at most: a tenth of a second.
 const MOST_STEPS: f32 = 12.0;
+
+/// Color of each body of a game.
+fn colors(world: &World) -> Vec<Rgba> {
+    let mut colors = vec![WALL_COLOR; world.bodies.len()];
+    (colors[BOARD], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
+    colors
+}
+
+/// The board with its rim, however it tilts.
+fn bounds_of(map: &Map) -> Bounds {
+    let half = 0.5 * CELL * Vec3::new(map.columns as f32 + 3.0, 1.0, map.rows as f32 + 3.0);
+    Bounds { low: -half, high: half }
+}
+
+/// As one sits before it.
+fn camera_for(map: &Map, aspect: f32) -> Camera {
+    Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
+}
+
+/// Draws a game that was played, from the poses of its bodies.
+///
+/// # Errors
+/// The device was lost, or what `show` returns.
+pub fn draw_game(
+    canvas: &mut Canvas,
+    map: &Map,
+    world: &World,
+    frames: &[Vec<(Vec3, Quat)>],
+    mut show: impl FnMut(&Picture) -> Result<()>,
+) -> Result<()> {
+    let (colors, camera, bounds) = (colors(world), camera_for(map, canvas.aspect()), bounds_of(map));
+    frames.iter().try_for_each(|poses| {
+        let shot = Shot { poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
+        show(&canvas.draw(&shot)?)
+    })
+}
 
 /// A game on a screen.
 pub struct Labyrinth {
@@ -72,19 +110,15 @@ impl Show for Labyrinth {
     }
 
     fn bounds(&self) -> Bounds {
-        // With its rim, and tilted.
-        let half = 0.5 * CELL * Vec3::new(self.map.columns as f32 + 3.0, 1.0, self.map.rows as f32 + 3.0);
-        Bounds { low: -half, high: half }
+        bounds_of(&self.map)
     }
 
     fn camera(&self, aspect: f32) -> Camera {
-        Camera::framing(&self.bounds(), Vec3::Y, 0.0, 1.1, aspect)
+        camera_for(&self.map, aspect)
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
-        let mut colors = vec![WALL_COLOR; self.world().bodies.len()];
-        (colors[0], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
-        colors
+        colors(self.world())
     }
 
     fn advance(&mut self, seconds: f32) -> Result<()> {

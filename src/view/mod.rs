@@ -27,7 +27,7 @@ pub use camera::{Bounds, Camera};
 pub use canvas::{Canvas, Picture};
 pub use colors::{ColorBy, Rgba, batch_color};
 pub use film::{Film, Frame, Look, evenly};
-pub use labyrinth::Labyrinth;
+pub use labyrinth::{Labyrinth, draw_game};
 pub use live::Live;
 pub use mesh::{Meshes, Poses, poses};
 pub use output::Output;
