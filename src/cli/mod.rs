@@ -4,6 +4,9 @@ mod compare;
 #[cfg(feature = "fclib")]
 mod export;
 mod list;
+mod play;
+#[cfg(feature = "view")]
+mod render;
 mod report;
 mod run;
 mod solve;
@@ -37,6 +40,11 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
+    /// Play a game.
+    Play(play::PlayArgs),
+    /// Draw a scene: one picture, an animation, or every scene of the catalogue.
+    #[cfg(feature = "view")]
+    Render(render::RenderArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -150,6 +158,9 @@ pub fn main() -> std::process::ExitCode {
         Command::Solve(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
+        Command::Play(args) => args.run(),
+        #[cfg(feature = "view")]
+        Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),
