@@ -31,6 +31,7 @@ pub mod compare;
 pub mod config;
 pub mod contacts;
 pub mod error;
+pub mod files;
 pub mod graph;
 pub mod kernels;
 pub mod load;

@@ -1,7 +1,7 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
 use crate::backend::Backend;
-use crate::collide::Detector;
+use crate::collide::{Detector, Pair};
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::graph::ConstraintGraph;
@@ -68,8 +68,7 @@ impl Simulation {
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = self.assemble(dt);
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
-        let pairs = self.detector.pairs_mut();
-        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
+        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
         stats.first_non_finite = self.world.first_non_finite();
@@ -86,14 +85,14 @@ impl Simulation {
     fn assemble(&mut self, dt: f32) -> StepStats {
         let mut stats = StepStats::default();
         let times = &mut stats.times;
-        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt));
-        let pairs = self.detector.pairs_mut();
+        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
+        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt, &give_back));
         timed(&mut times.color, || {
-            self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
+            self.prepared.color(&self.world, &mut self.detector, &mut self.graph, self.config.max_colors);
             self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
-            self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
+            self.prepared.prepare(&self.world, &self.detector, &self.config, dt, &mut self.problem);
             self.plan = StepPlan::new(&self.config, &self.problem);
         });
         stats.pairs = found.pairs;
@@ -111,12 +110,15 @@ impl Simulation {
 
     /// Overlap of the world as it is now, from contacts computed anew.
     pub fn penetration(&mut self) -> Penetration {
-        self.detector.detect_anew(&self.world, &self.config, 0.0);
+        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
+        self.detector.detect_anew(&self.world, &self.config, 0.0, &give_back);
         Penetration::of(self.detector.pairs())
     }
 
     /// Contacts and impulses of the last step.
-    pub fn pairs(&self) -> &[crate::collide::Pair] {
+    pub fn pairs(&mut self) -> &[Pair] {
+        let pairs = self.detector.pairs_mut();
+        pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
         self.detector.pairs()
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules of each floor, the ground floor first.
 const FLOORS: [&[&str]; 9] = [
-    &["math", "error", "stats"],
+    &["math", "error", "files", "stats"],
     &["world", "config"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],

@@ -25,8 +25,8 @@ fn parsed(source: &str) -> naga::Module {
 mod layouts {
     use super::*;
     use drystone::problem::{
-        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
-        PassColors, PointRow, Softness,
+        BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+        Params, PassColors, PointRow, Softness,
     };
 
     const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
@@ -54,10 +54,11 @@ mod layouts {
     fn in_rust() -> BTreeMap<String, Layout> {
         layouts! {
             Body = BodyRow { v w dp dq }
+            Free = FreeRow { v w }
             Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {
-                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b preload
             }
             Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
             Joint = JointRow { r_a body_a r_b body_b gap }

@@ -12,5 +12,7 @@
 @group(0) @binding(9) var<storage, read> joints: array<Joint>;
 @group(0) @binding(10) var<storage, read_write> joint_impulses: array<JointImpulse>;
 @group(0) @binding(11) var<storage, read_write> convergence: Convergence;
+// Stays on the device: every step writes it before it reads it.
+@group(0) @binding(12) var<storage, read_write> free: array<Free>;
 
 const WORKGROUP: u32 = 64u;

@@ -1,6 +1,8 @@
 //! The command line: parse, one library call, print.
 
 mod compare;
+#[cfg(feature = "fclib")]
+mod export;
 mod list;
 mod play;
 #[cfg(feature = "view")]
@@ -43,6 +45,9 @@ enum Command {
     /// Run a scene in a window (in builds with `--features view`).
     #[cfg(not(feature = "view"))]
     View(NotBuilt),
+    /// Write a contact problem for other solvers.
+    #[cfg(feature = "fclib")]
+    Export(export::ExportArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
@@ -142,7 +147,8 @@ impl SceneArgs {
     fn set_threads(&self, unless_told: usize) {
         let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
         // Fails only if it was set before, which nothing does.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
     }
 }
 
@@ -177,6 +183,8 @@ pub fn main() -> std::process::ExitCode {
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
         Command::View(args) => args.run(),
+        #[cfg(feature = "fclib")]
+        Command::Export(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),

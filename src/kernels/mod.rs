@@ -11,7 +11,7 @@ pub mod joint;
 pub mod pair;
 mod rows;
 
-pub use rows::{Body, Contact, Impulse, Inertia, Joint, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+pub use rows::{Body, Contact, Free, Impulse, Inertia, Joint, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
 
 use crate::config::FrictionRule;
 

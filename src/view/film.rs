@@ -145,7 +145,7 @@ pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
 }
 
-/// Around everything in a world that moves, with room around it, and its joints.
+/// Around everything in a world that moves, with room around it, and the points that it hangs from.
 pub fn bounds(world: &World) -> Bounds {
     bounds_at(world, &poses(world))
 }
@@ -156,6 +156,7 @@ fn bounds_at(world: &World, poses: &Poses) -> Bounds {
     let around = moving.map(|(body, &(position, _))| {
         Bounds::around(position, 1.5 * body.colliders.iter().map(reach).fold(0.0, f32::max))
     });
-    let anchors = world.joints.iter().flat_map(|j| world.anchors(j)).map(|a| Bounds::around(a, 0.0));
+    let hung = world.joints.iter().filter(|j| j.body_b.is_none());
+    let anchors = hung.map(|j| Bounds::around(j.anchor_b, 0.0));
     around.chain(anchors).fold(Bounds::EMPTY, Bounds::join)
 }

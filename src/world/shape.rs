@@ -128,6 +128,11 @@ impl Shape {
         sphere.center().length() + sphere.radius()
     }
 
+    /// parry's shape, for those who hand it to another engine.
+    pub fn parry(&self) -> &SharedShape {
+        &self.0
+    }
+
     /// Half of the smallest side of the shape's own bounding box [m]; infinite for a half-space.
     pub fn smallest_half_extent(&self) -> f32 {
         if self.is_half_space() {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::{Body, Contact, Impulse, Inertia, Joint, Mass, Pair, Point, Rules, StepParams};
+use crate::kernels::{Body, Contact, Free, Impulse, Inertia, Joint, Mass, Pair, Point, Rules, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -17,6 +17,7 @@ pub struct Reference<S> {
     params: StepParams<S>,
     bodies: Vec<Body<S>>,
     masses: Vec<Mass<S>>,
+    free: Vec<Free<S>>,
     inertias: Vec<Inertia<S>>,
     contacts: Vec<Contact<S>>,
     points: Vec<Point<S>>,
@@ -40,6 +41,7 @@ impl<S: Scalar> Reference<S> {
         self.params = StepParams::load(&problem.params);
         refill(&problem.bodies, &mut self.bodies, Body::load);
         refill(&problem.masses, &mut self.masses, Mass::load);
+        self.free.resize(problem.bodies.len(), Free::default());
         refill(&problem.inertias, &mut self.inertias, Inertia::load);
         refill(&problem.contacts, &mut self.contacts, Contact::load);
         refill(&problem.points, &mut self.points, Point::load);
@@ -65,15 +67,16 @@ impl<S: Scalar> Reference<S> {
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
         let params = &self.params;
         match pass.kernel {
-            Kernel::IntegrateVelocities => {
-                for (body, mass) in self.bodies.iter_mut().zip(&self.masses) {
-                    integrate_velocities(params, mass, body);
+            Kernel::IntegrateVelocities { carry } => {
+                for ((body, free), mass) in self.bodies.iter_mut().zip(&mut self.free).zip(&self.masses) {
+                    integrate_velocities(carry, params, mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {
                 for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
                     let i = row.body as usize;
-                    integrate_gyroscopic(params, inertia, &mut self.bodies[i], &mut self.masses[i]);
+                    let (body, free) = (&mut self.bodies[i], &mut self.free[i]);
+                    integrate_gyroscopic(params, inertia, body, free, &mut self.masses[i]);
                 }
             }
             Kernel::IntegratePositions => {

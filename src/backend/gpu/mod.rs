@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use super::Backend;
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, PassColors, StepProblem};
+use crate::problem::{ConvergenceRow, FreeRow, PassColors, StepProblem};
 use shader::{BINDINGS, PASS_COLORS, WORKGROUP};
 
 /// Opens the adapter that `choice` finds, for drawing.
@@ -111,6 +111,8 @@ impl Gpu {
             bytemuck::cast_slice(&problem.joints),
             bytemuck::cast_slice(&problem.joint_impulses),
             bytemuck::bytes_of(&problem.convergence),
+            // Not sent: written before it is read.
+            &[],
         ];
         // Refused before anything is sent.
         for (name, bytes) in BINDINGS.iter().zip(rows) {
@@ -127,6 +129,7 @@ impl Gpu {
                 self.queue.write_buffer(buffer, 0, bytes);
             }
         }
+        self.reserve(shader::FREE as usize, (size_of::<FreeRow>() * problem.bodies.len()) as u64, limit);
         Ok(())
     }
 
@@ -329,7 +332,7 @@ fn color_ranges(passes: &[Pass], stride: usize) -> (Vec<u8>, Vec<u32>) {
 /// dispatch, beyond which each thread takes several.
 fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
     let rows = match pass.kernel {
-        Kernel::IntegrateVelocities | Kernel::IntegratePositions => problem.bodies.len(),
+        Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
         Kernel::ClearImpulses => problem.impulses.len(),
         Kernel::BeginSweep { .. } => 1,

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::kernels::Rules;
 use crate::plan::Kernel;
 
-/// Name of each binding, which is also a field of `StepProblem`; the place in this list is its number.
-pub const BINDINGS: [&str; 12] = [
+/// Name of each binding, which is also a field of `StepProblem` but for the last; the place in this list is its number.
+pub const BINDINGS: [&str; 13] = [
     "params",
     "pass_colors",
     "bodies",
@@ -23,6 +23,7 @@ pub const BINDINGS: [&str; 12] = [
     "joints",
     "joint_impulses",
     "convergence",
+    "free",
 ];
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;
@@ -36,6 +37,8 @@ pub const IMPULSES: u32 = 7;
 pub const JOINT_IMPULSES: u32 = 10;
 /// Whether the sweeps still move anything, read back.
 pub const CONVERGENCE: u32 = 11;
+/// Velocities without the impulses of the substep, which stay on the device.
+pub const FREE: u32 = 12;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
@@ -49,7 +52,7 @@ macro_rules! part {
 /// The WGSL of a kernel: the parts it is made of, one after another.
 pub fn source(kernel: Kernel) -> String {
     let own: &[&str] = match kernel {
-        Kernel::IntegrateVelocities => &[part!("integrate_velocities")],
+        Kernel::IntegrateVelocities { .. } => &[part!("integrate_velocities")],
         Kernel::IntegrateGyroscopic => &[part!("integrate_gyroscopic")],
         Kernel::IntegratePositions => &[part!("integrate_positions")],
         Kernel::ClearImpulses => &[part!("clear_impulses")],
@@ -85,6 +88,7 @@ pub fn constants(kernel: Kernel) -> Vec<(&'static str, f64)> {
     };
     let contact = |r: Rules| vec![("ACCUMULATED", yes(r.accumulated)), ("ROUND", yes(r.round))];
     match kernel {
+        Kernel::IntegrateVelocities { carry } => vec![("CARRY", yes(carry))],
         Kernel::BeginSweep { first } => vec![("FIRST", yes(first))],
         Kernel::WarmStartJoints => pair(Rules::default()),
         Kernel::SolveJoints(r) | Kernel::ApplyRestitution(r) => pair(r),
