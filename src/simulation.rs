@@ -117,9 +117,14 @@ impl Simulation {
 
     /// Contacts and impulses of the last step.
     pub fn pairs(&mut self) -> &[Pair] {
+        self.world_and_pairs().1
+    }
+
+    /// The bodies, and contacts and impulses of the last step.
+    pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
         let pairs = self.detector.pairs_mut();
         pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
-        self.detector.pairs()
+        (&self.world, self.detector.pairs())
     }
 
     /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].

@@ -100,7 +100,8 @@ impl RenderArgs {
                 bar.inc(1);
             }
             if kept.binary_search(&(step as usize)).is_ok() {
-                film.add(f64::from(step) * f64::from(dt), &simulation.world, simulation.pairs());
+                let (world, pairs) = simulation.world_and_pairs();
+                film.add(f64::from(step) * f64::from(dt), world, pairs);
             }
         }
         bar.finish_and_clear();

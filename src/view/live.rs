@@ -165,18 +165,18 @@ impl Show for Live {
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
-        let world = &self.simulation.world;
-        let values = self.color.values(world, self.simulation.pairs());
+        let (world, pairs) = self.simulation.world_and_pairs();
+        let values = self.color.values(world, pairs);
         // Follows slowly, so that colors do not flicker.
         let scale = self.color.scale(world, &values);
         self.light_end += 0.05 * (scale - self.light_end);
         self.color.paint(world, &values, self.light_end.max(0.5 * scale))
     }
 
-    fn lines(&self) -> Vec<LineEnd> {
+    fn lines(&mut self) -> Vec<LineEnd> {
         let size = 0.02 * self.bounds.radius();
         let overlay = Overlay { joints: self.overlay.joints || self.grabbed.is_some(), ..self.overlay };
-        lines(&self.simulation, overlay, size)
+        lines(&mut self.simulation, overlay, size)
     }
 
     fn advance(&mut self, seconds: f32) -> Result<()> {

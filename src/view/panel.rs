@@ -28,10 +28,10 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
     });
 }
 
-fn numbers(live: &Live, ui: &mut egui::Ui) {
-    let world = &live.simulation.world;
+fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let StepStats { manifolds, points, colors, .. } = live.stats;
     let depth = Penetration::of(live.simulation.pairs());
+    let world = &live.simulation.world;
     let total: f64 = live.stage_ms.iter().sum();
     egui::Grid::new("numbers").num_columns(2).show(ui, |ui| {
         let mut row = |what: &str, value: String| {

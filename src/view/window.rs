@@ -49,7 +49,7 @@ pub trait Show {
     /// Color of each body.
     fn colors(&mut self) -> Vec<Rgba>;
     /// Lines on top.
-    fn lines(&self) -> Vec<LineEnd> {
+    fn lines(&mut self) -> Vec<LineEnd> {
         Vec::new()
     }
     /// Lets `seconds` of real time pass.
@@ -300,7 +300,8 @@ impl Open {
             _ => return Ok(()),
         };
         let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (poses, colors, lines) = (poses(show.world()), show.colors(), show.lines());
+        let (colors, lines) = (show.colors(), show.lines());
+        let poses = poses(show.world());
         let shot = Shot {
             poses: &poses,
             colors: &colors,
