@@ -36,6 +36,7 @@ pub mod graph;
 pub mod kernels;
 pub mod load;
 pub mod math;
+pub mod maze;
 pub mod metrics;
 pub mod plan;
 pub mod problem;
@@ -45,6 +46,8 @@ pub mod scenes;
 pub mod simulation;
 pub mod solver;
 pub mod stats;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod world;
 
 pub use backend::Backend;

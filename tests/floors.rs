@@ -12,7 +12,7 @@ const FLOORS: [&[&str]; 9] = [
     &["kernels", "plan", "metrics", "residuals"],
     &["backend", "solver"],
     &["simulation"],
-    &["report", "compare"],
+    &["report", "compare", "view", "maze"],
     &["main", "cli"],
 ];
 
