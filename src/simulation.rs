@@ -92,7 +92,10 @@ impl Simulation {
         });
         timed(&mut times.prepare, || {
             self.prepared.prepare(&self.world, &self.detector, &self.config, dt, &mut self.problem);
-            self.plan = StepPlan::new(&self.config, &self.problem);
+            // Where nothing was computed, the plan of the last step is the plan of this one.
+            if found.computed > 0 || found.reshaped || self.plan.passes.is_empty() {
+                self.plan = StepPlan::new(&self.config, &self.problem);
+            }
         });
         stats.pairs = found.pairs;
         stats.computed = found.computed;

@@ -43,6 +43,10 @@ pub struct Detector {
     workspace: BvhWorkspace,
     /// Fattened box of each collider, as the tree has it.
     fat: Vec<Aabb>,
+    /// Box now of each collider that left its fattened one.
+    left: Vec<Option<Aabb>>,
+    /// Colliders whose fattened boxes are new.
+    moved: Vec<u32>,
     pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
@@ -64,6 +68,7 @@ impl Detector {
                 body: body as u32,
                 shape: c.shape.0.clone(),
                 local: Pose::from_parts(c.position, c.rotation),
+                cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
                 size: c.shape.smallest_half_extent(),
                 reach: c.position.length() + bounding,
                 unbounded: c.shape.0.as_halfspace().is_some(),
@@ -81,6 +86,8 @@ impl Detector {
             tree: Bvh::new(),
             workspace: BvhWorkspace::default(),
             fat: Vec::new(),
+            left: Vec::new(),
+            moved: Vec::new(),
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
@@ -168,8 +175,8 @@ impl Detector {
         // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
         let tight = |c: &ColliderInfo| {
             let body = &self.moving[c.body as usize];
-            let pose = Pose::from_parts(body.position, body.rotation) * c.local;
-            let mut aabb = c.shape.compute_aabb(&pose).loosened(margins.speculative * c.size + margins.fall);
+            let pose = Pose::from_parts(body.position, body.rotation);
+            let mut aabb = c.aabb(pose).loosened(margins.speculative * c.size + margins.fall);
             let sweep = body.v * margins.dt;
             aabb.mins += sweep.min(glam::Vec3::ZERO);
             aabb.maxs += sweep.max(glam::Vec3::ZERO);
@@ -182,29 +189,33 @@ impl Detector {
             self.found.clear();
             let found = &mut self.found;
             self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-            self.find_unbounded((0..self.colliders.len() as u32).collect());
+            self.moved.extend(0..self.colliders.len() as u32);
+            self.find_unbounded();
         } else {
             let kinds = &self.kinds;
-            let left = |(i, c): (usize, &ColliderInfo)| {
+            let left = |(c, fat): (&ColliderInfo, &Aabb)| {
                 if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded {
                     return None;
                 }
                 let aabb = tight(c);
-                (!self.fat[i].contains(&aabb) && is_finite(&aabb)).then_some((i as u32, aabb))
+                (!fat.contains(&aabb) && is_finite(&aabb)).then_some(aabb)
             };
-            let moved: Vec<_> = self.colliders.par_iter().enumerate().filter_map(left).collect();
+            let colliders = self.colliders.par_iter().with_min_len(256);
+            colliders.zip(&self.fat).map(left).collect_into_vec(&mut self.left);
             self.found.clear();
-            if !moved.is_empty() {
-                for (i, aabb) in &moved {
-                    let margin = FAT * self.colliders[*i as usize].size;
-                    self.tree.insert_or_update_partially(*aabb, *i, margin);
-                    self.fat[*i as usize] = aabb.loosened(margin);
-                }
+            self.moved.clear();
+            for (i, aabb) in self.left.iter().enumerate().filter_map(|(i, left)| Some((i, left.as_ref()?))) {
+                let margin = FAT * self.colliders[i].size;
+                self.tree.insert_or_update_partially(*aabb, i as u32, margin);
+                self.fat[i] = aabb.loosened(margin);
+                self.moved.push(i as u32);
+            }
+            if !self.moved.is_empty() {
                 self.tree.optimize_incremental(&mut self.workspace);
                 self.tree.refit(&mut self.workspace);
                 let found = &mut self.found;
                 self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-                self.find_unbounded(moved.iter().map(|m| m.0).collect());
+                self.find_unbounded();
                 parted = self.drop_parted();
             }
         }
@@ -213,10 +224,10 @@ impl Detector {
     }
 
     /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
-    fn find_unbounded(&mut self, moved: Vec<u32>) {
+    fn find_unbounded(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         for &plane in &self.unbounded {
-            let near = moved.iter().filter(|&&c| plane != c && self.touches(plane, c));
+            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(plane, c));
             found.extend(near.map(|&c| (plane, c)));
         }
         self.found = found;

@@ -87,6 +87,9 @@ impl Prepared {
 
     /// Gives every joint of the world a color; joints and contacts share none.
     pub fn color_joints(&mut self, world: &World, graph: &mut ConstraintGraph, max_colors: u32) {
+        if self.joint_edges.len() == world.joints.len() {
+            return;
+        }
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
         self.joint_edges.truncate(world.joints.len());
         let fresh = &world.joints[self.joint_edges.len()..];

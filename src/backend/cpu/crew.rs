@@ -51,20 +51,29 @@ const PATIENCE: u32 = 4000;
 impl Crew {
     /// Leads a run in which no pass goes over more than `widest` groups, with the threads of the pool that this thread
     /// belongs to.
-    pub fn lead<R>(widest: usize, lead: impl FnOnce(&Self) -> R) -> R {
+    pub fn lead<R: Send>(widest: usize, lead: impl FnOnce(&Self) -> R + Send) -> R {
         let threads = rayon::current_num_threads();
         if threads == 1 || widest < 2 * CHUNK {
             return lead(&Self::default());
         }
         let crew = Self { helpers: threads - 1, ..Self::default() };
-        rayon::in_place_scope(|scope| {
-            for _ in 0..crew.helpers {
-                scope.spawn(|_| crew.help());
-            }
+        crew.beside_helpers(crew.helpers, || {
             // Helpers leave whether the leader returns or panics.
             let _end = OnDrop(|| crew.over.store(true, Ordering::Release));
             lead(&crew)
         })
+    }
+
+    /// Runs `lead` beside some helpers.
+    fn beside_helpers<R: Send>(&self, helpers: usize, lead: impl FnOnce() -> R + Send) -> R {
+        fn beside<R: Send>(crew: &Crew, helpers: usize, lead: &mut (dyn FnMut() -> R + Send)) -> R {
+            if helpers == 0 {
+                return lead();
+            }
+            rayon::join(|| beside(crew, helpers - 1, lead), || crew.help()).0
+        }
+        let mut lead = Some(lead);
+        beside(self, helpers, &mut || (lead.take().expect("called once"))())
     }
 
     /// Runs `work` over `groups`, cut into chunks if there are enough of them.
