@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::narrow::Motion;
+
 /// Most points that a manifold keeps.
 pub const MAX_POINTS: usize = 4;
 
@@ -43,6 +45,8 @@ pub struct Manifold {
     pub twist_impulse: f32,
     /// Friction impulse on b, with friction per manifold, world axes [N s].
     pub friction_impulse: Vec3,
+    /// How far the springs of its soft contacts are compressed while the surfaces just touch [m].
+    pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
     points: [ManifoldPoint; MAX_POINTS],
@@ -61,6 +65,7 @@ impl Manifold {
             radius_b: 0.0,
             twist_impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            preload: 0.0,
             color: None,
             points,
             count: count as u8,
@@ -70,6 +75,12 @@ impl Manifold {
     /// Its points.
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]
+    }
+
+    /// Separation of one of its points when its bodies moved since it was computed [m].
+    pub fn separation(&self, point: &ManifoldPoint, motion: &Motion) -> f32 {
+        let (core_a, core_b) = (self.normal * self.radius_a, self.normal * self.radius_b);
+        point.computed_separation + motion.along(self.normal, point.r_a - core_a, point.r_b + core_b)
     }
 
     /// Its points, to write impulses and separations into.
@@ -83,6 +94,7 @@ impl Manifold {
         self.color = old.color;
         self.twist_impulse = old.twist_impulse;
         self.friction_impulse = old.friction_impulse;
+        self.preload = old.preload;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {

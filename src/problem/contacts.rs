@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::StepProblem;
 use super::effective::{EffectiveMass, InverseMass};
-use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
+use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow};
 use crate::collide::{Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::world::World;
@@ -32,15 +32,17 @@ pub(super) struct ContactRows {
     points: Vec<PointRow>,
     impulses: Vec<ImpulseRow>,
     computed: Vec<f32>,
+    preloads: Vec<f32>,
 }
 
 impl ContactRows {
     /// Takes the rows of a problem, and gives it memory that it can write new ones to.
-    pub fn exchange(&mut self, problem: &mut StepProblem, computed: &mut Vec<f32>) {
+    pub fn exchange(&mut self, problem: &mut StepProblem, computed: &mut Vec<f32>, preloads: &mut Vec<f32>) {
         std::mem::swap(&mut self.contacts, &mut problem.contacts);
         std::mem::swap(&mut self.points, &mut problem.points);
         std::mem::swap(&mut self.impulses, &mut problem.impulses);
         std::mem::swap(&mut self.computed, computed);
+        std::mem::swap(&mut self.preloads, preloads);
     }
 }
 
@@ -53,6 +55,8 @@ pub(super) struct Chunk<'a> {
     pub impulses: &'a mut [ImpulseRow],
     /// Separation of each point when its manifold was computed.
     pub computed: &'a mut [f32],
+    /// How much each contact is preloaded.
+    pub preloads: &'a mut [f32],
 }
 
 impl Chunk<'_> {
@@ -65,10 +69,18 @@ impl Chunk<'_> {
         let (points_1, points_2) = self.points.split_at_mut(points);
         let (impulses, impulses_2) = self.impulses.split_at_mut(points);
         let (computed, computed_2) = self.computed.split_at_mut(points);
-        let half = |order, contacts, points, impulses, computed| Chunk { order, contacts, points, impulses, computed };
+        let (preloads, preloads_2) = self.preloads.split_at_mut(middle);
+        let half = |order, contacts, points, impulses, computed, preloads| Chunk {
+            order,
+            contacts,
+            points,
+            impulses,
+            computed,
+            preloads,
+        };
         [
-            half(order, contacts, points_1, impulses, computed),
-            half(order_2, contacts_2, points_2, impulses_2, computed_2),
+            half(order, contacts, points_1, impulses, computed, preloads),
+            half(order_2, contacts_2, points_2, impulses_2, computed_2, preloads_2),
         ]
     }
 }
@@ -81,8 +93,9 @@ pub(super) struct Writer<'a> {
     pub world: &'a World,
     pub pairs: &'a [Pair],
     pub config: &'a SolverConfig,
-    /// Length of a substep [s].
-    pub substep: f32,
+    pub params: &'a Params,
+    /// Share of the overlap at rest that is taken out; 0 if the rows of the step before were not solved.
+    pub preload_share: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
     /// Whether anything can bounce, so that the velocity of the approach matters.
@@ -116,7 +129,7 @@ impl Writer<'_> {
         }
         let patch = usize::from(self.patches);
         let mut next = 0;
-        for (row, &contact) in chunk.contacts.iter().zip(chunk.order) {
+        for ((row, &contact), preload) in chunk.contacts.iter().zip(chunk.order).zip(chunk.preloads) {
             let source = &self.sources[contact as usize];
             let pair = &self.pairs[source.pair as usize];
             let own = next..next + source.points as usize + patch;
@@ -124,16 +137,20 @@ impl Writer<'_> {
             let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);
             let computed = &mut chunk.computed[own.clone()];
             if pair.computed_in > self.seen {
-                self.write_points(row, &pair.manifolds[source.manifold as usize], points, impulses, computed);
+                let manifold = &pair.manifolds[source.manifold as usize];
+                *preload = manifold.preload;
+                self.write_points(row, manifold, pair.motion(), points, impulses, computed);
             } else {
                 if let (Some(before), Some(from)) = (self.before, source.row_before) {
+                    *preload = before.preloads[from as usize];
                     let from = before.contacts[from as usize].first_point as usize;
                     let from = from..from + own.len();
                     points.copy_from_slice(&before.points[from.clone()]);
                     impulses.copy_from_slice(&before.impulses[from.clone()]);
                     computed.copy_from_slice(&before.computed[from]);
                 }
-                self.refresh_points(row, pair.motion(), points, impulses, computed);
+                *preload = preload_after(row, *preload, self.preload_share, points, impulses, self.params, self.masses);
+                self.refresh_points(row, *preload, pair.motion(), points, impulses, computed);
             }
         }
     }
@@ -159,6 +176,7 @@ impl Writer<'_> {
         &self,
         row: &ContactRow,
         manifold: &Manifold,
+        motion: &Motion,
         points: &mut [PointRow],
         impulses: &mut [ImpulseRow],
         computed: &mut [f32],
@@ -166,6 +184,7 @@ impl Writer<'_> {
         let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
         let effective = EffectiveMass { inverse: &inverse, row };
         let from = manifold.points();
+        let separation = |p: &ManifoldPoint| manifold.separation(p, motion) - manifold.preload;
         for (((p, point), impulse), computed) in from.iter().zip(&mut *points).zip(&mut *impulses).zip(computed) {
             let tangent_mass = match self.config.friction {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
@@ -174,7 +193,7 @@ impl Writer<'_> {
             *computed = p.computed_separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
-                separation: p.separation,
+                separation: separation(p),
                 r_b: p.r_b.to_array(),
                 normal_mass: effective.normal(p.r_a, p.r_b),
                 tangent_mass,
@@ -195,6 +214,7 @@ impl Writer<'_> {
     fn refresh_points(
         &self,
         row: &ContactRow,
+        preload: f32,
         motion: &Motion,
         points: &mut [PointRow],
         impulses: &mut [ImpulseRow],
@@ -204,7 +224,7 @@ impl Writer<'_> {
         let (core_a, core_b) = (normal * row.radius_a, normal * row.radius_b);
         for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {
             let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
-            point.separation = computed + motion.along(normal, r_a - core_a, r_b + core_b);
+            point.separation = computed + motion.along(normal, r_a - core_a, r_b + core_b) - preload;
             self.approach(row, point);
         }
         for impulse in impulses {
@@ -229,7 +249,7 @@ impl Writer<'_> {
         let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
-            velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
+            velocity_at_impact(u.dot(normal), pull, point.separation, self.params.substep, row.restitution);
         if slips && !self.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
@@ -295,4 +315,34 @@ fn patch_of(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
         tangent_mass: effective.tangent(r_a, r_b),
         ..PointRow::default()
     }
+}
+
+/// Most that a manifold is preloaded, relative to the overlap at rest of what it bears.
+const LARGEST_PRELOAD: f32 = 2.0;
+
+/// How much a manifold is preloaded after a step, by the impulses that it bore; `share` of the way to the overlap at rest.
+///
+/// At rest its springs are compressed by what it bears: the overlap of a soft contact. That much, as a mean over the points, its
+/// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are for
+/// everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
+pub(super) fn preload_after(
+    row: &ContactRow,
+    preload: f32,
+    share: f32,
+    points: &[PointRow],
+    impulses: &[ImpulseRow],
+    params: &Params,
+    masses: &[MassRow],
+) -> f32 {
+    if share == 0.0 {
+        return preload;
+    }
+    let moves = |body: u32| masses[body as usize].inv_mass > 0.0;
+    let both = moves(row.body_a) && moves(row.body_b);
+    let compliance = if both { params.movable } else { params.fixed }.compliance();
+    let count = row.point_count as usize;
+    let sag = |(p, i): (&PointRow, &ImpulseRow)| i.normal * compliance / p.normal_mass;
+    let sag = points[..count].iter().zip(impulses).map(sag).sum::<f32>() / count.max(1) as f32;
+    // What is borne no more is not held up either.
+    (preload + share * (sag - preload)).min(LARGEST_PRELOAD * sag)
 }

@@ -221,6 +221,11 @@ impl Softness {
     pub fn rigid(bias_rate: f32, push_limit: f32) -> Self {
         Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
     }
+
+    /// Overlap at rest per impulse of a substep, times the effective mass [s]; 0 of a rigid constraint.
+    pub fn compliance(&self) -> f32 {
+        if self.impulse_scale > 0.0 { self.impulse_scale / (self.mass_scale * self.bias_rate) } else { 0.0 }
+    }
 }
 
 /// What is the same for every body and contact of a step, 96 B.

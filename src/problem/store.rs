@@ -3,6 +3,7 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
+use super::contacts::preload_after;
 use super::prepare::Prepared;
 use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
@@ -24,6 +25,7 @@ impl Prepared {
         for (&i, row) in self.joint_coloring.order.iter().zip(&problem.joint_impulses) {
             self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
         }
+        self.solved = true;
     }
 
     /// Brings colors, separations and impulses of the rows of `problem` to the manifolds of a pair, unless they were computed
@@ -32,16 +34,23 @@ impl Prepared {
         if pair.computed_in > self.seen {
             return;
         }
+        let motion = *pair.motion();
         for (k, manifold) in pair.manifolds.iter_mut().enumerate() {
             let at = pair.contact as usize + k;
-            let contact = &problem.contacts[self.row_of[at] as usize];
+            let row = self.row_of[at] as usize;
+            let contact = &problem.contacts[row];
             let (tangent_1, tangent_2) = contact.tangents();
             let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
             manifold.color = self.edges[at].color;
             let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
-            let rows = problem.points[first..end].iter().zip(&problem.impulses[first..end]);
-            for (point, (row, impulse)) in manifold.points_mut().iter_mut().zip(rows) {
-                point.separation = row.separation;
+            let (points, impulses) = (&problem.points[first..end], &problem.impulses[first..end]);
+            let share = if self.solved { self.preload_share } else { 0.0 };
+            let (params, masses) = (&problem.params, &problem.masses);
+            manifold.preload = preload_after(contact, self.preloads[row], share, points, impulses, params, masses);
+            for (k, impulse) in impulses.iter().enumerate() {
+                let separation = manifold.separation(&manifold.points()[k], &motion);
+                let point = &mut manifold.points_mut()[k];
+                point.separation = separation;
                 point.normal_impulse = impulse.normal;
                 point.friction_impulse = friction(impulse);
             }

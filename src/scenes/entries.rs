@@ -109,7 +109,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 36 mm deep, or 2 with substeps=32",
+        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 1.5 mm deep, or 0.01 with substeps=32",
         parameters: &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
