@@ -42,6 +42,7 @@ pub mod report;
 pub mod residuals;
 pub mod scenes;
 pub mod simulation;
+pub mod sleep;
 pub mod solver;
 pub mod stats;
 pub mod world;

@@ -22,6 +22,17 @@ use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, World};
 use narrow::{ColliderInfo, Margins, Moving, Scratch, Update};
 
+/// What a body is to the detection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activity {
+    /// Does not move, and nothing is solved for it.
+    Still,
+    /// Moves by itself: cannot be pushed, but may wake what it touches.
+    Moving,
+    /// Can be pushed.
+    Awake,
+}
+
 /// What one detection did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DetectStats {
@@ -114,12 +125,14 @@ impl Detector {
 
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
     /// their pairs know how the bodies moved since. A manifold that is computed anew inherits the impulses of the old one,
-    /// which `give_back` fetches from where the last step left them.
+    /// which `give_back` fetches from where the last step left them. Pairs of bodies that are still keep what they have, and take
+    /// no part in the step; without `activity` all take part.
     pub fn detect(
         &mut self,
         world: &World,
         config: &SolverConfig,
         dt: f32,
+        activity: &[Activity],
         give_back: &(dyn Fn(&mut Pair) + Sync),
     ) -> DetectStats {
         let moving = |b: &Body| Moving {
@@ -138,8 +151,8 @@ impl Detector {
             dt,
             detection: self.detections,
         };
-        let parted = self.broad_phase(margins);
-        let mut stats = self.narrow_phase(margins, give_back);
+        let parted = self.broad_phase(margins, activity);
+        let mut stats = self.narrow_phase(margins, activity, give_back);
         stats.reshaped |= parted;
         if stats.reshaped {
             self.reshaped_in = self.detections;
@@ -166,11 +179,11 @@ impl Detector {
         give_back: &(dyn Fn(&mut Pair) + Sync),
     ) -> DetectStats {
         self.pairs.iter_mut().for_each(Pair::invalidate);
-        self.detect(world, config, dt, give_back)
+        self.detect(world, config, dt, &[], give_back)
     }
 
     /// Finds new pairs and ends parted ones; returns whether it ended any.
-    fn broad_phase(&mut self, margins: Margins) -> bool {
+    fn broad_phase(&mut self, margins: Margins, activity: &[Activity]) -> bool {
         let mut parted = false;
         // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
         let tight = |c: &ColliderInfo| {
@@ -194,7 +207,8 @@ impl Detector {
         } else {
             let kinds = &self.kinds;
             let left = |(c, fat): (&ColliderInfo, &Aabb)| {
-                if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded {
+                let still = activity.get(c.body as usize) == Some(&Activity::Still);
+                if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
                     return None;
                 }
                 let aabb = tight(c);
@@ -291,11 +305,34 @@ impl Detector {
         }
     }
 
-    fn narrow_phase(&mut self, margins: Margins, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+    fn narrow_phase(
+        &mut self,
+        margins: Margins,
+        activity: &[Activity],
+        give_back: &(dyn Fn(&mut Pair) + Sync),
+    ) -> DetectStats {
         let (colliders, moving) = (&self.colliders, &self.moving);
         let update = |scratch: &mut Scratch, pair: &mut Pair| {
             let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
-            let update = pair.update(colliders, a, b, margins, scratch, give_back);
+            let of = |body: u32| activity.get(body as usize).copied().unwrap_or(Activity::Awake);
+            let both = [of(pair.body_a), of(pair.body_b)];
+            // What a pair has belongs to its manifolds while it takes no part, and to their rows while it does.
+            let takes_part = both.contains(&Activity::Awake);
+            let changes = pair.rests == takes_part;
+            if changes && !takes_part {
+                give_back(pair);
+            }
+            let mut update = Update::Reused;
+            if both != [Activity::Still; 2] {
+                update = pair.update(colliders, a, b, margins, scratch, give_back);
+            }
+            if changes && takes_part {
+                pair.computed_in = margins.detection;
+            }
+            pair.rests = !takes_part;
+            if changes && !pair.manifolds.is_empty() {
+                update = Update::Reshaped;
+            }
             (usize::from(update != Update::Reused), update == Update::Reshaped)
         };
         let both = |x: (usize, bool), y: (usize, bool)| (x.0 + y.0, x.1 | y.1);

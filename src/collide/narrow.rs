@@ -63,6 +63,8 @@ pub struct Pair {
     motion: Motion,
     /// The detection, counted from 1, that computed the manifolds; 0 if none did.
     pub(crate) computed_in: u64,
+    /// Whether it takes no part in steps, so that its manifolds have no rows.
+    pub(crate) rests: bool,
     /// Where the first of the manifolds stands among the contacts that were last prepared. Written by `problem`.
     pub(crate) contact: u32,
 }
@@ -167,6 +169,7 @@ impl Pair {
             computed_at: None,
             motion: Motion::default(),
             computed_in: 0,
+            rests: false,
             contact: 0,
         }
     }
