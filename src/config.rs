@@ -156,8 +156,8 @@ pub struct SolverConfig {
     /// Bodies that touch or are joined fall asleep together once all of them were slower than `sleep_speed` for this long [s];
     /// 0 lets nothing sleep. Asleep they cost next to nothing and stay to the last bit, until something disturbs them.
     pub sleep_after: f32,
-    /// Speed of the fastest point of a body under which it is slow [m/s]. What `preload_rate` still has to take out is by
-    /// then a millimeter at most.
+    /// Speed of the fastest point of a body under which it is slow [m/s]. A pile of 5,000 falls asleep 7 s after it came to rest,
+    /// with a mean overlap of 0.166 mm where it has 0.161 awake; at 5 mm/s a few that rattle keep it awake.
     pub sleep_speed: f32,
     /// Colors smaller than this are swept one after another in one workgroup instead of one dispatch each.
     pub fuse_colors_below: u32,
@@ -195,7 +195,7 @@ impl Default for SolverConfig {
             speculative_margin: 0.04,
             recycle_distance: 0.02,
             sleep_after: 0.0,
-            sleep_speed: 1e-3,
+            sleep_speed: 1e-2,
             fuse_colors_below: 256,
             max_colors: 64,
         }

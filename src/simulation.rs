@@ -71,11 +71,13 @@ impl Simulation {
     /// # Errors
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
-        self.sleep.before_step(&self.world, self.detector.pairs());
+        let mut stats = StepStats::default();
+        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
         if self.sleep.is_everything_still() {
-            return Ok(StepStats { asleep: self.sleep.count(), ..StepStats::default() });
+            stats.asleep = self.sleep.count();
+            return Ok(stats);
         }
-        let mut stats = self.assemble(dt);
+        self.assemble(dt, &mut stats);
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
         timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
@@ -91,13 +93,12 @@ impl Simulation {
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
         self.sleep.before_step(&self.world, self.detector.pairs());
-        self.assemble(dt);
+        self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
     }
 
     /// Detects, colors, prepares and plans.
-    fn assemble(&mut self, dt: f32) -> StepStats {
-        let mut stats = StepStats::default();
+    fn assemble(&mut self, dt: f32, stats: &mut StepStats) {
         let times = &mut stats.times;
         let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
         let found = timed(&mut times.detect, || {
@@ -142,7 +143,6 @@ impl Simulation {
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.plan.bytes_moved(&self.problem);
         stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
-        stats
     }
 
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`].

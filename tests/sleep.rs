@@ -199,7 +199,7 @@ fn a_pile_that_sleeps_and_is_hit_gives_the_same_bits_for_any_number_of_threads()
         pool.install(|| {
             let mut world = Scene::find("pile", &["n=100".into()]).expect("the scene").world;
             let thrown = world.add(cube(0.0, 300.0));
-            let mut simulation = simulation(world, SolverConfig { sleep_speed: 0.01, ..sleepy() });
+            let mut simulation = simulation(world, sleepy());
             let sleeping = run(&mut simulation, 360).asleep;
             assert!(sleeping >= 90, "{sleeping} sleep");
             let body = &mut simulation.world.bodies[thrown];
