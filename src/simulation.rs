@@ -110,7 +110,7 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
         }
-        self.assemble(dt);
+        self.next_problem(dt);
         let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
         let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
         let mut problem = self.problem.clone();
