@@ -80,14 +80,7 @@ impl Args {
     }
 
     fn scene(&self, text: &str) -> Result<Scene> {
-        let known = |name: &str| drystone::scenes::CATALOGUE.iter().any(|e| e.name == name);
-        let mut scene = match text.split_once(':') {
-            Some((name, parameters)) if known(name) => {
-                Scene::find(name, &parameters.split(',').map(str::to_owned).collect::<Vec<_>>())?
-            }
-            _ => Scene::find(text, &[])?,
-        };
-        scene.name = text.to_owned();
+        let mut scene = Scene::named(text)?;
         scene.steps = self.steps.unwrap_or(scene.steps);
         Ok(scene)
     }

@@ -26,6 +26,18 @@ pub trait Contender {
     fn world(&mut self) -> &World;
 }
 
+/// Who takes part in a scene, with each of their settings.
+pub type Team<'a> = dyn Fn(&Scene, Extent) -> Result<Vec<Box<dyn Contender>>> + 'a;
+
+/// How much is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// The main settings.
+    Quick,
+    /// All of them.
+    Full,
+}
+
 /// An engine and its settings, as text and numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Setting {
@@ -53,7 +65,7 @@ impl Setting {
             backend: backend.into(),
             substeps: config.substeps,
             sweeps: config.iterations,
-            method: "plain".into(),
+            method: table(config).get("method").and_then(|m| m.as_str()).unwrap_or("plain").into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
             more: unusual(config).join(" "),
         }
@@ -72,11 +84,15 @@ impl Setting {
     }
 }
 
-/// Settings that are not at their defaults, as `key=value`, those of [`Setting`] left out.
+fn table(config: &SolverConfig) -> toml::Table {
+    toml::Table::try_from(config).expect("a config is a table")
+}
+
+/// Settings that are not at their defaults, as `key=value`, those of [`Setting`] left out; as many relax sweeps as biased ones are
+/// what is expected.
 fn unusual(config: &SolverConfig) -> Vec<String> {
-    let table = |config: &SolverConfig| toml::Table::try_from(config).expect("a config is a table");
-    let usual = table(&SolverConfig::default());
-    let said = ["substeps", "iterations", "friction"];
+    let usual = table(&SolverConfig { relax: config.iterations, ..SolverConfig::default() });
+    let said = ["substeps", "iterations", "method", "friction"];
     let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
     table(config).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
 }
@@ -130,5 +146,7 @@ mod tests {
         config.set("contact_frequency=0.25").unwrap();
         config.set("relax=2").unwrap();
         assert_eq!(Setting::drystone("cpu", &config).more, "contact_frequency=0.25 relax=2");
+        config.set("iterations=2").unwrap();
+        assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x2 box contact_frequency=0.25");
     }
 }
