@@ -31,10 +31,12 @@ pub mod compare;
 pub mod config;
 pub mod contacts;
 pub mod error;
+pub mod files;
 pub mod graph;
 pub mod kernels;
 pub mod load;
 pub mod math;
+pub mod maze;
 pub mod metrics;
 pub mod plan;
 pub mod problem;
@@ -45,6 +47,8 @@ pub mod simulation;
 pub mod sleep;
 pub mod solver;
 pub mod stats;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod world;
 
 pub use backend::Backend;

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, Velocity};
+use super::{ContactProblem, Velocity, inverse};
 
 /// A problem with the inverse of its masses.
 #[derive(Clone, Debug)]
@@ -15,11 +15,6 @@ pub struct Operator<'a> {
 impl<'a> Operator<'a> {
     /// Of a problem.
     pub fn new(problem: &'a ContactProblem) -> Self {
-        // Scaled to order 1, so that the determinant of a small body's inertia does not vanish.
-        let inverse = |i: DMat3| {
-            let scale = 3.0 / (i.x_axis.x + i.y_axis.y + i.z_axis.z);
-            (i * scale).inverse() * scale
-        };
         Self { problem, inverse_inertia: problem.bodies.iter().map(|b| inverse(b.inertia)).collect() }
     }
 

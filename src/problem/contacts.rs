@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::StepProblem;
 use super::effective::{EffectiveMass, InverseMass};
-use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow};
+use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::world::World;
@@ -32,17 +32,15 @@ pub(super) struct ContactRows {
     points: Vec<PointRow>,
     impulses: Vec<ImpulseRow>,
     computed: Vec<f32>,
-    preloads: Vec<f32>,
 }
 
 impl ContactRows {
     /// Takes the rows of a problem, and gives it memory that it can write new ones to.
-    pub fn exchange(&mut self, problem: &mut StepProblem, computed: &mut Vec<f32>, preloads: &mut Vec<f32>) {
+    pub fn exchange(&mut self, problem: &mut StepProblem, computed: &mut Vec<f32>) {
         std::mem::swap(&mut self.contacts, &mut problem.contacts);
         std::mem::swap(&mut self.points, &mut problem.points);
         std::mem::swap(&mut self.impulses, &mut problem.impulses);
         std::mem::swap(&mut self.computed, computed);
-        std::mem::swap(&mut self.preloads, preloads);
     }
 }
 
@@ -55,8 +53,6 @@ pub(super) struct Chunk<'a> {
     pub impulses: &'a mut [ImpulseRow],
     /// Separation of each point when its manifold was computed.
     pub computed: &'a mut [f32],
-    /// How much each contact is preloaded.
-    pub preloads: &'a mut [f32],
 }
 
 impl Chunk<'_> {
@@ -69,18 +65,10 @@ impl Chunk<'_> {
         let (points_1, points_2) = self.points.split_at_mut(points);
         let (impulses, impulses_2) = self.impulses.split_at_mut(points);
         let (computed, computed_2) = self.computed.split_at_mut(points);
-        let (preloads, preloads_2) = self.preloads.split_at_mut(middle);
-        let half = |order, contacts, points, impulses, computed, preloads| Chunk {
-            order,
-            contacts,
-            points,
-            impulses,
-            computed,
-            preloads,
-        };
+        let half = |order, contacts, points, impulses, computed| Chunk { order, contacts, points, impulses, computed };
         [
-            half(order, contacts, points_1, impulses, computed, preloads),
-            half(order_2, contacts_2, points_2, impulses_2, computed_2, preloads_2),
+            half(order, contacts, points_1, impulses, computed),
+            half(order_2, contacts_2, points_2, impulses_2, computed_2),
         ]
     }
 }
@@ -88,16 +76,24 @@ impl Chunk<'_> {
 /// Contacts that one task writes at most.
 const CHUNK: usize = 256;
 
+/// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
+const LARGEST_PRELOAD: f32 = 2.0;
+
 /// What the rows of contacts are written from.
 pub(super) struct Writer<'a> {
     pub world: &'a World,
     pub pairs: &'a [Pair],
     pub config: &'a SolverConfig,
-    pub params: &'a Params,
-    /// Share of the overlap at rest that is taken out; 0 if the rows of the step before were not solved.
-    pub preload_share: f32,
+    /// Length of a substep [s].
+    pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
+    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move [s].
+    pub movable_compliance: f32,
+    /// The same of contacts with bodies that cannot [s].
+    pub fixed_compliance: f32,
+    /// Share of what is missing that preloads gain in this step.
+    pub preload_share: f32,
     /// Whether anything can bounce, so that the velocity of the approach matters.
     pub bounces: bool,
     /// Whether a patch follows the points of every contact.
@@ -129,7 +125,7 @@ impl Writer<'_> {
         }
         let patch = usize::from(self.patches);
         let mut next = 0;
-        for ((row, &contact), preload) in chunk.contacts.iter().zip(chunk.order).zip(chunk.preloads) {
+        for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
             let pair = &self.pairs[source.pair as usize];
             let own = next..next + source.points as usize + patch;
@@ -138,20 +134,23 @@ impl Writer<'_> {
             let computed = &mut chunk.computed[own.clone()];
             if pair.computed_in > self.seen {
                 let manifold = &pair.manifolds[source.manifold as usize];
-                *preload = manifold.preload;
                 self.write_points(row, manifold, pair.motion(), points, impulses, computed);
             } else {
                 if let (Some(before), Some(from)) = (self.before, source.row_before) {
-                    *preload = before.preloads[from as usize];
                     let from = before.contacts[from as usize].first_point as usize;
                     let from = from..from + own.len();
                     points.copy_from_slice(&before.points[from.clone()]);
                     impulses.copy_from_slice(&before.impulses[from.clone()]);
                     computed.copy_from_slice(&before.computed[from]);
                 }
-                *preload = preload_after(row, *preload, self.preload_share, points, impulses, self.params, self.masses);
-                self.refresh_points(row, *preload, pair.motion(), points, impulses, computed);
+                self.refresh_points(row, pair.motion(), points, computed);
             }
+            row.preload = self.preload(row, points, impulses);
+            points[..row.point_count as usize].iter_mut().for_each(|point| point.separation -= row.preload);
+            let warm_start = self.config.warm_start;
+            impulses
+                .iter_mut()
+                .for_each(|i| *i = if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() });
         }
     }
 
@@ -167,6 +166,7 @@ impl Writer<'_> {
             point_count: row.point_count,
             radius_a: manifold.radius_a,
             radius_b: manifold.radius_b,
+            preload: manifold.preload,
             ..ContactRow::framed(manifold.normal)
         };
     }
@@ -184,7 +184,6 @@ impl Writer<'_> {
         let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
         let effective = EffectiveMass { inverse: &inverse, row };
         let from = manifold.points();
-        let separation = |p: &ManifoldPoint| manifold.separation(p, motion) - manifold.preload;
         for (((p, point), impulse), computed) in from.iter().zip(&mut *points).zip(&mut *impulses).zip(computed) {
             let tangent_mass = match self.config.friction {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
@@ -193,44 +192,47 @@ impl Writer<'_> {
             *computed = p.computed_separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
-                separation: separation(p),
+                separation: manifold.separation(p, motion),
                 r_b: p.r_b.to_array(),
                 normal_mass: effective.normal(p.r_a, p.r_b),
                 tangent_mass,
                 ..PointRow::default()
             };
             self.approach(row, point);
-            *impulse = if self.config.warm_start { carried_over(row, p) } else { ImpulseRow::default() };
+            *impulse = carried_over(row, p);
         }
         if self.patches {
             let (points, patch) = points.split_at_mut(from.len());
             patch[0] = patch_of(&effective, points);
-            let warm_start = self.config.warm_start;
-            impulses[from.len()] = if warm_start { carried_over_patch(row, manifold) } else { ImpulseRow::default() };
+            impulses[from.len()] = carried_over_patch(row, manifold);
         }
     }
 
     /// Brings the rows of a manifold that is reused to where the bodies are.
-    fn refresh_points(
-        &self,
-        row: &ContactRow,
-        preload: f32,
-        motion: &Motion,
-        points: &mut [PointRow],
-        impulses: &mut [ImpulseRow],
-        computed: &[f32],
-    ) {
+    fn refresh_points(&self, row: &ContactRow, motion: &Motion, points: &mut [PointRow], computed: &[f32]) {
         let normal = Vec3::from_array(row.normal);
         let (core_a, core_b) = (normal * row.radius_a, normal * row.radius_b);
         for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {
             let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
-            point.separation = computed + motion.along(normal, r_a - core_a, r_b + core_b) - preload;
+            point.separation = computed + motion.along(normal, r_a - core_a, r_b + core_b);
             self.approach(row, point);
         }
-        for impulse in impulses {
-            *impulse =
-                if self.config.warm_start { ImpulseRow { peak: 0.0, ..*impulse } } else { ImpulseRow::default() };
-        }
+    }
+
+    /// How much a contact is preloaded in this step, by the impulses that it bore in the step before.
+    ///
+    /// At rest its springs are compressed by what it bears: the overlap of a soft contact. That much, as a mean over the points,
+    /// its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as
+    /// they are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each
+    /// point rocks towers.
+    fn preload(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
+        let both = [row.body_a, row.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
+        let compliance = if both { self.movable_compliance } else { self.fixed_compliance };
+        let count = row.point_count as usize;
+        let sags = points[..count].iter().zip(impulses).map(|(p, impulse)| impulse.normal * compliance / p.normal_mass);
+        let sag = sags.sum::<f32>() / count as f32;
+        // What is borne no more is not held up either.
+        (row.preload + self.preload_share * (sag - row.preload)).min(LARGEST_PRELOAD * sag)
     }
 
     /// What a row knows of the velocities when the step begins: that of the approach where it may bounce, and the direction
@@ -249,7 +251,7 @@ impl Writer<'_> {
         let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
-            velocity_at_impact(u.dot(normal), pull, point.separation, self.params.substep, row.restitution);
+            velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
         if slips && !self.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
@@ -315,34 +317,4 @@ fn patch_of(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
         tangent_mass: effective.tangent(r_a, r_b),
         ..PointRow::default()
     }
-}
-
-/// Most that a manifold is preloaded, relative to the overlap at rest of what it bears.
-const LARGEST_PRELOAD: f32 = 2.0;
-
-/// How much a manifold is preloaded after a step, by the impulses that it bore; `share` of the way to the overlap at rest.
-///
-/// At rest its springs are compressed by what it bears: the overlap of a soft contact. That much, as a mean over the points, its
-/// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are for
-/// everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
-pub(super) fn preload_after(
-    row: &ContactRow,
-    preload: f32,
-    share: f32,
-    points: &[PointRow],
-    impulses: &[ImpulseRow],
-    params: &Params,
-    masses: &[MassRow],
-) -> f32 {
-    if share == 0.0 {
-        return preload;
-    }
-    let moves = |body: u32| masses[body as usize].inv_mass > 0.0;
-    let both = moves(row.body_a) && moves(row.body_b);
-    let compliance = if both { params.movable } else { params.fixed }.compliance();
-    let count = row.point_count as usize;
-    let sag = |(p, i): (&PointRow, &ImpulseRow)| i.normal * compliance / p.normal_mass;
-    let sag = points[..count].iter().zip(impulses).map(sag).sum::<f32>() / count.max(1) as f32;
-    // What is borne no more is not held up either.
-    (preload + share * (sag - preload)).min(LARGEST_PRELOAD * sag)
 }

@@ -106,8 +106,10 @@ pub struct ContactRow {
     pub radius_a: f32,
     /// Radius of curvature of b's surface [m].
     pub radius_b: f32,
+    /// How far the springs of a soft contact are compressed while the surfaces just touch: separations are that much less [m].
+    pub preload: f32,
     #[doc(hidden)]
-    pub pad: [f32; 2],
+    pub pad: f32,
 }
 
 impl ContactRow {

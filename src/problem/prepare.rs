@@ -32,12 +32,6 @@ pub struct Prepared {
     pub(super) seen: u64,
     /// Separation of each point when its manifold was computed, in the order of the rows [m].
     pub(super) computed: Vec<f32>,
-    /// How much each row is preloaded: its surfaces are taken to be thicker by that [m].
-    pub(super) preloads: Vec<f32>,
-    /// Share of the overlap at rest that a step takes out.
-    pub(super) preload_share: f32,
-    /// Whether the rows were solved, so that what they bear says how they are to be preloaded.
-    pub(super) solved: bool,
     /// The rows of the step before, where they have to move.
     before: ContactRows,
     sources_before: Vec<Source>,
@@ -141,8 +135,7 @@ impl Prepared {
         problem.first_joint_color = problem.colors.len() as u32;
         self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
         self.prepare_joints(world, asleep, problem);
-        self.prepare_contacts(world, detector, config, problem);
-        self.preload_share = 1.0 - 1.0 / (1.0 + config.preload_rate * dt);
+        self.prepare_contacts(world, detector, config, dt, problem);
         problem.params.point_count = problem.points.len() as u32;
     }
 
@@ -194,23 +187,25 @@ impl Prepared {
         world: &World,
         detector: &Detector,
         config: &SolverConfig,
+        dt: f32,
         problem: &mut StepProblem,
     ) {
         let reshaped = detector.reshaped_in() > self.seen;
         if reshaped {
-            self.before.exchange(problem, &mut self.computed, &mut self.preloads);
+            self.before.exchange(problem, &mut self.computed);
             let total = self.lay_out(problem);
             problem.points.resize(total, PointRow::default());
             problem.impulses.resize(total, ImpulseRow::default());
             self.computed.resize(total, 0.0);
-            self.preloads.resize(problem.contacts.len(), 0.0);
         }
         let writer = Writer {
             world,
             pairs: detector.pairs(),
             config,
-            params: &problem.params,
-            preload_share: if self.solved { self.preload_share } else { 0.0 },
+            substep: problem.params.substep,
+            movable_compliance: problem.params.movable.compliance(),
+            fixed_compliance: problem.params.fixed.compliance(),
+            preload_share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
             bodies: &problem.bodies,
             masses: &problem.masses,
             bounces: world.bodies.iter().any(|b| b.material.restitution > 0.0),
@@ -225,10 +220,8 @@ impl Prepared {
             points: &mut problem.points,
             impulses: &mut problem.impulses,
             computed: &mut self.computed,
-            preloads: &mut self.preloads,
         });
         self.seen = detector.detections();
-        self.solved = false;
     }
 
     /// Where the points of each contact begin; returns how many rows they are.

@@ -3,14 +3,14 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::contacts::preload_after;
 use super::prepare::Prepared;
 use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
 use crate::world::{BodyKind, World};
 
 impl Prepared {
-    /// Writes poses and velocities into the world, but for those who are asleep. The impulses of contacts stay in the rows, where the next step finds them.
+    /// Writes poses and velocities into the world, but for those who are asleep. The impulses of contacts stay in the rows,
+    /// where the next step finds them.
     pub fn store(&mut self, problem: &StepProblem, asleep: &[bool], world: &mut World) {
         let bodies = world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies);
         bodies.enumerate().for_each(|(i, (body, row))| {
@@ -26,7 +26,6 @@ impl Prepared {
         for (&i, row) in self.joint_rows.iter().zip(&problem.joint_impulses) {
             self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
         }
-        self.solved = true;
     }
 
     /// Brings colors, separations and impulses of the rows of `problem` to the manifolds of a pair, unless they were computed
@@ -35,23 +34,17 @@ impl Prepared {
         if pair.computed_in > self.seen || pair.rests {
             return;
         }
-        let motion = *pair.motion();
         for (k, manifold) in pair.manifolds.iter_mut().enumerate() {
             let at = pair.contact as usize + k;
-            let row = self.row_of[at] as usize;
-            let contact = &problem.contacts[row];
+            let contact = &problem.contacts[self.row_of[at] as usize];
             let (tangent_1, tangent_2) = contact.tangents();
             let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
             manifold.color = self.edges[at].color;
+            manifold.preload = contact.preload;
             let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
-            let (points, impulses) = (&problem.points[first..end], &problem.impulses[first..end]);
-            let share = if self.solved { self.preload_share } else { 0.0 };
-            let (params, masses) = (&problem.params, &problem.masses);
-            manifold.preload = preload_after(contact, self.preloads[row], share, points, impulses, params, masses);
-            for (k, impulse) in impulses.iter().enumerate() {
-                let separation = manifold.separation(&manifold.points()[k], &motion);
-                let point = &mut manifold.points_mut()[k];
-                point.separation = separation;
+            let rows = problem.points[first..end].iter().zip(&problem.impulses[first..end]);
+            for (point, (row, impulse)) in manifold.points_mut().iter_mut().zip(rows) {
+                point.separation = row.separation + contact.preload;
                 point.normal_impulse = impulse.normal;
                 point.friction_impulse = friction(impulse);
             }

@@ -85,6 +85,12 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| Ok(basics::roll(v[0] as f32, v[1] as f32)),
     },
     Entry {
+        name: "rolling",
+        summary: "balls on a plate that is pushed over the ground: they roll on it, all along the push, as on paper",
+        parameters: &[Parameter::real("angle", 60.0, (0.0, 360.0), "direction of the push, from x to z [degrees]")],
+        build: |v| Ok(basics::rolling(v[0] as f32)),
+    },
+    Entry {
         name: "throw",
         summary: "a ball is thrown at a stack of cubes: the stack stands until it is hit, then it falls",
         parameters: &[

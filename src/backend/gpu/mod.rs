@@ -18,6 +18,17 @@ use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, FreeRow, PassColors, StepProblem};
 use shader::{BINDINGS, PASS_COLORS, WORKGROUP};
 
+/// Opens the adapter that `choice` finds, for drawing.
+///
+/// # Errors
+/// No such adapter, or it cannot be opened.
+#[cfg(feature = "view")]
+pub(crate) fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+    let (adapter, summary) = adapter::find(choice)?;
+    let (device, queue) = adapter::open(&adapter, false)?;
+    Ok((device, queue, summary))
+}
+
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
