@@ -28,7 +28,8 @@ use crate::world::World;
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies. Poses, velocities and forces may be changed between steps; number, shapes and kinds may not.
+    /// The bodies. Poses, velocities, forces and joints may be changed between steps; number, shapes and kinds of bodies may
+    /// not, and which bodies joints keep from colliding.
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
@@ -159,14 +160,34 @@ impl Simulation {
 
     /// Contacts and impulses of the last step.
     pub fn pairs(&mut self) -> &[Pair] {
+        self.world_and_pairs().1
+    }
+
+    /// The bodies, and contacts and impulses of the last step.
+    pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
         let pairs = self.detector.pairs_mut();
         pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
-        self.detector.pairs()
+        (&self.world, self.detector.pairs())
     }
 
     /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].
     pub fn joint_impulses(&self) -> &[glam::Vec3] {
         self.prepared.joint_impulses()
+    }
+
+    /// Changes the settings from the next step on.
+    ///
+    /// # Errors
+    /// One is out of range or contradicts another; they are then as they were.
+    pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
+        config.check()?;
+        self.config = config;
+        Ok(())
+    }
+
+    /// Changes what runs the steps, from the next one on.
+    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
+        self.backend = backend;
     }
 
     /// The settings.

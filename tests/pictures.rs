@@ -29,7 +29,8 @@ fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Option<Picture> {
         simulation.step(scene.dt).expect("a step");
     }
     let mut film = Film::new(scene.clone(), color);
-    film.add(0.0, &simulation.world, simulation.pairs());
+    let (world, pairs) = simulation.world_and_pairs();
+    film.add(0.0, world, pairs);
     let mut canvas = Canvas::new(&scene.world, SIZE).expect("an adapter");
     let mut pictures = Vec::new();
     let keep = |p: &Picture| {

@@ -131,11 +131,11 @@ impl Game {
 
     /// Slip while the floor is all that the ball touches, and overlap.
     fn measure(&mut self) {
-        let world = &self.simulation.world;
+        let (world, pairs) = self.simulation.world_and_pairs();
         let (board, ball) = (&world.bodies[BOARD], &world.bodies[BALL]);
         let up = board.rotation * Vec3::Y;
         let (mut on_floor, mut elsewhere) = (false, false);
-        for (pair, manifold) in self.simulation.pairs().iter().flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
+        for (pair, manifold) in pairs.iter().flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
             let is_floor = [BOARD, GOAL].contains(&(pair.body_a as usize)) && manifold.normal.dot(up) > 0.999;
             let bears = manifold.points().iter().any(|p| p.normal_impulse > 0.0);
             on_floor |= is_floor && bears;
@@ -198,17 +198,20 @@ pub struct Played {
 
 /// Steps between two samples of the track.
 const SAMPLE: u32 = 6;
+/// Samples of the track a second.
+pub const SAMPLES: f64 = 20.0;
 
-/// Plays `script` to its end, or until the game is won or lost. `game` has not begun.
+/// Plays `script` to its end, or until the game is won or lost. `game` has not begun; `watch` sees every sample of the track.
 ///
 /// # Errors
 /// The backend cannot run a step.
-pub fn play(mut game: Game, script: &Script) -> Result<Played> {
+pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Result<Played> {
     let mut track = Vec::new();
     loop {
         let ended = game.outcome.is_some() || game.time() >= script.end();
         if game.steps.is_multiple_of(SAMPLE) || ended {
             track.push(Sample { time: game.time(), ball: game.ball().to_array() });
+            watch(&game);
         }
         if ended {
             break;

@@ -31,14 +31,14 @@ const GAP: Rgba = [220, 30, 30, 255];
 const BOX: Rgba = [90, 90, 90, 255];
 
 /// Pairs of line ends, `size` long where a length has no other measure [m].
-pub fn lines(simulation: &Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
-    let world = &simulation.world;
+pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
+    let (world, pairs) = simulation.world_and_pairs();
     let mut ends = Vec::new();
     let mut line = |from: Vec3, to: Vec3, color: Rgba| {
         ends.extend([from, to].map(|p| LineEnd { position: p.to_array(), color }));
     };
     if overlay.contacts {
-        for pair in simulation.pairs() {
+        for pair in pairs {
             let center = world.bodies[pair.body_a as usize].center_of_mass();
             for manifold in &pair.manifolds {
                 let color = manifold.color.map_or(GAP, |c| batch_color(c.into()));
@@ -89,14 +89,15 @@ mod tests {
         let reference = Box::new(Reference::<f32>::new());
         let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
         simulation.step(scene.dt).expect("a step");
-        let count = |overlay: Overlay| lines(&simulation, overlay, 0.1).len() / 2;
         let points: usize = simulation.pairs().iter().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
         assert!(points > 0);
+        let world = simulation.world.clone();
+        let mut count = |overlay: Overlay| lines(&mut simulation, overlay, 0.1).len() / 2;
         assert_eq!(count(Overlay { contacts: true, ..Overlay::default() }), 3 * points);
-        let joints = &simulation.world.joints;
+        let joints = &world.joints;
         let ends: usize = joints.iter().map(|j| 2 + usize::from(j.body_b.is_some())).sum();
         assert_eq!(count(Overlay { joints: true, ..Overlay::default() }), ends);
-        let moving = simulation.world.bodies.iter().filter(|b| b.kind != BodyKind::Fixed);
+        let moving = world.bodies.iter().filter(|b| b.kind != BodyKind::Fixed);
         assert_eq!(
             count(Overlay { boxes: true, ..Overlay::default() }),
             12 * moving.map(|b| b.colliders.len()).sum::<usize>()

@@ -8,7 +8,6 @@ mod surface;
 pub use body::{Body, BodyKind, Collider, MassProperties, Material};
 pub use joint::BallJoint;
 pub use shape::Shape;
-#[cfg(test)]
 pub(crate) use shape::pose;
 pub use surface::Triangles;
 
