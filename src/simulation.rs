@@ -1,12 +1,14 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
 use crate::backend::Backend;
+use crate::backend::cpu::Reference;
 use crate::collide::{Detector, Pair};
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::contacts::ContactProblem;
+use crate::error::{Error, Result};
 use crate::graph::ConstraintGraph;
 use crate::metrics::Penetration;
-use crate::plan::StepPlan;
+use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::{Prepared, StepProblem};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
@@ -96,6 +98,24 @@ impl Simulation {
         self.sleep.before_step(&self.world, self.detector.pairs());
         self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
+    }
+
+    /// What the first substep of the next step of `dt` seconds asks of the velocities, as a contact problem by itself:
+    /// [`ContactProblem::of_step`]. The world stays as it is.
+    ///
+    /// # Errors
+    /// The world has joints, which a contact problem has not.
+    pub fn next_contacts(&mut self, name: &str, dt: f32) -> Result<ContactProblem> {
+        if !self.world.joints.is_empty() {
+            let joints = self.world.joints.len();
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+        }
+        self.next_problem(dt);
+        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
+        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.problem.clone();
+        Reference::<f32>::new().run(&mut problem, &first)?;
+        Ok(ContactProblem::of_step(name.into(), &problem))
     }
 
     /// Detects, colors, prepares and plans.

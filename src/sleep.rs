@@ -171,7 +171,7 @@ impl Sleep {
         }
         self.steps += 1;
         let before = self.count;
-        if ready && self.steps % EVERY == 0 {
+        if ready && self.steps.is_multiple_of(EVERY) {
             self.let_islands_sleep(world, pairs);
         }
         self.count > before

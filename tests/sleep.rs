@@ -113,7 +113,8 @@ fn a_thrown_box_wakes_the_stack_that_it_hits_and_no_other() {
 
 #[test]
 fn whatever_is_changed_from_outside_wakes_its_island() {
-    let changes: [(&str, fn(&mut World)); 5] = [
+    type Change = fn(&mut World);
+    let changes: [(&str, Change); 5] = [
         ("velocity", |w| w.bodies[3].linear_velocity.y = 1.0),
         ("position", |w| w.bodies[1].position.x += 0.01),
         ("rotation", |w| w.bodies[2].rotation = Quat::from_rotation_y(0.1)),
