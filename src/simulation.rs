@@ -1,13 +1,16 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
 use crate::backend::Backend;
+use crate::backend::cpu::Reference;
 use crate::collide::{Detector, Pair};
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::contacts::ContactProblem;
+use crate::error::{Error, Result};
 use crate::graph::ConstraintGraph;
 use crate::metrics::Penetration;
-use crate::plan::StepPlan;
+use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::{Prepared, StepProblem};
+use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
 
@@ -33,6 +36,9 @@ pub struct Simulation {
     config: SolverConfig,
     backend: Box<dyn Backend>,
     detector: Detector,
+    sleep: Sleep,
+    /// Joints of the problem that the plan is for.
+    planned_joints: usize,
     graph: ConstraintGraph,
     joint_graph: ConstraintGraph,
     prepared: Prepared,
@@ -50,6 +56,8 @@ impl Simulation {
         world.check()?;
         Ok(Self {
             detector: Detector::new(&world),
+            sleep: Sleep::new(&world, &config),
+            planned_joints: 0,
             world,
             config,
             backend,
@@ -61,39 +69,90 @@ impl Simulation {
         })
     }
 
-    /// Moves the world by `dt` seconds.
+    /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
     ///
     /// # Errors
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
-        let mut stats = self.assemble(dt);
+        let mut stats = StepStats::default();
+        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
+        if self.sleep.is_everything_still() {
+            stats.asleep = self.sleep.count();
+            return Ok(stats);
+        }
+        self.assemble(dt, &mut stats);
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
-        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world));
+        timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
+        timed(&mut stats.times.store, || {
+            self.sleep.after_step(&mut self.world, self.detector.pairs(), dt);
+        });
+        stats.asleep = self.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
         Ok(stats)
     }
 
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
-        self.assemble(dt);
+        self.sleep.before_step(&self.world, self.detector.pairs());
+        self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
     }
 
+    /// What the first substep of the next step of `dt` seconds asks of the velocities, as a contact problem by itself:
+    /// [`ContactProblem::of_step`]. The world stays as it is.
+    ///
+    /// # Errors
+    /// The world has joints, which a contact problem has not.
+    pub fn next_contacts(&mut self, name: &str, dt: f32) -> Result<ContactProblem> {
+        if !self.world.joints.is_empty() {
+            let joints = self.world.joints.len();
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+        }
+        self.next_problem(dt);
+        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
+        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.problem.clone();
+        Reference::<f32>::new().run(&mut problem, &first)?;
+        Ok(ContactProblem::of_step(name.into(), &problem))
+    }
+
     /// Detects, colors, prepares and plans.
-    fn assemble(&mut self, dt: f32) -> StepStats {
-        let mut stats = StepStats::default();
+    fn assemble(&mut self, dt: f32, stats: &mut StepStats) {
         let times = &mut stats.times;
         let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
-        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt, &give_back));
+        let found = timed(&mut times.detect, || {
+            let (detector, sleep) = (&mut self.detector, &mut self.sleep);
+            let mut found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
+            // Who wakes takes part in this step already.
+            while sleep.wake_touched(detector.pairs()) {
+                let reshaped = found.reshaped;
+                found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
+                found.reshaped |= reshaped;
+            }
+            found
+        });
         timed(&mut times.color, || {
             self.prepared.color(&self.world, &mut self.detector, &mut self.graph, self.config.max_colors);
             self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
-            self.prepared.prepare(&self.world, &self.detector, &self.config, dt, &mut self.problem);
-            self.plan = StepPlan::new(&self.config, &self.problem);
+            self.prepared.prepare(
+                &self.world,
+                self.sleep.asleep(),
+                &self.detector,
+                &self.config,
+                dt,
+                &mut self.problem,
+            );
+            // Where nothing was computed, the plan of the last step is the plan of this one.
+            let joints = self.problem.joints.len();
+            let same = found.computed == 0 && !found.reshaped && joints == self.planned_joints;
+            if !same || self.plan.passes.is_empty() {
+                self.planned_joints = joints;
+                self.plan = StepPlan::new(&self.config, &self.problem);
+            }
         });
         stats.pairs = found.pairs;
         stats.computed = found.computed;
@@ -105,7 +164,11 @@ impl Simulation {
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.plan.bytes_moved(&self.problem);
         stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
-        stats
+    }
+
+    /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
+    pub fn is_asleep(&self, body: usize) -> bool {
+        self.sleep.asleep().get(body) == Some(&true)
     }
 
     /// Overlap of the world as it is now, from contacts computed anew.

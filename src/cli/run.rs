@@ -22,6 +22,9 @@ pub struct RunArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
+    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
+    #[arg(long)]
+    no_sleep: bool,
     /// Write poses and velocities of the bodies that can move, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -33,7 +36,12 @@ pub struct RunArgs {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load()?;
+        if self.no_sleep {
+            config.sleep_after = 0.0;
+        } else if config.sleep_after == 0.0 {
+            config.sleep_after = 0.5;
+        }
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;

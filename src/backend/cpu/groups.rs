@@ -2,9 +2,9 @@
 
 #![allow(unsafe_code)]
 
+use super::crew::Crew;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::spread;
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
 /// Eight contacts of one color with as many points each.
@@ -35,14 +35,14 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Takes over the contacts of a problem.
-    pub fn load(&mut self, problem: &StepProblem) {
+    pub fn load(&mut self, problem: &StepProblem, crew: &Crew) {
         self.deal(problem);
         let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
         self.points.resize(count, [Row8::default(); 12]);
         self.impulses.resize(count, [Row8::default(); 4]);
         let (points, impulses) = (Shared::new(&mut self.points), Shared::new(&mut self.impulses));
         let (len, all) = (self.all.len(), Shared::new(&mut self.all));
-        spread(0..len, &|range| {
+        crew.spread(0..len, &|range| {
             // SAFETY: tasks have different groups.
             for group in unsafe { all.slice(range) } {
                 let rows = group.first_point as usize..(group.first_point + group.points) as usize;
@@ -54,9 +54,9 @@ impl Groups {
     }
 
     /// Gives the impulses back.
-    pub fn store(&self, problem: &mut StepProblem) {
+    pub fn store(&self, problem: &mut StepProblem, crew: &Crew) {
         let (contacts, impulses) = (&problem.contacts, Shared::new(&mut problem.impulses));
-        spread(0..self.all.len(), &|range| {
+        crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                     let to = contacts[row as usize].first_point as usize;

@@ -9,10 +9,11 @@ use std::sync::atomic::AtomicBool;
 
 use super::super::Backend;
 use super::begin_sweep;
+use super::crew::Crew;
 use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spread, velocity_row};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, velocity_row};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
@@ -68,7 +69,7 @@ impl Cpu {
         }
     }
 
-    fn load(&mut self, problem: &StepProblem) {
+    fn load(&mut self, problem: &StepProblem, crew: &Crew) {
         let rows8 = |row: &crate::problem::BodyRow| {
             let all: &[f32; 16] = bytemuck::cast_ref(row);
             let half = |at: usize| Row8(std::array::from_fn(|i| all[at + i]));
@@ -98,12 +99,12 @@ impl Cpu {
         self.joint_impulses.clear();
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
-        self.groups.load(problem);
+        self.groups.load(problem, crew);
     }
 
-    fn store(&self, problem: &mut StepProblem) {
+    fn store(&self, problem: &mut StepProblem, crew: &Crew) {
         self.store_bodies(problem);
-        self.groups.store(problem);
+        self.groups.store(problem, crew);
         for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
             row.linear = impulse.store();
         }
@@ -118,7 +119,7 @@ impl Cpu {
         }
     }
 
-    fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
+    fn run_pass(&mut self, problem: &StepProblem, pass: &Pass, crew: &Crew) {
         match pass.kernel {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::ClearImpulses => {
@@ -132,7 +133,7 @@ impl Cpu {
                 let (bodies, free) = (Shared::new(&mut self.bodies), Shared::new(&mut self.free));
                 let (instructions, accelerations) = (self.instructions, &self.accelerations);
                 let work = BodyWork { kernel, params, bodies, free, accelerations };
-                spread(groups, &|range| work.run(instructions, range));
+                crew.spread(groups, &|range| work.run(instructions, range));
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
@@ -151,7 +152,7 @@ impl Cpu {
                         impulses: Shared::new(&mut self.groups.impulses),
                         moving: &moving,
                     };
-                    spread(groups, &|range| work.run(self.instructions, range));
+                    crew.spread(groups, &|range| work.run(self.instructions, range));
                     self.convergence.moving |= u32::from(moving.into_inner());
                 }
             }
@@ -223,11 +224,14 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        self.load(problem);
-        for pass in passes {
-            self.run_pass(problem, pass);
-        }
-        self.store(problem);
+        let widest = problem.bodies.len().max(problem.contacts.len()).div_ceil(8);
+        Crew::lead(widest, |crew| {
+            self.load(problem, crew);
+            for pass in passes {
+                self.run_pass(problem, pass, crew);
+            }
+            self.store(problem, crew);
+        });
         Ok(())
     }
 }

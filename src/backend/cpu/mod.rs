@@ -1,5 +1,6 @@
 //! The CPU backends: the reference, one constraint at a time, and the same kernels over eight lanes and all threads.
 
+mod crew;
 mod groups;
 mod lane8;
 mod lanes;

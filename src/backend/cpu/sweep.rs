@@ -5,8 +5,6 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
-
 use super::groups::Group;
 use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
@@ -91,20 +89,6 @@ macro_rules! eight {
             },
         ]
     };
-}
-
-/// Groups that one task takes at least: some ten microseconds of work.
-const TASK_GROUPS: usize = 64;
-
-/// Runs `work` over the groups, on all threads if there are enough of them.
-pub(super) fn spread(groups: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
-    let threads = rayon::current_num_threads();
-    if threads == 1 || groups.len() < 2 * TASK_GROUPS {
-        return work(groups);
-    }
-    let tasks = (groups.len() / TASK_GROUPS).min(2 * threads);
-    let cut = |i: usize| groups.start + groups.len() * i / tasks;
-    (0..tasks).into_par_iter().for_each(|i| work(cut(i)..cut(i + 1)));
 }
 
 /// What a processor can do.
