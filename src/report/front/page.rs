@@ -28,7 +28,8 @@ const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 /// A race has rows of several runs.
 pub fn page(races: &[Vec<Row>]) -> Result<Page> {
     let sides = sides(races);
-    let main = grid(&races.iter().map(|race| picture(race, &sides, faults(race)[0], (410, 320))).collect::<Vec<_>>(), 3);
+    let main =
+        grid(&races.iter().map(|race| picture(race, &sides, faults(race)[0], (410, 320))).collect::<Vec<_>>(), 3);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Speed against error</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>\n{}</style></head><body>\n<h1>Speed against error</h1>\n",
@@ -128,9 +129,11 @@ fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> 
         for &fault in faults(race) {
             let duel = Duel::new(&of_side(race, OWN), &theirs, fault)?;
             let scene = escape(&race[0].scene);
-            let [own, other] = [duel.own, duel.others].map(|error| if error.is_finite() { shown(fault, error) } else { "none holds".into() });
+            let [own, other] = [duel.own, duel.others]
+                .map(|error| if error.is_finite() { shown(fault, error) } else { "none holds".into() });
             let [low, high] = match duel.others.is_finite() {
-                true => [duel.best, duel.worst].map(|r| if r.is_finite() { format!("{r:.2}") } else { "not reached".into() }),
+                true => [duel.best, duel.worst]
+                    .map(|r| if r.is_finite() { format!("{r:.2}") } else { "not reached".into() }),
                 false => [const { String::new() }; 2],
             };
             let best = if duel.worst <= 1.0 { " class=\"best\"" } else { "" };
@@ -166,7 +169,13 @@ fn profiles(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<(
             Series { name: name.clone(), look, points: Vec::new(), line }
         };
         let title = format!("error of at most {} mm", level * 1e3);
-        let frame = Frame { title: &title, x: "time, relative to the fastest", y: "share of scenes", share: true, size: (400, 280) };
+        let frame = Frame {
+            title: &title,
+            x: "time, relative to the fastest",
+            y: "share of scenes",
+            share: true,
+            size: (400, 280),
+        };
         html.push_str(&inline(&svg(&frame, &named.map(series).collect::<Vec<_>>())));
     }
     html.push_str("</div>\n");

@@ -148,7 +148,8 @@ mod tests {
 
     #[test]
     fn a_front_has_what_nobody_beats() {
-        let rows = [row("a", 1.0, 4e-3), row("b", 2.0, 5e-3), row("c", 3.0, 1e-3), row("d", 3.0, 2e-3), row("e", 4.0, 1e-9)];
+        let rows =
+            [row("a", 1.0, 4e-3), row("b", 2.0, 5e-3), row("c", 3.0, 1e-3), row("d", 3.0, 2e-3), row("e", 4.0, 1e-9)];
         let fallen = Row { in_place: Some(0), ..row("f", 0.5, 1e-4) };
         let all: Vec<_> = rows.iter().chain([&fallen]).collect();
         let names = |rows: Vec<&Row>| rows.iter().map(|r| r.engine.clone()).collect::<Vec<_>>().concat();

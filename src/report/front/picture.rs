@@ -113,7 +113,7 @@ fn decades(values: impl Iterator<Item = f64>) -> Decades {
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw<Y>(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series], x: Decades, y: Y) -> Drawn
+fn draw<'a, Y>(root: &DrawingArea<SVGBackend<'a>, Shift>, frame: &Frame, series: &[Series], x: Decades, y: Y) -> Drawn
 where
     Y: Ranged<ValueType = f64, FormatOption = DefaultFormatting>,
 {
@@ -150,7 +150,9 @@ where
             chart.plotting_area().draw(&(EmptyElement::at((*px, *py)) + marker(*look, (0, 0), style)))?;
             if best && !label.is_empty() {
                 let style = ("sans-serif", 11).into_font().color(&color);
-                chart.plotting_area().draw(&(EmptyElement::at((*px, *py)) + Text::new(label.clone(), (6, -13), style)))?;
+                chart
+                    .plotting_area()
+                    .draw(&(EmptyElement::at((*px, *py)) + Text::new(label.clone(), (6, -13), style)))?;
             }
         }
     }
@@ -182,7 +184,7 @@ fn stairs(line: &[(f64, f64)], right: f64, rising: bool) -> Vec<(f64, f64)> {
 }
 
 /// A circle, a triangle, a square, a diamond, an X, a cross, of some 8 pixels.
-fn marker(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'static, SVGBackend<'static>, (i32, i32)> {
+fn marker<'a>(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     let around = |corners: &[(i32, i32)]| corners.iter().map(|c| (at.0 + c.0, at.1 + c.1)).collect::<Vec<_>>();
     let closed = |corners: &[(i32, i32)]| {
         let mut corners = around(corners);
@@ -215,7 +217,11 @@ mod tests {
     #[test]
     fn axes_are_labelled_with_what_lies_between_their_ends() {
         let keys = |low: f64, high: f64| {
-            Decades(low..high).key_points(plotters::coord::ranged1d::BoldPoints(10)).iter().map(plain).collect::<Vec<_>>()
+            Decades(low..high)
+                .key_points(plotters::coord::ranged1d::BoldPoints(10))
+                .iter()
+                .map(plain)
+                .collect::<Vec<_>>()
         };
         assert_eq!(keys(0.015, 0.6), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
         assert_eq!(keys(1e-3, 1e3), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
-use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::metrics::{Penetration, drift, in_place_count, rms_speed};
@@ -135,7 +134,6 @@ pub fn race(
 ) -> Result<Vec<Row>> {
     let blocks = blocks(scene.steps);
     let run = Origin::now();
-    let mut detector = Detector::new(&scene.world);
     let mut lanes: Vec<_> = contenders.iter().map(|_| Lane { finite: true, ..Lane::default() }).collect();
     for block in 0..blocks {
         for (contender, lane) in contenders.iter_mut().zip(&mut lanes) {
@@ -148,9 +146,8 @@ pub fn race(
                 let world = contender.world();
                 lane.finite = world.first_non_finite().is_none();
                 if lane.finite && 2 * block >= blocks {
-                    detector.detect_anew(world, &SolverConfig::default(), 0.0, &|_| ());
                     lane.ms.push(ms);
-                    lane.penetration.push(Penetration::of(detector.pairs()));
+                    lane.penetration.push(Penetration::of_world(world, &SolverConfig::default()));
                     lane.speed.push(rms_speed(world));
                     lane.gap.push(world.joint_gap().into());
                 }

@@ -89,11 +89,17 @@ fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) 
     let (hash, steps) = (scene.content_hash(), super::race::steps(scene));
     let fit = |row: &&Row| {
         let Origin { build, commit: _, machine, threads } = origin;
-        row.hash == hash && row.steps == steps && row.build == *build && row.machine == *machine && row.threads == *threads
+        row.hash == hash
+            && row.steps == steps
+            && row.build == *build
+            && row.machine == *machine
+            && row.threads == *threads
     };
     let fit: Vec<_> = rows.iter().filter(fit).collect();
     let of_run = |run: &str| -> Option<Vec<Row>> {
-        let of = |setting| fit.iter().find(|row| row.run == run && row.setting() == *setting).map(|&row| row.clone());
+        let of = |setting: &Setting| {
+            fit.iter().find(|row| row.run == run && row.setting() == *setting).map(|&row| row.clone())
+        };
         settings.iter().map(of).collect()
     };
     fit.iter().rev().find_map(|row| of_run(&row.run))
