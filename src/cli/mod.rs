@@ -3,6 +3,7 @@
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
+mod hard;
 mod list;
 mod play;
 #[cfg(feature = "view")]
@@ -19,6 +20,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::backend::Backend;
+use crate::backend::cpu::{Cpu, Reference};
+use crate::backend::gpu::{AdapterChoice, Gpu};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::load::Load;
@@ -50,6 +54,8 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
+    /// Run hard cases and say which pass.
+    Hard(hard::HardArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
@@ -78,6 +84,41 @@ struct NotBuilt {
 impl NotBuilt {
     fn run(&self) -> Result<()> {
         Err(Error::input("pictures and windows need a build with them: `cargo install --path . --features view`"))
+    }
+}
+
+/// What runs sweeps, by the numbers that it computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Numbers {
+    /// The reference in double precision.
+    F64,
+    /// The reference, one constraint at a time on one thread, in single precision.
+    Reference,
+    /// Eight constraints at a time, in single precision.
+    Cpu,
+    /// The compute shaders, in single precision.
+    Gpu,
+}
+
+impl Numbers {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// No adapter.
+    pub fn open(self) -> Result<Box<dyn Backend>> {
+        Ok(match self {
+            Self::F64 => Box::new(Reference::<f64>::new()),
+            Self::Reference => Box::new(Reference::<f32>::new()),
+            Self::Cpu => Box::new(Cpu::new()),
+            Self::Gpu => Box::new(Gpu::new(AdapterChoice::Best, false)?),
+        })
+    }
+}
+
+impl Display for Numbers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
     }
 }
 
@@ -195,12 +236,17 @@ fn length(text: &str) -> std::result::Result<f64, String> {
 
 /// A progress bar on a terminal, nothing elsewhere.
 fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
+    progress_of("step", steps.into(), quiet)
+}
+
+/// A progress bar over `count` of what `unit` names.
+fn progress_of(unit: &str, count: u64, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
         return indicatif::ProgressBar::hidden();
     }
-    let style = "{bar:40} step {pos}/{len}  {per_sec}  {eta} left";
-    let style = indicatif::ProgressStyle::with_template(style).expect("a fixed template");
-    indicatif::ProgressBar::new(steps.into()).with_style(style)
+    let style = format!("{{bar:40}} {unit} {{pos}}/{{len}}  {{per_sec}}  {{eta}} left  {{msg}}");
+    let style = indicatif::ProgressStyle::with_template(&style).expect("a fixed template");
+    indicatif::ProgressBar::new(count).with_style(style)
 }
 
 /// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
@@ -226,6 +272,7 @@ pub fn main() -> std::process::ExitCode {
         Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
+        Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
