@@ -1,12 +1,14 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
 use crate::backend::Backend;
+use crate::backend::cpu::Reference;
 use crate::collide::Detector;
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::contacts::ContactProblem;
+use crate::error::{Error, Result};
 use crate::graph::ConstraintGraph;
 use crate::metrics::Penetration;
-use crate::plan::StepPlan;
+use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::{Prepared, StepProblem};
 use crate::stats::{StepStats, timed};
 use crate::world::World;
@@ -79,6 +81,24 @@ impl Simulation {
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
         self.assemble(dt);
         (&self.problem, &self.plan)
+    }
+
+    /// What the first substep of the next step of `dt` seconds asks of the velocities, as a contact problem by itself:
+    /// [`ContactProblem::of_step`]. The world stays as it is.
+    ///
+    /// # Errors
+    /// The world has joints, which a contact problem has not.
+    pub fn next_contacts(&mut self, name: &str, dt: f32) -> Result<ContactProblem> {
+        if !self.world.joints.is_empty() {
+            let joints = self.world.joints.len();
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+        }
+        self.assemble(dt);
+        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities | Kernel::IntegrateGyroscopic);
+        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.problem.clone();
+        Reference::<f32>::new().run(&mut problem, &first)?;
+        Ok(ContactProblem::of_step(name.into(), &problem))
     }
 
     /// Detects, colors, prepares and plans.

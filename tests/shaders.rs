@@ -7,7 +7,7 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use common::kernels::{every_kernel, every_rules};
-use drystone::backend::gpu::shader::{BINDINGS, Reflected, UNIFORMS, WORKGROUP, constants, source};
+use drystone::backend::gpu::shader::{BINDINGS, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source};
 use drystone::kernels::Rules;
 use drystone::plan::Kernel;
 
@@ -25,8 +25,8 @@ fn parsed(source: &str) -> naga::Module {
 mod layouts {
     use super::*;
     use drystone::problem::{
-        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
-        PassColors, PointRow, Softness,
+        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
+        Params, PassColors, PointRow, Softness,
     };
 
     const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
@@ -50,6 +50,19 @@ mod layouts {
         };
     }
 
+    /// Rows that stay on the device: Rust knows only how long they are.
+    #[repr(C)]
+    struct Velocities {
+        v: [f32; 4],
+        w: [f32; 4],
+    }
+    #[repr(C)]
+    struct Step {
+        before: [f32; 4],
+        begin: [f32; 4],
+    }
+    const _: () = assert!(size_of::<Velocities>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
+
     /// The layout of each row, under the name of its twin.
     fn in_rust() -> BTreeMap<String, Layout> {
         layouts! {
@@ -63,11 +76,14 @@ mod layouts {
             Joint = JointRow { r_a body_a r_b body_b gap }
             JointImpulse = JointImpulseRow { linear }
             Convergence = ConvergenceRow { moving done sweeps planned }
+            Velocities = Velocities { v w }
+            Step = Step { before begin }
+            Momentum = MomentumRow { t factor square restarts }
             Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
             Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
             Params = Params {
                 substep inverse_substep restitution_threshold inertia_count movable fixed joint
-                body_count point_count slop relaxation tolerance
+                body_count point_count slop relaxation tolerance joint_count
             }
             PassColors = PassColors { first end }
         }

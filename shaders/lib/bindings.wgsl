@@ -12,5 +12,10 @@
 @group(0) @binding(9) var<storage, read> joints: array<Joint>;
 @group(0) @binding(10) var<storage, read_write> joint_impulses: array<JointImpulse>;
 @group(0) @binding(11) var<storage, read_write> convergence: Convergence;
+@group(0) @binding(12) var<storage, read_write> momentum: Momentum;
+// What accelerated sweeps leave for each other: it stays on the device.
+@group(0) @binding(13) var<storage, read_write> velocities_before: array<Velocities>;
+@group(0) @binding(14) var<storage, read_write> impulse_steps: array<Step>;
+@group(0) @binding(15) var<storage, read_write> squares: array<f32>;
 
 const WORKGROUP: u32 = 64u;

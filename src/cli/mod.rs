@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::config::SolverConfig;
+use crate::config::{Method, SolverConfig};
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
 
@@ -63,6 +63,9 @@ struct SceneArgs {
     /// Relax sweeps of a substep.
     #[arg(long)]
     relax: Option<u32>,
+    /// What is done with the sweeps of a substep.
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Any setting of the solver, as key=value; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -92,6 +95,7 @@ impl SceneArgs {
                 config.set(&format!("{name}={value}"))?;
             }
         }
+        config.method = self.method.unwrap_or(config.method);
         config.check()?;
         let mut scene = Scene::find(&self.scene, &self.parameter)?;
         if let Some(dt) = self.dt {

@@ -47,12 +47,19 @@ impl ContactProblem {
         Ok(problem)
     }
 
-    /// Into a file.
+    /// Into a file: whole or not at all.
     ///
     /// # Errors
     /// It cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        std::fs::write(path.as_ref(), self.to_text()).map_err(Error::file(path.as_ref()))
+        let path = path.as_ref();
+        let partial = path.with_added_extension("partial");
+        let written = std::fs::write(&partial, self.to_text()).and_then(|()| std::fs::rename(&partial, path));
+        written.map_err(|e| {
+            // Nothing half-written stays; that there was nothing is no further error.
+            let _ = std::fs::remove_file(&partial);
+            Error::file(path)(e)
+        })
     }
 
     /// As text; every number is read back to the same bits.

@@ -12,6 +12,7 @@
 
 mod format;
 mod operator;
+mod step;
 
 pub use operator::Operator;
 

@@ -15,11 +15,6 @@ pub struct Operator<'a> {
 impl<'a> Operator<'a> {
     /// Of a problem.
     pub fn new(problem: &'a ContactProblem) -> Self {
-        // Scaled to order 1, so that the determinant of a small body's inertia does not vanish.
-        let inverse = |i: DMat3| {
-            let scale = 3.0 / (i.x_axis.x + i.y_axis.y + i.z_axis.z);
-            (i * scale).inverse() * scale
-        };
         Self { problem, inverse_inertia: problem.bodies.iter().map(|b| inverse(b.inertia)).collect() }
     }
 
@@ -76,4 +71,10 @@ impl<'a> Operator<'a> {
         }
         DMat3::from_cols_array_2d(&block)
     }
+}
+
+/// The inverse of an inertia, scaled to order 1 on the way, so that the determinant of a small one does not vanish.
+pub(super) fn inverse(inertia: DMat3) -> DMat3 {
+    let scale = 3.0 / (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z);
+    (inertia * scale).inverse() * scale
 }

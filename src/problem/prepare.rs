@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
-    Softness,
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow, Params,
+    PointRow, Softness,
 };
 use super::softness::softness;
 use super::weigh::{middle, weigh};
@@ -103,6 +103,7 @@ impl Prepared {
             ..Params::default()
         };
         problem.convergence = ConvergenceRow::default();
+        problem.momentum = MomentumRow::default();
         problem.colors.clone_from(&self.coloring.offsets);
         problem.first_joint_color = problem.colors.len() as u32;
         if !world.joints.is_empty() {
@@ -113,6 +114,7 @@ impl Prepared {
         weigh(pairs, &problem.masses, config.friction, self.patches);
         self.prepare_contacts(world, pairs, config, problem);
         problem.params.point_count = problem.points.len() as u32;
+        problem.params.joint_count = problem.joints.len() as u32;
     }
 
     fn prepare_joints(&self, world: &World, problem: &mut StepProblem) {

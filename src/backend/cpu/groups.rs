@@ -2,9 +2,15 @@
 
 #![allow(unsafe_code)]
 
-use super::lane8::Row8;
+use rayon::prelude::*;
+
+use super::lane8::{Lane8, Portable, Row8};
+use super::lanes::MIN_ROWS;
 use super::shared::Shared;
 use super::sweep::spread;
+use crate::kernels::Step;
+use crate::kernels::momentum::{extrapolate, squared_step};
+use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
 /// Eight contacts of one color with as many points each.
@@ -31,6 +37,8 @@ pub(super) struct Groups {
     pub colors: Vec<u32>,
     pub points: Vec<[Row8; 12]>,
     pub impulses: Vec<[Row8; 4]>,
+    /// What accelerated sweeps leave for each other, kept from one run to the next.
+    steps: Vec<Step<Portable>>,
 }
 
 impl Groups {
@@ -69,6 +77,37 @@ impl Groups {
                 }
             }
         });
+    }
+
+    /// Goes on with all impulses.
+    pub fn extrapolate(&mut self, first: bool, factor: f32) {
+        self.steps.resize(self.impulses.len(), Step::default());
+        let factor = Portable::constant(factor.into());
+        let impulses = self.impulses.par_iter_mut().with_min_len(MIN_ROWS);
+        impulses.zip(&mut self.steps).for_each(|(impulse, step)| {
+            let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
+            [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+        });
+    }
+
+    /// How far the last sweep moved the impulse of each point of the problem, squared.
+    pub fn squared_steps(&self, problem: &StepProblem) -> Vec<f32> {
+        let mut squares = vec![0.0; problem.impulses.len()];
+        let shared = Shared::new(&mut squares);
+        spread(0..self.all.len(), &|range| {
+            for group in &self.all[range] {
+                for k in 0..group.points as usize {
+                    let at = group.first_point as usize + k;
+                    let square = squared_step(components(&self.impulses[at]), &self.steps[at]).store();
+                    for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                        let to = problem.contacts[row as usize].first_point as usize + k;
+                        // SAFETY: a contact is in one lane of one group, and its points are its own.
+                        unsafe { shared.write(to, square.0[lane]) };
+                    }
+                }
+            }
+        });
+        squares
     }
 
     /// Deals the contacts of each color out to groups by their number of points, in one walk.
@@ -124,6 +163,12 @@ impl Group {
             }
         }
     }
+}
+
+/// The normal and the tangents of eight impulses.
+fn components(impulse: &[Row8; 4]) -> Vec3<Portable> {
+    let [normal, tangent_1, tangent_2, _] = impulse.each_ref().map(Portable::load);
+    vec3(normal, tangent_1, tangent_2)
 }
 
 /// Writes one lane of some rows.

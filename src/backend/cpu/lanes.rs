@@ -7,8 +7,10 @@
 
 use std::sync::atomic::AtomicBool;
 
+use rayon::prelude::*;
+
 use super::super::Backend;
-use super::begin_sweep;
+use super::{begin_sweep, chunk_sums};
 use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
@@ -16,10 +18,14 @@ use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spre
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::{Inertia, Joint, Pair, StepParams};
+use crate::kernels::momentum::{extrapolate, extrapolated, squared_step, workgroup_sum};
+use crate::kernels::{Inertia, Joint, Momentum, Pair, Step, StepParams};
 use crate::math::Vec3;
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
+
+/// Rows that one task extrapolates at least.
+pub(super) const MIN_ROWS: usize = 1024;
 
 /// The backend of the processor.
 pub struct Cpu {
@@ -32,6 +38,11 @@ pub struct Cpu {
     inertias: Vec<Inertia<f32>>,
     joints: Vec<Joint<f32>>,
     joint_impulses: Vec<Vec3<f32>>,
+    momentum: Momentum<f32>,
+    /// What accelerated sweeps leave for each other: velocities of the sweep before, and what the joints' impulses were.
+    velocities_before: Vec<Row8>,
+    joint_steps: Vec<Step<f32>>,
+    squares: Vec<f32>,
 }
 
 impl Default for Cpu {
@@ -62,6 +73,10 @@ impl Cpu {
             inertias: Vec::new(),
             joints: Vec::new(),
             joint_impulses: Vec::new(),
+            momentum: Momentum::default(),
+            velocities_before: Vec::new(),
+            joint_steps: Vec::new(),
+            squares: Vec::new(),
         }
     }
 
@@ -94,6 +109,7 @@ impl Cpu {
         self.joint_impulses.clear();
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
+        self.momentum = Momentum::load(&problem.momentum);
         self.groups.load(problem);
     }
 
@@ -104,6 +120,7 @@ impl Cpu {
             row.linear = impulse.store();
         }
         problem.convergence = self.convergence;
+        problem.momentum = self.momentum.store();
     }
 
     fn store_bodies(&self, problem: &mut StepProblem) {
@@ -161,6 +178,17 @@ impl Cpu {
                     self.masses[i] = Row8([x.x, x.y, x.z, mass.inv_mass, yz.x, yz.y, yz.z, 0.0]);
                 }
             }
+            Kernel::Extrapolate { first, measured } => {
+                if !(measured && self.convergence.done != 0) {
+                    self.extrapolate(first);
+                }
+            }
+            Kernel::MeasureStep => {
+                let points = self.groups.squared_steps(problem);
+                let joints = self.joint_impulses.iter().zip(&self.joint_steps).map(|(now, step)| squared_step(*now, step));
+                self.squares = chunk_sums(&points.into_iter().chain(joints).collect::<Vec<_>>());
+            }
+            Kernel::UpdateMomentum => self.momentum.update(workgroup_sum(&self.squares)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),
@@ -171,6 +199,29 @@ impl Cpu {
                     });
                 }
             }
+        }
+    }
+
+    fn extrapolate(&mut self, first: bool) {
+        if first {
+            self.momentum.begin();
+        }
+        let factor = self.momentum.factor;
+        self.velocities_before.resize(self.bodies.len(), Row8::default());
+        let bodies = self.bodies.par_iter_mut().with_min_len(MIN_ROWS);
+        bodies.zip(&mut self.velocities_before).for_each(|(body, before)| {
+            let now = body.velocity;
+            if !first {
+                for (x, before) in body.velocity.0.iter_mut().zip(&before.0) {
+                    *x = extrapolated(*x, *before, factor);
+                }
+            }
+            *before = now;
+        });
+        self.groups.extrapolate(first, factor);
+        self.joint_steps.resize(self.joint_impulses.len(), Step::default());
+        for (impulse, step) in self.joint_impulses.iter_mut().zip(&mut self.joint_steps) {
+            *impulse = extrapolate(first, factor, *impulse, step);
         }
     }
 

@@ -1,0 +1,74 @@
+//! A contact problem from a step: what its first substep asks of the velocities, without springs and without memory.
+
+use glam::{DMat3, DVec3};
+
+use super::operator::inverse;
+use super::{ContactProblem, FreeBody, PointContact, Velocity};
+use crate::problem::{BodyRow, ContactRow, MassRow, StepProblem};
+
+impl ContactProblem {
+    /// The cold, hard problem of a substep: every contact is rigid and may close its gap in the substep, overlap is left
+    /// alone, and impulses begin at zero. `problem` has the velocities that the sweeps of the substep find, gravity
+    /// included. Bodies that nothing touches are left out; what moves on its own goes into the offsets. Joints have no place
+    /// here and are left out.
+    pub fn of_step(name: String, problem: &StepProblem) -> Self {
+        let mut index = vec![None; problem.bodies.len()];
+        let mut contacts = Self { name, ..Self::default() };
+        for row in &problem.contacts {
+            let [a, b] = [row.body_a, row.body_b].map(|body| {
+                let (mass, place) = (&problem.masses[body as usize], &mut index[body as usize]);
+                if mass.inv_mass > 0.0 && place.is_none() {
+                    *place = Some(contacts.bodies.len() as u32);
+                    contacts.bodies.push(free_body(&problem.bodies[body as usize], mass));
+                }
+                *place
+            });
+            let frame = frame(row);
+            for point in &problem.points[row.first_point as usize..(row.first_point + row.point_count) as usize] {
+                let (r_a, r_b) = (wide(point.r_a), wide(point.r_b));
+                // How what no contact can push moves by itself at the point.
+                let driven = |body: u32, own: Option<u32>, arm: DVec3| match own {
+                    Some(_) => DVec3::ZERO,
+                    None => {
+                        let Velocity { linear, angular } = velocity(&problem.bodies[body as usize]);
+                        linear + angular.cross(arm)
+                    }
+                };
+                let u = driven(row.body_b, b, r_b) - driven(row.body_a, a, r_a);
+                let gap = f64::from(point.separation.max(0.0) * problem.params.inverse_substep);
+                let arm = |own: Option<u32>, r: DVec3| if own.is_some() { r } else { DVec3::ZERO };
+                contacts.contacts.push(PointContact {
+                    a,
+                    b,
+                    friction: row.friction.into(),
+                    offset: DVec3::from_array(frame.map(|d| d.dot(u))) + DVec3::X * gap,
+                    frame,
+                    r_a: arm(a, r_a),
+                    r_b: arm(b, r_b),
+                });
+            }
+        }
+        contacts
+    }
+}
+
+fn free_body(body: &BodyRow, mass: &MassRow) -> FreeBody {
+    let ([xx, xy, xz], [yy, yz, zz]) = (mass.inv_inertia_x.map(f64::from), mass.inv_inertia_yz.map(f64::from));
+    let inverse_inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+    FreeBody { mass: 1.0 / f64::from(mass.inv_mass), inertia: inverse(inverse_inertia), free: velocity(body) }
+}
+
+fn velocity(body: &BodyRow) -> Velocity {
+    Velocity { linear: wide(body.v), angular: wide(body.w) }
+}
+
+/// The frame of a manifold, orthonormal in all digits.
+fn frame(row: &ContactRow) -> [DVec3; 3] {
+    let normal = wide(row.normal).normalize();
+    let tangent = wide(row.tangent).reject_from_normalized(normal).normalize();
+    [normal, tangent, normal.cross(tangent)]
+}
+
+fn wide(x: [f32; 3]) -> DVec3 {
+    DVec3::from_array(x.map(f64::from))
+}
