@@ -26,7 +26,7 @@ fn extrapolate(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     if FIRST && id.x == 0u { momentum = Momentum(1.0, 0.0, 3.4028234663852886e38, momentum.restarts); }
     let stride = groups.x * WORKGROUP;
     for (var i = id.x; i < params.body_count; i += stride) {
-        let now = Velocities(bodies[i].v, bodies[i].w);
+        let now = Free(bodies[i].v, bodies[i].w);
         bodies[i].v = extrapolated(now.v, velocities_before[i].v);
         bodies[i].w = extrapolated(now.w, velocities_before[i].w);
         velocities_before[i] = now;

@@ -1,5 +1,5 @@
 // integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint,
-// and turns its inverse inertia along. Reads inertias. Writes bodies and masses; one thread a body.
+// and turns its inverse inertia along. Reads inertias. Writes bodies, free and masses; one thread a body.
 // Double: src/kernels/integrate.rs.
 
 // Solves rows x = g by Cramer's rule.
@@ -22,8 +22,8 @@ fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_w
         let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
         let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-        // Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
-        let w = bodies[inertia.body].w;
+        // The free spin: impulses come after. Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
+        let w = free[inertia.body].w;
         let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
         var next = spin;
         for (var step = 0u; step < 2u; step++) {
@@ -39,7 +39,9 @@ fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_w
         }
         // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
         let change = next - spin;
-        bodies[inertia.body].w = w + (x * change.x + y * change.y + z * change.z);
+        let turn = x * change.x + y * change.y + z * change.z;
+        free[inertia.body].w = w + turn;
+        bodies[inertia.body].w += turn;
 
         // The inverse inertia in world axes.
         let kx = x * k.x;

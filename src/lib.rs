@@ -31,10 +31,12 @@ pub mod compare;
 pub mod config;
 pub mod contacts;
 pub mod error;
+pub mod files;
 pub mod graph;
 pub mod kernels;
 pub mod load;
 pub mod math;
+pub mod maze;
 pub mod metrics;
 pub mod plan;
 pub mod problem;
@@ -44,6 +46,8 @@ pub mod scenes;
 pub mod simulation;
 pub mod solver;
 pub mod stats;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod world;
 
 pub use backend::Backend;

@@ -1,7 +1,7 @@
 //! What a run got wrong: penetration, speed and what fell, in f64.
 
 use crate::collide::Pair;
-use crate::world::{Body, BodyKind, World, pose};
+use crate::world::{Body, BodyKind, World};
 
 /// Overlap over all touching pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,8 +56,8 @@ pub fn rms_speed(world: &World) -> f64 {
 /// Half of the height of the box along the world's axes around a body as it is [m]; 0 without shapes.
 pub fn half_height(body: &Body) -> f64 {
     let bounds = |c: &crate::world::Collider| {
-        let aabb = c.shape.0.compute_aabb(&(pose(body.position, body.rotation) * pose(c.position, c.rotation)));
-        (f64::from(aabb.mins.y), f64::from(aabb.maxs.y))
+        let (low, high) = c.bounds(body.position, body.rotation);
+        (f64::from(low.y), f64::from(high.y))
     };
     let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     body.colliders.iter().map(bounds).reduce(both).map_or(0.0, |(low, high)| 0.5 * (high - low))

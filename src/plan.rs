@@ -13,7 +13,7 @@ use crate::config::{
 use crate::kernels::Rules;
 use crate::kernels::momentum::CHUNK;
 use crate::problem::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
     StepProblem,
 };
 
@@ -21,7 +21,10 @@ use crate::problem::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
     /// Gravity and forces; over bodies.
-    IntegrateVelocities,
+    IntegrateVelocities {
+        /// Whether the impulses that the last substep ended with are applied as well, as velocities.
+        carry: bool,
+    },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic,
     /// Forgets impulses; over points.
@@ -60,7 +63,7 @@ impl Kernel {
     /// Name of the shader file and of its entry point.
     pub fn name(self) -> &'static str {
         match self {
-            Self::IntegrateVelocities => "integrate_velocities",
+            Self::IntegrateVelocities { .. } => "integrate_velocities",
             Self::IntegrateGyroscopic => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
             Self::WarmStartJoints => "warm_start_joints",
@@ -91,6 +94,9 @@ impl Kernel {
 impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.name())?;
+        if matches!(self, Self::IntegrateVelocities { carry: true }) {
+            write!(f, "(carry)")?;
+        }
         if let Some(r) = self.rules() {
             let friction = match r.friction {
                 FrictionRule::None => "",
@@ -175,13 +181,19 @@ impl StepPlan {
         let biased = Rules { biased: true, friction: biased_friction, ..shared };
 
         let mut plan = Self::default();
-        for _ in 0..config.substeps {
-            plan.over_bodies(Kernel::IntegrateVelocities);
+        // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
+        // velocities that they gave. The arms of joints turn.
+        let carried = shared.accumulated && joints.is_empty();
+        for substep in 0..config.substeps {
+            let carry = carried && substep > 0;
+            plan.over_bodies(Kernel::IntegrateVelocities { carry });
             if !problem.inertias.is_empty() {
                 plan.over_bodies(Kernel::IntegrateGyroscopic);
             }
             plan.over_colors(Kernel::WarmStartJoints, &joints);
-            if shared.accumulated {
+            if carry {
+                // Done already.
+            } else if shared.accumulated {
                 plan.over_colors(Kernel::WarmStart(shared.of_warm_start()), &contacts);
             } else {
                 plan.over_bodies(Kernel::ClearImpulses);
@@ -269,9 +281,13 @@ impl Pass {
         const IMPULSE: usize = size_of::<ImpulseRow>();
         let rows = problem.rows_of(&self.colors);
         let bytes = match self.kernel {
-            Kernel::IntegrateVelocities => problem.bodies.len() * (VELOCITIES + MASS / 3),
+            Kernel::IntegrateVelocities { carry } => {
+                problem.bodies.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
+            }
             Kernel::IntegratePositions => problem.bodies.len() * (BODY + BODY / 2),
-            Kernel::IntegrateGyroscopic => problem.inertias.len() * (size_of::<InertiaRow>() + BODY + MASS),
+            Kernel::IntegrateGyroscopic => {
+                problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY + MASS)
+            }
             Kernel::ClearImpulses => problem.impulses.len() * 2 * IMPULSE,
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.

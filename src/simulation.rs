@@ -2,7 +2,7 @@
 
 use crate::backend::Backend;
 use crate::backend::cpu::Reference;
-use crate::collide::Detector;
+use crate::collide::{Detector, Pair};
 use crate::config::SolverConfig;
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
@@ -67,10 +67,32 @@ impl Simulation {
     /// # Errors
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
-        let mut stats = self.assemble(dt);
+        let stats = self.assemble(dt);
+        self.run(stats)
+    }
+
+    /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
+    /// itself: [`ContactProblem::of_step`].
+    ///
+    /// # Errors
+    /// As [`Simulation::step`], or the world has joints, which a contact problem has not.
+    pub fn step_with_contacts(&mut self, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
+        if !self.world.joints.is_empty() {
+            let joints = self.world.joints.len();
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+        }
+        let stats = self.assemble(dt);
+        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
+        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.problem.clone();
+        Reference::<f32>::new().run(&mut problem, &first)?;
+        Ok((ContactProblem::of_step(name.into(), &problem), self.run(stats)?))
+    }
+
+    /// Runs and stores what is assembled.
+    fn run(&mut self, mut stats: StepStats) -> Result<StepStats> {
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
-        let pairs = self.detector.pairs_mut();
-        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world, pairs));
+        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
         stats.first_non_finite = self.world.first_non_finite();
@@ -83,36 +105,18 @@ impl Simulation {
         (&self.problem, &self.plan)
     }
 
-    /// What the first substep of the next step of `dt` seconds asks of the velocities, as a contact problem by itself:
-    /// [`ContactProblem::of_step`]. The world stays as it is.
-    ///
-    /// # Errors
-    /// The world has joints, which a contact problem has not.
-    pub fn next_contacts(&mut self, name: &str, dt: f32) -> Result<ContactProblem> {
-        if !self.world.joints.is_empty() {
-            let joints = self.world.joints.len();
-            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
-        }
-        self.assemble(dt);
-        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
-        let mut problem = self.problem.clone();
-        Reference::<f32>::new().run(&mut problem, &first)?;
-        Ok(ContactProblem::of_step(name.into(), &problem))
-    }
-
     /// Detects, colors, prepares and plans.
     fn assemble(&mut self, dt: f32) -> StepStats {
         let mut stats = StepStats::default();
         let times = &mut stats.times;
-        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt));
-        let pairs = self.detector.pairs_mut();
+        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
+        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt, &give_back));
         timed(&mut times.color, || {
-            self.prepared.color(&self.world, pairs, &mut self.graph, self.config.max_colors);
+            self.prepared.color(&self.world, &mut self.detector, &mut self.graph, self.config.max_colors);
             self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
-            self.prepared.prepare(&self.world, pairs, &self.config, dt, &mut self.problem);
+            self.prepared.prepare(&self.world, &self.detector, &self.config, dt, &mut self.problem);
             self.plan = StepPlan::new(&self.config, &self.problem);
         });
         stats.pairs = found.pairs;
@@ -130,13 +134,21 @@ impl Simulation {
 
     /// Overlap of the world as it is now, from contacts computed anew.
     pub fn penetration(&mut self) -> Penetration {
-        self.detector.detect_anew(&self.world, &self.config, 0.0);
+        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
+        self.detector.detect_anew(&self.world, &self.config, 0.0, &give_back);
         Penetration::of(self.detector.pairs())
     }
 
     /// Contacts and impulses of the last step.
-    pub fn pairs(&self) -> &[crate::collide::Pair] {
-        self.detector.pairs()
+    pub fn pairs(&mut self) -> &[Pair] {
+        self.world_and_pairs().1
+    }
+
+    /// The bodies, with contacts and impulses of the last step.
+    pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
+        let pairs = self.detector.pairs_mut();
+        pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
+        (&self.world, self.detector.pairs())
     }
 
     /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].

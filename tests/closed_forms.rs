@@ -113,14 +113,14 @@ fn a_free_ball_turns_by_its_angular_velocity() {
 }
 
 /// Overlap at rest of a cube on the ground and of one on top of it [m], with 2 substeps, so that it is large in f32.
-fn sag_of_two_cubes(backend: Box<dyn Backend>, frequency: f32) -> [f64; 2] {
+fn sag_of_two_cubes(backend: Box<dyn Backend>, frequency: f32, preload_rate: f32, steps: u32) -> [f64; 2] {
     let mut world = ground(0.0, 0.5);
     for y in [0.5, 1.5] {
         world.add(cube().position(0.0, y, 0.0));
     }
-    let config = SolverConfig { substeps: 2, contact_frequency: frequency, ..SolverConfig::default() };
-    let mut simulation = simulation(world, config, backend);
-    for _ in 0..300 {
+    let soft = SolverConfig { substeps: 2, contact_frequency: frequency, preload_rate, ..SolverConfig::default() };
+    let mut simulation = simulation(world, soft, backend);
+    for _ in 0..steps {
         simulation.step(1.0 / 60.0).expect("a step");
     }
     let [lower, upper] = [1, 2].map(|i| f64::from(simulation.world.bodies[i].position.y));
@@ -140,10 +140,51 @@ fn soft_contact_law(frequency: f64) -> [f64; 2] {
 fn boxes_at_rest_sink_in_as_far_as_soft_contacts_say() {
     for backend in backends() {
         let name = backend.name();
-        let sag = sag_of_two_cubes(backend, 0.125);
+        let sag = sag_of_two_cubes(backend, 0.125, 0.0, 300);
         let law = soft_contact_law(0.125);
         holds(&format!("{name}, cube on the ground"), sag[0], law[0], 0.01);
         holds(&format!("{name}, cube on a cube"), sag[1], law[1], 0.01);
+    }
+}
+
+/// Each step takes its share of what is left: overlaps fall by e in a second. Measured 0.4 %: positions near 1 m are multiples
+/// of 1e-7 m.
+#[test]
+fn preloaded_contacts_come_up_again_at_the_rate_of_their_preload() {
+    for backend in [reference, || Box::new(Cpu::new()) as Box<dyn Backend>] {
+        let name = backend().name();
+        let [early, late] = [180, 240].map(|steps| sag_of_two_cubes(backend(), 0.125, 1.0, steps));
+        let left = (61.0_f64 / 60.0).powi(-60);
+        holds(&format!("{name}, cube on the ground"), late[0] / early[0], left, 0.01);
+        holds(&format!("{name}, cube on a cube"), late[1] / early[1], left, 0.01);
+        let end = sag_of_two_cubes(backend(), 0.125, 1.0, 600);
+        below(&format!("{name}, overlap after 10 s"), end[0].abs().max(end[1].abs()), 5e-6);
+    }
+}
+
+/// Two cubes under one a hundred times as heavy, which is taken away once all are at rest: springs that hold up what is no
+/// longer there would throw them. Measured 1.8 mm, with preloads and without; with 8 substeps 28 mm: one sweep takes out what
+/// is left of an impulse a hundred times too large only in part.
+#[test]
+fn what_a_load_leaves_behind_stays_where_it_is() {
+    for backend in backends() {
+        let name = backend.name();
+        let mut world = ground(0.0, 0.5);
+        for (y, density) in [(0.5, 1e3), (1.5, 1e3), (2.5, 1e5)] {
+            world.add(cube().density(density).position(0.0, y, 0.0));
+        }
+        let mut simulation = simulation(world, SolverConfig { substeps: 32, ..SolverConfig::default() }, backend);
+        let height = |s: &Simulation| f64::from(s.world.bodies[2].position.y);
+        let mut highest = f64::MIN;
+        for step in 0..240 {
+            simulation.step(1.0 / 60.0).expect("a step");
+            if step == 120 {
+                simulation.world.bodies[3].position.x += 10.0;
+            } else if step > 120 {
+                highest = highest.max(height(&simulation));
+            }
+        }
+        below(&format!("{name}, jump"), highest - 1.5, 3e-3);
     }
 }
 
@@ -434,7 +475,7 @@ fn the_comparisons_refuse_what_is_one_percent_off() {
     for bad in [1.0051, 0.9949, f64::NAN, f64::INFINITY] {
         assert!(!is_near(bad, 1.0, 0.005), "{bad}");
     }
-    let [ground, pair] = sag_of_two_cubes(reference(), 0.125 * 1.01);
+    let [ground, pair] = sag_of_two_cubes(reference(), 0.125 * 1.01, 0.0, 300);
     assert!(!is_near(ground, soft_contact_law(0.125)[0], 0.01) && !is_near(pair, soft_contact_law(0.125)[1], 0.01));
     assert!(!is_near(slide(reference(), 4.0, 0.404), 16.0 / (2.0 * 0.4 * G), 0.005));
     assert!(!is_near(slip(reference(), 0.303), G * (FRAC_PI_6.sin() - 0.3 * FRAC_PI_6.cos()), 0.005));

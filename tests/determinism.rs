@@ -1,5 +1,8 @@
 //! The same scene gives the same bits, for any number of threads; a settled one computes hardly any contact anew.
 
+use std::collections::HashMap;
+
+use drystone::config::FrictionAt;
 use drystone::problem::effective::{EffectiveMass, InverseMass};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
 
@@ -112,4 +115,65 @@ fn a_reused_manifold_keeps_the_masses_that_its_arms_have() {
         }
     }
     assert!(reused > 1000, "{reused}");
+}
+
+/// The bodies of a contact and the arms of its points, to the bit: what tells it from every other.
+type Contact = (u32, u32, Vec<[u32; 6]>);
+
+fn arms(r_a: [f32; 3], r_b: [f32; 3]) -> [u32; 6] {
+    let [[a, b, c], [d, e, f]] = [r_a, r_b].map(|r| r.map(f32::to_bits));
+    [a, b, c, d, e, f]
+}
+
+/// Separation of the surfaces, preload and normal impulse of each point of every row.
+fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
+    let of = |row: &drystone::problem::ContactRow| {
+        let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
+        let points = &problem.points[own.clone()];
+        let values = points
+            .iter()
+            .zip(&problem.impulses[own])
+            .map(|(p, i)| [p.separation + row.preload, row.preload, i.normal])
+            .collect();
+        ((row.body_a, row.body_b, points.iter().map(|p| arms(p.r_a, p.r_b)).collect()), values)
+    };
+    problem.contacts.iter().map(of).collect()
+}
+
+/// Rows move to other places as contacts begin and end, and what they carry has to move along.
+#[test]
+fn what_a_reused_contact_carries_stays_with_it() {
+    for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
+        let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
+        let config = SolverConfig { friction_at, ..SolverConfig::default() };
+        let mut simulation = Simulation::new(scene.world, config, cpu()).expect("a simulation");
+        let (mut carried, mut ended) = (0, 0);
+        for step in 0..100 {
+            simulation.step(scene.dt).expect("a step");
+            let solved = rows(simulation.problem());
+            // The manifolds have what their rows have.
+            let given_back: HashMap<Contact, Vec<[f32; 3]>> = (simulation.pairs().iter())
+                .flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
+                .map(|(pair, m)| {
+                    let key = m.points().iter().map(|p| arms(p.r_a.into(), p.r_b.into())).collect();
+                    let values = m.points().iter().map(|p| [p.separation, m.preload, p.normal_impulse]).collect();
+                    ((pair.body_a, pair.body_b, key), values)
+                })
+                .collect();
+            assert_eq!(solved, given_back, "step {step}");
+            // And the rows of the next step begin with the impulses that those of this one ended with.
+            let next = rows(simulation.next_problem(scene.dt).0);
+            for (contact, points) in &solved {
+                match next.get(contact) {
+                    Some(now) => {
+                        carried += 1;
+                        assert!(points.iter().zip(now).all(|(p, n)| p[2] == n[2]), "step {step}: {points:?} {now:?}");
+                    }
+                    None => ended += 1,
+                }
+            }
+        }
+        println!("{carried} carried, {ended} ended");
+        assert!(carried > 1000 && ended > 1000, "{carried} {ended}");
+    }
 }

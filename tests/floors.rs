@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 /// The modules of each floor, the ground floor first.
 const FLOORS: [&[&str]; 9] = [
-    &["math", "error", "stats"],
+    &["math", "error", "files", "stats"],
     &["world", "config"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals"],
     &["backend", "solver"],
     &["simulation"],
-    &["report", "compare"],
+    &["report", "compare", "view", "maze"],
     &["main", "cli"],
 ];
 

@@ -66,7 +66,11 @@ fn convex(problem: &ContactProblem, slip: &[f64]) -> (Vec<Velocity>, Vec<DVec3>)
     let (p, a) = (CscMatrix::from(&upper), CscMatrix::from(&rows));
     let mut solver = DefaultSolver::new(&p, &linear, &a, &right, &cones, settings).expect("a convex program");
     solver.solve();
-    assert_eq!(solver.solution.status, SolverStatus::Solved, "{}", problem.name);
+    // Where it ends earlier, it must still be far better than what is compared.
+    let (status, info) = (solver.solution.status, &solver.info);
+    let reached = info.gap_rel.min(info.gap_abs).max(info.res_primal).max(info.res_dual);
+    let near = status == SolverStatus::AlmostSolved && reached < 100.0 * ASKED;
+    assert!(status == SolverStatus::Solved || near, "{}: {status:?} with {reached:e}", problem.name);
     let vector = |x: &[f64]| DVec3::new(x[0], x[1], x[2]);
     let velocities = solver.solution.x.chunks(6).map(|x| Velocity { linear: vector(&x[..3]), angular: vector(&x[3..]) });
     let mut duals = solver.solution.z.iter();
@@ -82,7 +86,7 @@ fn convex(problem: &ContactProblem, slip: &[f64]) -> (Vec<Velocity>, Vec<DVec3>)
 fn by_interior_point(problem: &ContactProblem) -> (Vec<Velocity>, Vec<DVec3>, u32) {
     let operator = Operator::new(problem);
     let mut slip = vec![0.0; problem.contacts.len()];
-    for round in 1..=200 {
+    for round in 1..=500 {
         let (velocities, impulses) = convex(problem, &slip);
         let found: Vec<_> = (0..slip.len())
             .map(|i| operator.relative_velocity(i, &velocities))
@@ -90,11 +94,11 @@ fn by_interior_point(problem: &ContactProblem) -> (Vec<Velocity>, Vec<DVec3>, u3
             .collect();
         let moved = found.iter().zip(&slip).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         slip = found;
-        if moved < 1e-9 {
+        if moved < 1e-8 {
             return (velocities, impulses, round);
         }
     }
-    panic!("{}: the slip was not found", problem.name);
+    panic!("{}: the slip was not found: {slip:?}", problem.name);
 }
 
 /// Largest difference of two velocities of a problem, over the largest free velocity.
@@ -117,8 +121,8 @@ fn exact(problem: &ContactProblem) -> Solution {
 fn pile() -> ContactProblem {
     let scene = Scene::find("pile", &["n=6".into()]).expect("a scene of the catalogue");
     let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("it is sound");
-    (0..45).for_each(|_| drop(simulation.step(1.0 / 60.0).expect("a step")));
-    simulation.next_contacts("pile", 1.0 / 60.0).expect("no joints")
+    (0..30).for_each(|_| drop(simulation.step(1.0 / 60.0).expect("a step")));
+    simulation.step_with_contacts("pile", 1.0 / 60.0).expect("no joints").0
 }
 
 /// Towers of equal and unequal boxes and a pile, with one friction coefficient.

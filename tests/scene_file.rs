@@ -113,6 +113,9 @@ fn what_is_given_is_taken() {
     let collider = &body.colliders[0];
     assert_eq!((collider.position, collider.rotation), (Vec3::Y, Quat::from_xyzw(0.0, 1.0, 0.0, 0.0)));
     assert_eq!(collider.shape.smallest_half_extent(), 2.0);
+
+    let pushed = r#"{"version": 1, "bodies": [{"force": [1, 2, -3], "shapes": [{"type": "ball", "radius": 2}]}]}"#;
+    assert_eq!(read(pushed).expect("a scene").world.bodies[0].force, Vec3::new(1.0, 2.0, -3.0));
 }
 
 #[test]
@@ -214,6 +217,8 @@ fn impossible_values_of_a_body_are_refused() {
         (json!({"position": [0, -1e10, 0]}), "position = [0, -10000000000, 0]: must be at most 1e9 m in size"),
         (json!({"position": [0, 1e39, 0]}), "position = [0, 1e39, 0]: must be finite in single precision"),
         (json!({"linear_velocity": [1, 0, 0]}), "linear_velocity = [1, 0, 0]: must be zero for a fixed body"),
+        (json!({"force": [0, 0, 1]}), "force = [0, 0, 1]: must be zero unless the body is dynamic"),
+        (json!({"kind": "dynamic", "force": [0, 1e39, 0]}), "force = [0, 1e39, 0]: must be finite in single precision"),
         (json!({"kind": "dynamic", "shapes": []}), "a dynamic body without shapes needs mass_properties"),
         (json!({"kind": "dynamic", "mass": 1, "shapes": []}), "a dynamic body without shapes needs mass_properties"),
         (
@@ -365,7 +370,7 @@ fn the_schema_describes_every_key() {
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "angular_velocity density friction kind linear_velocity mass mass_properties name position restitution rotation \
+        "angular_velocity density force friction kind linear_velocity mass mass_properties name position restitution rotation \
          shapes"
     );
     assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation");

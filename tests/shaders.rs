@@ -25,7 +25,8 @@ fn parsed(source: &str) -> naga::Module {
 mod layouts {
     use super::*;
     use drystone::problem::{
-        BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
+        BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+        MomentumRow,
         Params, PassColors, PointRow, Softness,
     };
 
@@ -50,33 +51,28 @@ mod layouts {
         };
     }
 
-    /// Rows that stay on the device: Rust knows only how long they are.
-    #[repr(C)]
-    struct Velocities {
-        v: [f32; 4],
-        w: [f32; 4],
-    }
+    /// Stays on the device: Rust knows only how long it is.
     #[repr(C)]
     struct Step {
         before: [f32; 4],
         begin: [f32; 4],
     }
-    const _: () = assert!(size_of::<Velocities>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
+    const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
 
     /// The layout of each row, under the name of its twin.
     fn in_rust() -> BTreeMap<String, Layout> {
         layouts! {
             Body = BodyRow { v w dp dq }
+            Free = FreeRow { v w }
             Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {
-                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b preload
             }
             Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
             Joint = JointRow { r_a body_a r_b body_b gap }
             JointImpulse = JointImpulseRow { linear }
             Convergence = ConvergenceRow { moving done sweeps planned }
-            Velocities = Velocities { v w }
             Step = Step { before begin }
             Momentum = MomentumRow { t factor square restarts }
             Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }

@@ -2,6 +2,8 @@
 
 struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
 
+struct Free { v: vec3f, w: vec3f }
+
 struct Mass {
     inv_inertia_x: vec3f, inv_mass: f32,
     inv_inertia_yz: vec3f,
@@ -14,7 +16,7 @@ struct Contact {
     normal: vec3f, friction: f32,
     tangent: vec3f, restitution: f32,
     body_a: u32, body_b: u32, first_point: u32, point_count: u32,
-    radius_a: f32, radius_b: f32,
+    radius_a: f32, radius_b: f32, preload: f32,
 }
 
 struct Point {
@@ -30,8 +32,6 @@ struct JointImpulse { linear: vec3f }
 struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
 struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
-
-struct Velocities { v: vec3f, w: vec3f }
 
 struct Step { before: vec3f, begin: vec3f }
 

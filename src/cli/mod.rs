@@ -1,7 +1,12 @@
 //! The command line: parse, one library call, print.
 
 mod compare;
+#[cfg(feature = "fclib")]
+mod export;
 mod list;
+mod play;
+#[cfg(feature = "view")]
+mod render;
 mod report;
 mod run;
 mod solve;
@@ -32,6 +37,14 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
+    /// Write a contact problem for other solvers.
+    #[cfg(feature = "fclib")]
+    Export(export::ExportArgs),
+    /// Play a game.
+    Play(play::PlayArgs),
+    /// Draw a scene: one picture, an animation, or every scene of the catalogue.
+    #[cfg(feature = "view")]
+    Render(render::RenderArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -112,7 +125,8 @@ impl SceneArgs {
     fn set_threads(&self, unless_told: usize) {
         let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
         // Fails only if it was set before, which nothing does.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
     }
 }
 
@@ -146,6 +160,11 @@ pub fn main() -> std::process::ExitCode {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
+        #[cfg(feature = "fclib")]
+        Command::Export(args) => args.run(),
+        Command::Play(args) => args.run(),
+        #[cfg(feature = "view")]
+        Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
+use crate::stats::StepStats;
 
 /// Arguments of `drystone run`.
 #[derive(Args)]
@@ -68,10 +69,12 @@ impl SaveProblem {
         Ok(())
     }
 
-    /// Writes the problem of the step that comes next.
-    fn write(&self, scene: &Scene, simulation: &mut Simulation) -> Result<()> {
+    /// Runs the step and writes its problem.
+    fn step(&self, scene: &Scene, simulation: &mut Simulation) -> Result<StepStats> {
         let name = format!("{}, step {}", scene.name, self.step);
-        simulation.next_contacts(&name, scene.dt)?.write(&self.file)
+        let (contacts, stats) = simulation.step_with_contacts(&name, scene.dt)?;
+        contacts.write(&self.file)?;
+        Ok(stats)
     }
 }
 
@@ -89,10 +92,11 @@ impl RunArgs {
         let bar = progress(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
-                if let Some(save) = self.save_problem.as_ref().filter(|save| save.step == step) {
-                    save.write(&scene, &mut simulation)?;
-                }
-                report.add(&simulation.step(scene.dt)?);
+                let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
+                    Some(save) => save.step(&scene, &mut simulation)?,
+                    None => simulation.step(scene.dt)?,
+                };
+                report.add(&stats);
                 bar.inc(1);
             }
             if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {

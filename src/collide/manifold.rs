@@ -19,22 +19,13 @@ pub struct ManifoldPoint {
     /// Distance along the normal now, negative when overlapping [m].
     pub separation: f32,
     /// The same when the manifold was computed.
-    pub(super) computed_separation: f32,
+    pub(crate) computed_separation: f32,
     /// parry's features of a and b; 0 if unknown.
     pub features: u64,
     /// Normal impulse of the last substep [N s].
     pub normal_impulse: f32,
     /// Friction impulse on b of the last substep, world axes [N s].
     pub friction_impulse: Vec3,
-}
-
-/// How hard one point is to move [kg]. Written by `problem`, which knows masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PointMass {
-    /// Along the normal; of a patch, about it [kg m²].
-    pub normal: f32,
-    /// Along the tangents.
-    pub tangent: f32,
 }
 
 /// The contact of two bodies over one pair of convex parts.
@@ -52,11 +43,10 @@ pub struct Manifold {
     pub twist_impulse: f32,
     /// Friction impulse on b, with friction per manifold, world axes [N s].
     pub friction_impulse: Vec3,
+    /// How far the springs of its soft contacts are compressed while the surfaces just touch [m].
+    pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
-    /// How hard its points are to move, and last their patch; none until that was computed. It stays while the manifold is
-    /// reused, as normal and arms do.
-    pub masses: Option<[PointMass; MAX_POINTS + 1]>,
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
 }
@@ -73,8 +63,8 @@ impl Manifold {
             radius_b: 0.0,
             twist_impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            preload: 0.0,
             color: None,
-            masses: None,
             points,
             count: count as u8,
         }
@@ -96,6 +86,7 @@ impl Manifold {
         self.color = old.color;
         self.twist_impulse = old.twist_impulse;
         self.friction_impulse = old.friction_impulse;
+        self.preload = old.preload;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {

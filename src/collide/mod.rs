@@ -7,8 +7,8 @@ mod manifold;
 mod narrow;
 mod query;
 
-pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, PointMass};
-pub use narrow::Pair;
+pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
+pub use narrow::{Motion, Pair};
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, DefaultHasher};
@@ -29,6 +29,8 @@ pub struct DetectStats {
     pub pairs: usize,
     /// Pairs whose manifolds were computed; the others were reused.
     pub computed: usize,
+    /// Whether what touches, or with how many points, is other than before.
+    pub reshaped: bool,
 }
 
 /// Finds the contacts of a world and keeps them from step to step.
@@ -44,6 +46,8 @@ pub struct Detector {
     pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
+    detections: u64,
+    reshaped_in: u64,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
 }
@@ -80,6 +84,8 @@ impl Detector {
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
+            detections: 0,
+            reshaped_in: 0,
             jointed: world
                 .joints
                 .iter()
@@ -99,33 +105,66 @@ impl Detector {
         &mut self.pairs
     }
 
-    /// Brings pairs and manifolds to the poses of `world`, for a step of `dt` seconds.
-    pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32) -> DetectStats {
-        self.moving.clear();
-        self.moving.extend(world.bodies.iter().map(|b| Moving {
+    /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
+    /// their pairs know how the bodies moved since. A manifold that is computed anew inherits the impulses of the old one,
+    /// which `give_back` fetches from where the last step left them.
+    pub fn detect(
+        &mut self,
+        world: &World,
+        config: &SolverConfig,
+        dt: f32,
+        give_back: &(dyn Fn(&mut Pair) + Sync),
+    ) -> DetectStats {
+        let moving = |b: &Body| Moving {
             position: b.position,
             rotation: b.rotation,
             center: b.center_of_mass(),
             v: b.linear_velocity,
             w: b.angular_velocity,
-        }));
+        };
+        world.bodies.par_iter().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
+        self.detections += 1;
         let margins = Margins {
             speculative: config.speculative_margin,
             recycle: config.recycle_distance,
             fall: world.gravity.length() * dt * dt,
             dt,
+            detection: self.detections,
         };
-        self.broad_phase(margins);
-        self.narrow_phase(margins)
+        let parted = self.broad_phase(margins);
+        let mut stats = self.narrow_phase(margins, give_back);
+        stats.reshaped |= parted;
+        if stats.reshaped {
+            self.reshaped_in = self.detections;
+        }
+        stats
+    }
+
+    /// The last detection, counted from 1.
+    pub fn detections(&self) -> u64 {
+        self.detections
+    }
+
+    /// The last detection after which another set of manifolds touched, or with other numbers of points.
+    pub fn reshaped_in(&self) -> u64 {
+        self.reshaped_in
     }
 
     /// Computes every manifold anew at the poses of `world`: for measuring, where reused ones would be a little off.
-    pub fn detect_anew(&mut self, world: &World, config: &SolverConfig, dt: f32) -> DetectStats {
+    pub fn detect_anew(
+        &mut self,
+        world: &World,
+        config: &SolverConfig,
+        dt: f32,
+        give_back: &(dyn Fn(&mut Pair) + Sync),
+    ) -> DetectStats {
         self.pairs.iter_mut().for_each(Pair::invalidate);
-        self.detect(world, config, dt)
+        self.detect(world, config, dt, give_back)
     }
 
-    fn broad_phase(&mut self, margins: Margins) {
+    /// Finds new pairs and ends parted ones; returns whether it ended any.
+    fn broad_phase(&mut self, margins: Margins) -> bool {
+        let mut parted = false;
         // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
         let tight = |c: &ColliderInfo| {
             let body = &self.moving[c.body as usize];
@@ -166,10 +205,11 @@ impl Detector {
                 let found = &mut self.found;
                 self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
                 self.find_unbounded(moved.iter().map(|m| m.0).collect());
-                self.drop_parted();
+                parted = self.drop_parted();
             }
         }
         self.add_found();
+        parted
     }
 
     /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
@@ -202,9 +242,9 @@ impl Detector {
         deepest <= 0.0
     }
 
-    /// Ends the pairs whose boxes came apart; the last pair takes an ended one's slot.
-    fn drop_parted(&mut self) {
-        let mut slot = 0;
+    /// Ends the pairs whose boxes came apart; the last pair takes an ended one's slot. Returns whether there were any.
+    fn drop_parted(&mut self) -> bool {
+        let (mut slot, before) = (0, self.pairs.len());
         while slot < self.pairs.len() {
             let pair = &self.pairs[slot];
             if self.touches(pair.collider_a, pair.collider_b) {
@@ -217,6 +257,7 @@ impl Detector {
                 self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
             }
         }
+        self.pairs.len() < before
     }
 
     /// Begins the pairs that are new, of different bodies of which one can be pushed, the further reaching first.
@@ -239,14 +280,17 @@ impl Detector {
         }
     }
 
-    fn narrow_phase(&mut self, margins: Margins) -> DetectStats {
+    fn narrow_phase(&mut self, margins: Margins, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
         let (colliders, moving) = (&self.colliders, &self.moving);
         let update = |scratch: &mut Scratch, pair: &mut Pair| {
             let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
-            usize::from(pair.update(colliders, a, b, margins, scratch) == Update::Computed)
+            let update = pair.update(colliders, a, b, margins, scratch, give_back);
+            (usize::from(update != Update::Reused), update == Update::Reshaped)
         };
-        let computed = self.pairs.par_iter_mut().with_min_len(64).map_init(Scratch::default, update).sum();
-        DetectStats { pairs: self.pairs.len(), computed }
+        let both = |x: (usize, bool), y: (usize, bool)| (x.0 + y.0, x.1 | y.1);
+        let updates = self.pairs.par_iter_mut().with_min_len(64).map_init(Scratch::default, update);
+        let (computed, reshaped) = updates.reduce(|| (0, false), both);
+        DetectStats { pairs: self.pairs.len(), computed, reshaped }
     }
 }
 

@@ -40,10 +40,36 @@ pub struct Pair {
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
+    /// Half of the smallest side of the thinner one [m].
+    size: f32,
+    /// Radius around the origin of body b that holds its collider [m].
+    reach_b: f32,
+    /// Distance up to which the last computation looked [m].
+    looked: f32,
     /// Where the bodies were when the manifolds were computed; none if they never were.
     computed_at: Option<[Placed; 2]>,
-    /// Distance up to which that computation looked [m].
-    looked: f32,
+    /// How they moved since.
+    motion: Motion,
+    /// The detection, counted from 1, that computed the manifolds; 0 if none did.
+    pub(crate) computed_in: u64,
+    /// Where the first of the manifolds stands among the contacts that were last prepared. Written by `problem`.
+    pub(crate) contact: u32,
+}
+
+/// How two bodies moved relative to each other since their manifolds were computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Of the centre of b as seen from the centre of a, world axes [m].
+    drift: Vec3,
+    turn_a: Quat,
+    turn_b: Quat,
+}
+
+impl Motion {
+    /// How far the arm `r_b` of b moved away from the arm `r_a` of a, along `normal` [m].
+    pub fn along(&self, normal: Vec3, r_a: Vec3, r_b: Vec3) -> f32 {
+        (self.drift + turned_arm(self.turn_b, r_b) - turned_arm(self.turn_a, r_a)).dot(normal)
+    }
 }
 
 /// Where a body is: its centre of mass and rotation.
@@ -89,6 +115,8 @@ pub(super) struct Margins {
     /// How far gravity moves a body in one step [m].
     pub fall: f32,
     pub dt: f32,
+    /// Number of this detection, from 1.
+    pub detection: u64,
 }
 
 /// Memory that one thread reuses from pair to pair.
@@ -109,23 +137,36 @@ const RECYCLE_TURN: f32 = 0.0025;
 pub(super) enum Update {
     Reused,
     Computed,
+    /// Computed, to another number of manifolds or points.
+    Reshaped,
 }
 
 impl Pair {
     pub(super) fn new(collider_a: u32, collider_b: u32, colliders: &[ColliderInfo]) -> Self {
-        let body = |c: u32| colliders[c as usize].body;
+        let (a, b) = (&colliders[collider_a as usize], &colliders[collider_b as usize]);
         Self {
-            body_a: body(collider_a),
-            body_b: body(collider_b),
+            body_a: a.body,
+            body_b: b.body,
             manifolds: Vec::new(),
             collider_a,
             collider_b,
-            computed_at: None,
+            size: a.size.min(b.size),
+            reach_b: b.reach,
             looked: 0.0,
+            computed_at: None,
+            motion: Motion::default(),
+            computed_in: 0,
+            contact: 0,
         }
     }
 
-    /// Brings the manifolds to the poses `a` and `b`.
+    /// How the bodies moved since the manifolds were computed.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// Notes how the bodies moved to the poses `a` and `b`; computes the manifolds anew if that was too far, after
+    /// `give_back` brought the impulses of the last step to the old ones.
     pub(super) fn update(
         &mut self,
         colliders: &[ColliderInfo],
@@ -133,16 +174,17 @@ impl Pair {
         b: &Moving,
         margins: Margins,
         scratch: &mut Scratch,
+        give_back: &(dyn Fn(&mut Self) + Sync),
     ) -> Update {
         // A body that left the finite range touches nothing, so that the trouble does not spread.
         if !(a.is_finite() && b.is_finite()) {
             self.manifolds.clear();
             self.invalidate();
-            return Update::Computed;
+            self.computed_in = margins.detection;
+            return Update::Reshaped;
         }
-        let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
-        let size = ca.size.min(cb.size);
-        let approach = (b.v - a.v).length() + cb.reach * (b.w - a.w).length();
+        let size = self.size;
+        let approach = (b.v - a.v).length() + self.reach_b * (b.w - a.w).length();
         let base = margins.speculative * size + margins.fall;
         let look = base + (approach * margins.dt).min(2.0 * size);
 
@@ -153,35 +195,27 @@ impl Pair {
             let carried = b_then.center - a_then.center;
             let shift = (b_now.center - a_now.center) - (turn_a * carried);
             let turn = turn_a.conjugate() * turn_b;
-            let moved = shift.length() + 2.0 * turn.xyz().length() * cb.reach;
+            let moved = shift.length() + 2.0 * turn.xyz().length() * self.reach_b;
             let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
             if moved < margins.recycle * size && turned < RECYCLE_TURN && look <= self.looked + 0.5 * base {
-                let drift = (b_now.center - a_now.center) - carried;
-                self.refresh(drift, turn_a, turn_b);
+                self.motion = Motion { drift: (b_now.center - a_now.center) - carried, turn_a, turn_b };
                 return Update::Reused;
             }
         }
+        give_back(self);
         self.computed_at = Some([Placed::of(a), Placed::of(b)]);
+        self.motion = Motion::default();
         self.looked = look;
+        self.computed_in = margins.detection;
+        let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
         self.compute(ca, cb, a, b, look, size, scratch);
-        Update::Computed
+        let shape = self.manifolds.iter().map(|m| m.points().len());
+        if shape.eq(scratch.old.iter().map(|m| m.points().len())) { Update::Computed } else { Update::Reshaped }
     }
 
     /// Forgets when the manifolds were computed, so that the next update computes them anew.
     pub(super) fn invalidate(&mut self) {
         self.computed_at = None;
-    }
-
-    /// Separations of the same points at new poses: normal and arms stay, as they do from substep to substep.
-    fn refresh(&mut self, drift: Vec3, turn_a: Quat, turn_b: Quat) {
-        for manifold in &mut self.manifolds {
-            let normal = manifold.normal;
-            let (core_a, core_b) = (normal * manifold.radius_a, normal * manifold.radius_b);
-            for p in manifold.points_mut() {
-                let moved = drift + turned_arm(turn_b, p.r_b + core_b) - turned_arm(turn_a, p.r_a - core_a);
-                p.separation = p.computed_separation + moved.dot(normal);
-            }
-        }
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -228,7 +262,6 @@ impl Pair {
             }
             self.manifolds.push(manifold);
         }
-        old.clear();
     }
 }
 

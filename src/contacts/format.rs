@@ -6,18 +6,27 @@ use std::str::{FromStr, Lines, SplitWhitespace};
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, FreeBody, PointContact, Velocity};
+use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
 use crate::error::{Error, Result};
 
+/// What an HDF5 file begins with.
+const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+
 impl ContactProblem {
-    /// From a file.
+    /// From a file: text, or FCLIB's HDF5.
     ///
     /// # Errors
-    /// It cannot be read, or is not a contact problem; names file, line and value.
+    /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
-        Self::parse(&text).map_err(|e| e.within(path.display()))
+        let bytes = std::fs::read(path).map_err(Error::file(path))?;
+        let problem = if bytes.starts_with(HDF5_SIGNATURE) {
+            Self::from_fclib(bytes)
+        } else {
+            let text = String::from_utf8(bytes).map_err(|_| Error::input("neither text nor HDF5"));
+            text.and_then(|text| Self::parse(&text))
+        };
+        problem.map_err(|e| e.within(path.display()))
     }
 
     /// From text.
@@ -52,14 +61,7 @@ impl ContactProblem {
     /// # Errors
     /// It cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        let path = path.as_ref();
-        let partial = path.with_added_extension("partial");
-        let written = std::fs::write(&partial, self.to_text()).and_then(|()| std::fs::rename(&partial, path));
-        written.map_err(|e| {
-            // Nothing half-written stays; that there was nothing is no further error.
-            let _ = std::fs::remove_file(&partial);
-            Error::file(path)(e)
-        })
+        crate::files::write(path.as_ref(), self.to_text().as_bytes())
     }
 
     /// As text; every number is read back to the same bits.
@@ -94,13 +96,11 @@ fn body(f: &mut Fields) -> Result<FreeBody> {
         return Err(Error::input(format!("mass {mass:?}: must be more than 0")));
     }
     let [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
-    // Pivots of the elimination: all positive if, and only if, every rotation has energy.
-    let (p_yy, p_yz, p_zz) = (yy - xy * xy / xx, yz - xy * xz / xx, zz - xz * xz / xx);
-    if !(xx > 0.0 && p_yy > 0.0 && p_zz - p_yz * p_yz / p_yy > 0.0) {
+    let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+    if !is_positive_definite(inertia) {
         let inertia = [xx, xy, xz, yy, yz, zz];
         return Err(Error::input(format!("inertia {inertia:?}: must be positive definite")));
     }
-    let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
     let free = Velocity { linear: f.vector("velocity")?, angular: f.vector("angular velocity")? };
     Ok(FreeBody { mass, inertia, free })
 }

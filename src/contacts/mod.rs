@@ -8,8 +8,10 @@
 //! |r_t| <= mu r_n,  r_t = -mu r_n u_t/|u_t| where |u_t| > 0                       Coulomb
 //! ```
 //!
-//! The rows are those of docs/derivation.md, sections 2 and 6. As text: docs/contacts-format.md.
+//! The rows are those of docs/derivation.md, sections 2 and 6. As text: docs/contacts-format.md; as HDF5: FCLIB's global form.
 
+#[cfg(feature = "fclib")]
+mod fclib;
 mod format;
 mod operator;
 mod step;
@@ -79,4 +81,24 @@ impl PointContact {
     pub fn impulse(&self, r: DVec3) -> DVec3 {
         self.frame[0] * r.x + self.frame[1] * r.y + self.frame[2] * r.z
     }
+}
+
+#[cfg(not(feature = "fclib"))]
+impl ContactProblem {
+    fn from_fclib(_: Vec<u8>) -> crate::error::Result<Self> {
+        Err(crate::error::Error::input("an HDF5 file: drystone was built without the feature fclib, which reads it"))
+    }
+}
+
+/// Whether every direction has energy: the pivots of the elimination of a symmetric matrix are positive.
+fn is_positive_definite(m: DMat3) -> bool {
+    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = m.to_cols_array_2d();
+    let (p_yy, p_yz, p_zz) = (yy - xy * xy / xx, yz - xy * xz / xx, zz - xz * xz / xx);
+    xx > 0.0 && p_yy > 0.0 && p_zz - p_yz * p_yz / p_yy > 0.0
+}
+
+/// Scaled to order 1 meanwhile, so that the determinant of a small body's inertia does not vanish.
+fn inverse(m: DMat3) -> DMat3 {
+    let scale = 3.0 / (m.x_axis.x + m.y_axis.y + m.z_axis.z);
+    (m * scale).inverse() * scale
 }

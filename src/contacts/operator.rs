@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, Velocity};
+use super::{ContactProblem, Velocity, inverse};
 
 /// A problem with the inverse of its masses.
 #[derive(Clone, Debug)]
@@ -47,6 +47,22 @@ impl<'a> Operator<'a> {
         velocities
     }
 
+    /// How far the velocity [m/s] and the angular velocity [rad/s] of each body move at most if every impulse [N s] changes by
+    /// a share of itself.
+    pub fn moved_at_most(&self, impulses: &[DVec3], share: f64) -> Vec<[f64; 2]> {
+        let mut moved = vec![[0.0; 2]; self.problem.bodies.len()];
+        for (contact, &r) in self.problem.contacts.iter().zip(impulses) {
+            let p = contact.impulse(r) * share;
+            for (body, arm) in [(contact.a, contact.r_a), (contact.b, contact.r_b)] {
+                if let Some(body) = body.map(|i| i as usize) {
+                    moved[body][0] += p.length() / self.problem.bodies[body].mass;
+                    moved[body][1] += (self.inverse_inertia[body] * arm.cross(p)).length();
+                }
+            }
+        }
+        moved
+    }
+
     /// The relative velocity u at a contact, offset included, in its coordinates [m/s].
     pub fn relative_velocity(&self, contact: usize, velocities: &[Velocity]) -> DVec3 {
         let contact = &self.problem.contacts[contact];
@@ -71,10 +87,4 @@ impl<'a> Operator<'a> {
         }
         DMat3::from_cols_array_2d(&block)
     }
-}
-
-/// The inverse of an inertia, scaled to order 1 on the way, so that the determinant of a small one does not vanish.
-pub(super) fn inverse(inertia: DMat3) -> DMat3 {
-    let scale = 3.0 / (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z);
-    (inertia * scale).inverse() * scale
 }

@@ -2,8 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::operator::inverse;
-use super::{ContactProblem, FreeBody, PointContact, Velocity};
+use super::{ContactProblem, FreeBody, PointContact, Velocity, inverse};
 use crate::problem::{BodyRow, ContactRow, MassRow, StepProblem};
 
 impl ContactProblem {

@@ -1,13 +1,29 @@
 //! What happens to one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic` and
 //! `integrate_positions`.
 
-use super::rows::{Body, Inertia, Mass, StepParams, Sym3};
+use super::rows::{Body, Free, Inertia, Mass, StepParams, Sym3};
 use crate::math::{Lane, Vec3, cross3, dot3, exp_rotation, quat_mul, reciprocal, renormalized, turned, vec3};
 
-/// Adds gravity and force.
+/// Adds gravity and force; with `carry` also the impulses that the substep before ended with.
+///
+/// What they did then, M⁻¹ Gᵀ λ, is what they do now, since neither masses nor arms change within a step, and what they did
+/// then is what the velocities differ from the free ones by. So the warm start of every substep but the first costs one
+/// subtraction and one addition a body, and no pass over the contacts.
 #[inline(always)]
-pub fn integrate_velocities<L: Lane>(params: &StepParams<L>, mass: &Mass<L>, body: &mut Body<L>) {
+pub fn integrate_velocities<L: Lane>(
+    carry: bool,
+    params: &StepParams<L>,
+    mass: &Mass<L>,
+    body: &mut Body<L>,
+    free: &mut Free<L>,
+) {
+    let (carried_v, carried_w) = (body.v - free.v, body.w - free.w);
     body.v += mass.acceleration * params.substep;
+    (free.v, free.w) = (body.v, body.w);
+    if carry {
+        body.v += carried_v;
+        body.w += carried_w;
+    }
 }
 
 /// Moves a body by its velocity.
@@ -34,6 +50,7 @@ pub fn integrate_gyroscopic<L: Lane>(
     params: &StepParams<L>,
     inertia: &Inertia<L>,
     body: &mut Body<L>,
+    free: &mut Free<L>,
     mass: &mut Mass<L>,
 ) {
     let (zero, one, half) = (L::constant(0.0), L::constant(1.0), L::constant(0.5));
@@ -46,8 +63,8 @@ pub fn integrate_gyroscopic<L: Lane>(
     let y = turned(q, unit_y) + unit_y;
     let z = turned(q, unit_z) + unit_z;
 
-    // Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
-    let spin = vec3(dot3(x, body.w), dot3(y, body.w), dot3(z, body.w));
+    // The free spin: impulses come after. Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
+    let spin = vec3(dot3(x, free.w), dot3(y, free.w), dot3(z, free.w));
     let mut next = spin;
     for _ in 0..2 {
         let m = (spin + next) * half;
@@ -61,7 +78,9 @@ pub fn integrate_gyroscopic<L: Lane>(
     }
     // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
     let change = next - spin;
-    body.w += x * change.x + y * change.y + z * change.z;
+    let turn = x * change.x + y * change.y + z * change.z;
+    free.w += turn;
+    body.w += turn;
 
     // The inverse inertia in world axes.
     let (kx, ky, kz) = (x * k.x, y * k.y, z * k.z);

@@ -14,7 +14,7 @@ mod rows;
 mod state;
 
 pub use rows::{
-    Body, Contact, Impulse, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, Step, StepParams, Sym3,
+    Body, Contact, Free, Impulse, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, Step, StepParams, Sym3,
 };
 pub use state::Rows;
 

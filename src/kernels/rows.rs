@@ -18,6 +18,15 @@ pub struct Body<L> {
     pub dq: Quat<L>,
 }
 
+/// Double of the WGSL struct `Free`: velocities of a body as they would be without the impulses of this substep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Free<L> {
+    /// Of the centre of mass.
+    pub v: Vec3<L>,
+    /// Angular velocity.
+    pub w: Vec3<L>,
+}
+
 /// A symmetric 3x3 matrix: the upper triangle, row by row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sym3<L> {

@@ -32,6 +32,21 @@ impl BodyRow {
         Self { v: [0.0; 3], pad_v: 0.0, w: [0.0; 3], pad_w: 0.0, dp: [0.0; 3], pad_dp: 0.0, dq: [0.0, 0.0, 0.0, 1.0] };
 }
 
+/// Velocities of one body as they would be without the impulses of this substep, 32 B. A backend keeps them from pass to
+/// pass; no step asks for those of the step before, so they are not part of a problem.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FreeRow {
+    /// Velocity of the centre of mass [m/s].
+    pub v: [f32; 3],
+    #[doc(hidden)]
+    pub pad_v: f32,
+    /// Angular velocity, world axes [rad/s].
+    pub w: [f32; 3],
+    #[doc(hidden)]
+    pub pad_w: f32,
+}
+
 /// How hard one body is to move, 48 B. All zero for a body that cannot be pushed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -91,8 +106,10 @@ pub struct ContactRow {
     pub radius_a: f32,
     /// Radius of curvature of b's surface [m].
     pub radius_b: f32,
+    /// How far the springs of a soft contact are compressed while the surfaces just touch: separations are that much less [m].
+    pub preload: f32,
     #[doc(hidden)]
-    pub pad: [f32; 2],
+    pub pad: f32,
 }
 
 impl ContactRow {
@@ -219,6 +236,11 @@ impl Softness {
     /// A rigid constraint with a target velocity of `bias_rate` times the overlap.
     pub fn rigid(bias_rate: f32, push_limit: f32) -> Self {
         Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
+    }
+
+    /// Overlap at rest per impulse of a substep, times the effective mass [s]; 0 of a rigid constraint.
+    pub fn compliance(&self) -> f32 {
+        if self.impulse_scale > 0.0 { self.impulse_scale / (self.mass_scale * self.bias_rate) } else { 0.0 }
     }
 }
 

@@ -1,14 +1,15 @@
 //! One step as a value: plain rows in color order, whose names are the names of the WGSL bindings.
 
+mod contacts;
 pub mod effective;
 mod layout;
 mod prepare;
 pub mod softness;
 mod store;
-mod weigh;
 
 pub use layout::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow, Params,
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
+    Params,
     PassColors, PointRow, Softness,
 };
 pub use prepare::Prepared;

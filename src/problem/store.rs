@@ -3,14 +3,14 @@
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::prepare::{CHUNK, Prepared};
+use super::prepare::Prepared;
 use super::{ImpulseRow, StepProblem};
 use crate::collide::Pair;
 use crate::world::{BodyKind, World};
 
 impl Prepared {
-    /// Writes poses and velocities into the world, and impulses into the manifolds that the rows came from.
-    pub fn store(&mut self, problem: &StepProblem, world: &mut World, pairs: &mut [Pair]) {
+    /// Writes poses and velocities into the world. The impulses of contacts stay in the rows, where the next step finds them.
+    pub fn store(&mut self, problem: &StepProblem, world: &mut World) {
         world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies).for_each(|(body, row)| {
             if body.kind == BodyKind::Fixed {
                 return;
@@ -24,26 +24,33 @@ impl Prepared {
         for (&i, row) in self.joint_coloring.order.iter().zip(&problem.joint_impulses) {
             self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
         }
-        let begin = |pair: usize| self.contacts.partition_point(|contact| (contact.0 as usize) < pair);
-        pairs.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, pairs)| {
-            let first_pair = chunk * CHUNK;
-            let own = begin(first_pair)..begin(first_pair + pairs.len());
-            for (&(i, k), &row) in self.contacts[own.clone()].iter().zip(&self.row_of[own]) {
-                let contact = &problem.contacts[row as usize];
-                let (tangent_1, tangent_2) = contact.tangents();
-                let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-                let manifold = &mut pairs[i as usize - first_pair].manifolds[k as usize];
-                let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
-                for (point, impulse) in manifold.points_mut().iter_mut().zip(&problem.impulses[first..end]) {
-                    point.normal_impulse = impulse.normal;
-                    point.friction_impulse = friction(impulse);
-                }
-                // With friction per manifold the row after the points is the patch's.
-                if self.patches {
-                    manifold.twist_impulse = problem.impulses[end].normal;
-                    manifold.friction_impulse = friction(&problem.impulses[end]);
-                }
+    }
+
+    /// Brings colors, separations and impulses of the rows of `problem` to the manifolds of a pair, unless they were computed
+    /// since.
+    pub fn give_back(&self, problem: &StepProblem, pair: &mut Pair) {
+        if pair.computed_in > self.seen {
+            return;
+        }
+        for (k, manifold) in pair.manifolds.iter_mut().enumerate() {
+            let at = pair.contact as usize + k;
+            let contact = &problem.contacts[self.row_of[at] as usize];
+            let (tangent_1, tangent_2) = contact.tangents();
+            let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+            manifold.color = self.edges[at].color;
+            manifold.preload = contact.preload;
+            let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
+            let rows = problem.points[first..end].iter().zip(&problem.impulses[first..end]);
+            for (point, (row, impulse)) in manifold.points_mut().iter_mut().zip(rows) {
+                point.separation = row.separation + contact.preload;
+                point.normal_impulse = impulse.normal;
+                point.friction_impulse = friction(impulse);
             }
-        });
+            // With friction per manifold the row after the points is the patch's.
+            if self.patches {
+                manifold.twist_impulse = problem.impulses[end].normal;
+                manifold.friction_impulse = friction(&problem.impulses[end]);
+            }
+        }
     }
 }

@@ -93,7 +93,7 @@ fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
         for _ in 1..step {
             simulation.step(scene.dt)?;
         }
-        problems.push(simulation.next_contacts(&format!("{}, step {step}", scene.name), scene.dt)?);
+        problems.push(simulation.step_with_contacts(&format!("{}, step {step}", scene.name), scene.dt)?.0);
     }
     if let Some(folder) = folder {
         let entries = std::fs::read_dir(folder).and_then(|all| all.map(|e| e.map(|e| e.path())).collect());

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 
 use super::Scene;
-use super::parts::{floor, slope};
+use super::parts::{centered, floor, slope};
 use super::stacks::stack;
 use crate::world::{Body, Shape, World};
 
@@ -28,6 +28,24 @@ pub(super) fn slide(degrees: f32, mu: f32) -> Scene {
 pub(super) fn roll(degrees: f32, mu: f32) -> Scene {
     let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5));
     on_slope("roll", ball, 0.5, degrees, mu)
+}
+
+/// 25 balls of 1 kg, 2 m apart, on a plate of 10 kg that is pushed by 150 N at `degrees` from x; friction is 0.4 below the
+/// plate and 0.8 on it. The plate slides straight along the push and the balls roll on it: m a = f for each ball, M A = 150 N
+/// - 0.4 (M + 25 m) g - 25 f, and A = 7/2 a where a ball touches. 4 s in steps of 1 ms. Source: SimBenchmark, "rolling".
+pub(super) fn rolling(degrees: f32) -> Scene {
+    let mut world = World::new();
+    world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(0.2));
+    let plate = Body::dynamic().named("plate").shape(Shape::cuboid(10.0, 0.5, 10.0)).total_mass(10.0).friction(0.8);
+    let plate = world.add(plate.position(0.0, 0.5, 0.0));
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    world.bodies[plate].force = 150.0 * Vec3::new(cos, 0.0, sin);
+    for k in 0..25 {
+        let [x, z] = [k / 5, k % 5].map(|k| 2.0 * centered(k, 5) as f32);
+        let ball = Body::dynamic().named(format!("ball {k}")).shape(Shape::ball(0.5)).total_mass(1.0).friction(0.8);
+        world.add(ball.position(x, 1.5, z));
+    }
+    Scene { dt: 1e-3, ..Scene::new("rolling", world, 4000) }
 }
 
 /// A body whose center is `height` above a slope that falls towards x.

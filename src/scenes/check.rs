@@ -53,7 +53,7 @@ fn container(corners: [[f64; 3]; 2]) -> Result<(Vec3, Vec3)> {
 }
 
 fn body(file: &BodyFile) -> Result<Body> {
-    let body = match file.kind {
+    let mut body = match file.kind {
         BodyKind::Fixed => Body::fixed(),
         BodyKind::Kinematic => Body::kinematic(),
         BodyKind::Dynamic => Body::dynamic(),
@@ -62,6 +62,9 @@ fn body(file: &BodyFile) -> Result<Body> {
     let velocity = |name, v| if file.kind == BodyKind::Fixed { zero(name, v) } else { finite(name, v) };
     let linear = velocity("linear_velocity", file.linear_velocity)?;
     let angular = velocity("angular_velocity", file.angular_velocity)?;
+    let pushed = |x: f32| x == 0.0 || file.kind == BodyKind::Dynamic;
+    let force = checked("force", file.force, "zero unless the body is dynamic", pushed)?;
+    body.force = force.into();
     let mut body = body
         .position(x, y, z)
         .rotation(rotation("rotation", file.rotation)?)

@@ -85,6 +85,12 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| Ok(basics::roll(v[0] as f32, v[1] as f32)),
     },
     Entry {
+        name: "rolling",
+        summary: "balls on a plate that is pushed over the ground: they roll on it, all along the push, as on paper",
+        parameters: &[Parameter::real("angle", 60.0, (0.0, 360.0), "direction of the push, from x to z [degrees]")],
+        build: |v| Ok(basics::rolling(v[0] as f32)),
+    },
+    Entry {
         name: "throw",
         summary: "a ball is thrown at a stack of cubes: the stack stands until it is hit, then it falls",
         parameters: &[
@@ -109,7 +115,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 36 mm deep, or 2 with substeps=32",
+        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 1.5 mm deep, or 0.01 with substeps=32",
         parameters: &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),

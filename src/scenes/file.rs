@@ -67,6 +67,8 @@ pub struct BodyFile {
     pub linear_velocity: [f64; 3],
     /// Angular velocity in world axes [rad/s]; zero for a fixed body.
     pub angular_velocity: [f64; 3],
+    /// Force through the center of mass, besides gravity [N]; zero unless dynamic.
+    pub force: [f64; 3],
     /// Density of all shapes [kg/m³], more than 0. 1000 for a dynamic body that says nothing about its mass.
     pub density: Option<f64>,
     /// Total mass [kg], more than 0, instead of the density.
@@ -90,6 +92,7 @@ impl Default for BodyFile {
             rotation: defaults::rotation(),
             linear_velocity: [0.0; 3],
             angular_velocity: [0.0; 3],
+            force: [0.0; 3],
             density: None,
             mass: None,
             mass_properties: None,

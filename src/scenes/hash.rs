@@ -25,7 +25,7 @@ impl Scene {
         let _ = write!(sink, "{:?} {:?}", self.dt, self.world.gravity);
         for b in &self.world.bodies {
             let pose = (b.kind, b.position, b.rotation, b.linear_velocity, b.angular_velocity);
-            let _ = write!(sink, "{pose:?} {:?} {:?}", b.mass, b.material);
+            let _ = write!(sink, "{pose:?} {:?} {:?} {:?}", b.force, b.mass, b.material);
             for c in &b.colliders {
                 let _ = write!(sink, "{} {:?} {:?}", c.shape.geometry(), c.position, c.rotation);
             }
@@ -43,9 +43,10 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(scene.content_hash(), Scene::find("drop", &[]).unwrap().content_hash());
-        let changes: [fn(&mut Scene); 4] = [
+        let changes: [fn(&mut Scene); 5] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
+            |s| s.world.bodies[3].force.y = 1e-3,
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].colliders[0].shape = crate::Shape::ball(0.25),
         ];

@@ -4,10 +4,10 @@
 //! Coulomb's cone allows (docs/derivation.md, sections 4 and 6). The accelerated method adds momentum to them
 //! ([`crate::kernels::momentum`]).
 //!
-//! In f32 the velocities that sweeps carry along drift away from those of the impulses, by rounding: some 3e-8 of the free
-//! velocities a sweep, more with momentum. So they are set right, in f64, after every 64 sweeps and wherever momentum ended.
-//! Errors e_vel that f32 ends at without that and with it, accelerated, after 1000 sweeps: Spheres-i099 4e-5 and 3e-7,
-//! KaplaTower-135 4e-5 and 8e-7, mj_wall 2e-3 and 5e-5, BoxStacks-610 2e-4 and 2e-6.
+//! Velocities that sweeps carry along drift away from those of the impulses, by rounding: in f32 by some 3e-8 of the free
+//! velocities a sweep, more with momentum. So they are set right, in f64, after every 64 plain sweeps and wherever momentum
+//! ended. Errors e_vel that f32 comes to without that and with it, accelerated, after 1000 sweeps: Spheres-i099 4e-5 and
+//! 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5, tower10 5e-4 and 1e-4.
 
 mod assemble;
 mod oracle;
@@ -28,8 +28,14 @@ use crate::plan::StepPlan;
 use crate::problem::StepProblem;
 use assemble::Assembled;
 
-/// Sweeps after which velocities in f32 are set right.
+/// Plain sweeps after which velocities are set right.
 const DRIFT_SWEEPS: u32 = 64;
+
+/// Share of an impulse that the rounding of some sweeps in f32 makes.
+const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
+
+/// Sweeps after which momentum begins anew: it multiplies rounding by as much as it is old.
+const LONGEST_MOMENTUM: u32 = 1024;
 
 /// A contact problem while it is solved.
 pub struct Solver<'a> {
@@ -42,6 +48,8 @@ pub struct Solver<'a> {
     points: Vec<u32>,
     hands: Vec<f64>,
     sweeps: u32,
+    /// Sweeps since momentum was begun, or velocities set right.
+    since: u32,
 }
 
 /// What runs the sweeps.
@@ -68,7 +76,7 @@ impl<'a> Solver<'a> {
             None => Work::Exact(Box::new(Reference::holding(rows))),
             Some(backend) => Work::Rounded(backend),
         };
-        Ok(Self { operator: Operator::new(contacts), work, method, passes: order.passes(), problem, points, hands, sweeps: 0 })
+        Ok(Self { operator: Operator::new(contacts), work, method, passes: order.passes(), problem, points, hands, sweeps: 0, since: 0 })
     }
 
     /// The same with every manifold swept so many times before the next, and not as often as its order proposes.
@@ -96,25 +104,26 @@ impl<'a> Solver<'a> {
     pub fn advance(&mut self, sweeps: u32) -> Result<()> {
         let end = self.sweeps + sweeps;
         while self.sweeps < end {
-            let stop = match (&self.work, self.method) {
-                (Work::Exact(_), _) => end,
-                (Work::Rounded(_), Method::Plain) => end.min((self.sweeps / DRIFT_SWEEPS + 1) * DRIFT_SWEEPS),
-                // Momentum may end with any.
-                (Work::Rounded(_), Method::Accelerated) => self.sweeps + 1,
+            // Momentum may end with any sweep.
+            let count = match self.method {
+                Method::Plain => (end - self.sweeps).min(DRIFT_SWEEPS - self.since),
+                Method::Accelerated => 1,
             };
-            let plan = StepPlan::of_sweeps(&self.problem, self.method, self.passes, self.sweeps..stop);
-            self.sweeps = stop;
+            let range = self.since..self.since + count;
+            let plan = StepPlan::of_sweeps(&self.problem, self.method, self.passes, range);
+            (self.sweeps, self.since) = (self.sweeps + count, self.since + count);
+            let restarts = self.restarts();
             match &mut self.work {
                 Work::Exact(reference) => reference.advance(&self.problem, &plan.passes),
-                Work::Rounded(backend) => {
-                    let restarts = self.problem.momentum.restarts;
-                    backend.run(&mut self.problem, &plan.passes)?;
-                    // Right after a restart nothing depends on the velocities of the sweep before.
-                    let due = stop.is_multiple_of(DRIFT_SWEEPS) && self.method == Method::Plain;
-                    if due || self.problem.momentum.restarts > restarts {
-                        self.set_right();
-                    }
-                }
+                Work::Rounded(backend) => backend.run(&mut self.problem, &plan.passes)?,
+            }
+            // Right after a restart nothing depends on the velocities of the sweep before. Begun anew, it is one, too.
+            let is_new = self.since == if self.method == Method::Plain { DRIFT_SWEEPS } else { LONGEST_MOMENTUM };
+            if is_new {
+                self.since = 0;
+            }
+            if is_new || self.restarts() > restarts {
+                self.set_right();
             }
         }
         Ok(())
@@ -154,11 +163,35 @@ impl<'a> Solver<'a> {
         movable.map(velocity).collect()
     }
 
-    /// Gives every body the velocity that belongs to the impulses.
+    fn restarts(&self) -> u32 {
+        match &self.work {
+            Work::Exact(reference) => reference.rows().momentum.restarts,
+            Work::Rounded(_) => self.problem.momentum.restarts,
+        }
+    }
+
+    /// Gives every body the velocity that belongs to the impulses, where it differs by more than their rounding explains: that
+    /// would only come into the velocities. (tower2_1_1000 then ends 1.3e-5 from f64 instead of 8e-6.)
     fn set_right(&mut self) {
-        let velocities = self.operator.velocities(&self.impulses());
-        for (row, velocity) in self.problem.bodies.iter_mut().zip(velocities) {
-            (row.v, row.w) = (velocity.linear.as_vec3().to_array(), velocity.angular.as_vec3().to_array());
+        let impulses = self.impulses();
+        let right = self.operator.velocities(&impulses);
+        match &mut self.work {
+            Work::Exact(reference) => {
+                let bodies = reference.rows_mut().bodies.iter_mut();
+                bodies.zip(right).for_each(|(row, velocity)| *row = assemble::body(velocity));
+            }
+            Work::Rounded(_) => {
+                let explained = self.operator.moved_at_most(&impulses, ROUNDING);
+                let carried = self.velocities();
+                for (i, velocity) in right.into_iter().enumerate() {
+                    let apart = |a: DVec3, b: DVec3, explained: f64| a.distance(b) > explained;
+                    if apart(carried[i].linear, velocity.linear, explained[i][0])
+                        || apart(carried[i].angular, velocity.angular, explained[i][1])
+                    {
+                        self.problem.bodies[i] = assemble::body(velocity).store();
+                    }
+                }
+            }
         }
     }
 }

@@ -309,8 +309,12 @@ impl Body {
                 "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
             ));
         }
-        if self.kind != BodyKind::Fixed && self.colliders.iter().any(|c| !c.shape.has_volume()) {
-            return refuse("half-spaces, meshes and height fields are for fixed bodies".into());
+        let is_plane = |c: &Collider| c.shape.as_half_space().is_some();
+        if self.kind == BodyKind::Kinematic && self.colliders.iter().any(is_plane) {
+            return refuse("half-spaces are for fixed bodies".into());
+        }
+        if self.kind == BodyKind::Dynamic && self.colliders.iter().any(|c| !c.shape.has_volume()) {
+            return refuse("half-spaces, meshes and height fields have no mass: not for dynamic bodies".into());
         }
         let MassProperties { mass, principal_inertia, .. } = self.mass;
         let has_mass = |x: f32| x > 0.0 && x.is_finite();

@@ -3,11 +3,13 @@
 mod body;
 mod joint;
 mod shape;
+mod surface;
 
 pub use body::{Body, BodyKind, Collider, MassProperties, Material};
 pub use joint::BallJoint;
 pub use shape::Shape;
 pub(crate) use shape::pose;
+pub use surface::Triangles;
 
 use glam::Vec3;
 

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
 ///
-/// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; half-space, triangle mesh and height field
-/// only on fixed bodies, since they have no mass.
+/// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; triangle mesh and height field not on dynamic
+/// ones, since they have no mass; half-space only on fixed ones.
 #[derive(Clone)]
 pub struct Shape(pub(crate) SharedShape);
 
@@ -126,6 +126,11 @@ impl Shape {
     pub fn bounding_radius(&self) -> f32 {
         let sphere = self.0.compute_local_bounding_sphere();
         sphere.center().length() + sphere.radius()
+    }
+
+    /// parry's shape, for those who hand it to another engine.
+    pub fn parry(&self) -> &SharedShape {
+        &self.0
     }
 
     /// Half of the smallest side of the shape's own bounding box [m]; infinite for a half-space.

@@ -41,7 +41,8 @@ pub fn every_rules() -> Vec<Rules> {
 /// Every kernel under every combination of rules.
 pub fn every_kernel() -> Vec<Kernel> {
     let mut all = vec![
-        Kernel::IntegrateVelocities,
+        Kernel::IntegrateVelocities { carry: false },
+        Kernel::IntegrateVelocities { carry: true },
         Kernel::IntegrateGyroscopic,
         Kernel::IntegratePositions,
         Kernel::ClearImpulses,

@@ -14,13 +14,13 @@ use super::{begin_sweep, chunk_sums};
 use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spread};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spread, velocity_row};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::{extrapolate, extrapolated, squared_step, workgroup_sum};
-use crate::kernels::{Inertia, Joint, Momentum, Pair, Step, StepParams};
-use crate::math::Vec3;
+use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
+use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
 
@@ -33,6 +33,8 @@ pub struct Cpu {
     bodies: Vec<State>,
     masses: Vec<Row8>,
     accelerations: Vec<Row8>,
+    /// v . w . without the impulses of the substep.
+    free: Vec<Row8>,
     groups: Groups,
     convergence: ConvergenceRow,
     inertias: Vec<Inertia<f32>>,
@@ -68,6 +70,7 @@ impl Cpu {
             bodies: Vec::new(),
             masses: Vec::new(),
             accelerations: Vec::new(),
+            free: Vec::new(),
             groups: Groups::default(),
             convergence: ConvergenceRow::default(),
             inertias: Vec::new(),
@@ -102,6 +105,7 @@ impl Cpu {
             Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0])
         }));
         self.accelerations.resize(self.bodies.len(), Row8::default());
+        self.free.resize(self.bodies.len(), Row8::default());
         self.inertias.clear();
         self.inertias.extend(problem.inertias.iter().map(Inertia::load));
         self.joints.clear();
@@ -139,11 +143,12 @@ impl Cpu {
                     impulse[..3].fill(Row8::default());
                 }
             }
-            Kernel::IntegrateVelocities | Kernel::IntegratePositions => {
+            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
                 let groups = 0..self.bodies.len() / 8;
                 let (kernel, params) = (pass.kernel, &problem.params);
-                let (instructions, bodies) = (self.instructions, Shared::new(&mut self.bodies));
-                let work = BodyWork { kernel, params, bodies, accelerations: &self.accelerations };
+                let (bodies, free) = (Shared::new(&mut self.bodies), Shared::new(&mut self.free));
+                let (instructions, accelerations) = (self.instructions, &self.accelerations);
+                let work = BodyWork { kernel, params, bodies, free, accelerations };
                 spread(groups, &|range| work.run(instructions, range));
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
@@ -172,8 +177,11 @@ impl Cpu {
                 for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
                     let i = row.body as usize;
                     let (mut body, mut mass) = (self.bodies[i].load(), load_mass(&self.masses[i]));
-                    integrate_gyroscopic(&params, inertia, &mut body, &mut mass);
+                    let [vx, vy, vz, _, wx, wy, wz, _] = self.free[i].0;
+                    let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+                    integrate_gyroscopic(&params, inertia, &mut body, &mut free, &mut mass);
                     self.bodies[i].store_velocity(&body);
+                    self.free[i] = velocity_row(free.v, free.w);
                     let (x, yz) = (mass.inv_inertia.x, mass.inv_inertia.yz);
                     self.masses[i] = Row8([x.x, x.y, x.z, mass.inv_mass, yz.x, yz.y, yz.z, 0.0]);
                 }

@@ -7,7 +7,7 @@ use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, w
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::{extrapolate, extrapolated, squared_step, workgroup_sum};
-use crate::kernels::{Contact, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
+use crate::kernels::{Contact, Free, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -16,6 +16,7 @@ use crate::problem::{ConvergenceRow, StepProblem};
 #[derive(Debug, Default)]
 pub struct Reference<S> {
     rows: Rows<S>,
+    free: Vec<Free<S>>,
     convergence: ConvergenceRow,
     /// What accelerated sweeps leave for each other: velocities of the sweep before, impulses of points and joints, and how
     /// far a sweep moved them.
@@ -41,6 +42,11 @@ impl<S: Scalar> Reference<S> {
         &self.rows
     }
 
+    /// The rows, to change before the next passes.
+    pub fn rows_mut(&mut self) -> &mut Rows<S> {
+        &mut self.rows
+    }
+
     /// Runs passes over the rows that are loaded, in all the digits of `S`; `problem` says which row belongs to which.
     pub fn advance(&mut self, problem: &StepProblem, passes: &[Pass]) {
         for pass in passes {
@@ -51,15 +57,18 @@ impl<S: Scalar> Reference<S> {
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
         let params = &self.rows.params;
         match pass.kernel {
-            Kernel::IntegrateVelocities => {
-                for (body, mass) in self.rows.bodies.iter_mut().zip(&self.rows.masses) {
-                    integrate_velocities(params, mass, body);
+            Kernel::IntegrateVelocities { carry } => {
+                self.free.resize(self.rows.bodies.len(), Free::default());
+                let free = &mut self.free;
+                for ((body, free), mass) in self.rows.bodies.iter_mut().zip(free).zip(&self.rows.masses) {
+                    integrate_velocities(carry, params, mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {
                 for (row, inertia) in problem.inertias.iter().zip(&self.rows.inertias) {
                     let i = row.body as usize;
-                    integrate_gyroscopic(params, inertia, &mut self.rows.bodies[i], &mut self.rows.masses[i]);
+                    let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
+                    integrate_gyroscopic(params, inertia, body, free, &mut self.rows.masses[i]);
                 }
             }
             Kernel::IntegratePositions => {

@@ -12,7 +12,7 @@ use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
-use crate::kernels::{Body, Contact, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+use crate::kernels::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{Params, Softness};
@@ -38,9 +38,13 @@ impl State {
 
     /// Takes over the velocities.
     pub fn store_velocity(&mut self, body: &Body<f32>) {
-        let (v, w) = (body.v, body.w);
-        self.velocity = Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0]);
+        self.velocity = velocity_row(body.v, body.w);
     }
+}
+
+/// Two velocities in a row.
+pub(super) fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
+    Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0])
 }
 
 /// The masses that a row of eight numbers holds.
@@ -150,6 +154,7 @@ pub(super) struct BodyWork<'a> {
     pub kernel: Kernel,
     pub params: &'a Params,
     pub bodies: Shared<'a, State>,
+    pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
 }
 
@@ -173,10 +178,19 @@ impl BodyWork<'_> {
             // SAFETY: tasks have different groups, and so different bodies.
             let states = unsafe { read_states(&self.bodies, bodies) };
             let mut body = wide_body::<L>(&states);
-            if self.kernel == Kernel::IntegrateVelocities {
+            if let Kernel::IntegrateVelocities { carry } = self.kernel {
                 let [x, y, z, ..] = L::transposed(eight!(lane => L::load(&self.accelerations[bodies[lane]])));
                 let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
-                integrate_velocities(&params, &mass, &mut body);
+                // SAFETY: as above.
+                let rows = unsafe { self.free.slice(bodies[0]..bodies[0] + 8) };
+                let [vx, vy, vz, _, wx, wy, wz, _] = L::transposed(eight!(lane => L::load(&rows[lane])));
+                let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+                integrate_velocities(carry, &params, &mass, &mut body, &mut free);
+                let (v, w, zero) = (free.v, free.w, L::constant(0.0));
+                let freed = L::transposed([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero]);
+                for (row, lane) in rows.iter_mut().zip(freed) {
+                    *row = lane.store();
+                }
             } else {
                 integrate_positions(&params, &mut body);
             }

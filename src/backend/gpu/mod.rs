@@ -19,6 +19,17 @@ use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, MomentumRow, PassColors, StepProblem};
 use shader::{BINDINGS, PASS_COLORS, SCRATCH, SCRATCH_ROW, WORKGROUP};
 
+/// Opens the adapter that `choice` finds, for drawing.
+///
+/// # Errors
+/// No such adapter, or it cannot be opened.
+#[cfg(feature = "view")]
+pub(crate) fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+    let (adapter, summary) = adapter::find(choice)?;
+    let (device, queue) = adapter::open(&adapter, false)?;
+    Ok((device, queue, summary))
+}
+
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
@@ -109,8 +120,8 @@ impl Gpu {
                 )));
             }
         }
-        for (binding, size) in (rows.len()..).zip(scratch_sizes(problem)) {
-            self.reserve(binding, if accelerated { size } else { 0 }, limit);
+        for (binding, size) in (rows.len()..).zip(scratch_sizes(problem, accelerated)) {
+            self.reserve(binding, size, limit);
         }
         for (binding, bytes) in rows.into_iter().enumerate() {
             self.reserve(binding, bytes.len() as u64, limit);
@@ -302,10 +313,12 @@ fn bind(device: &wgpu::Device, buffers: &[Option<wgpu::Buffer>], kernel: &Compil
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &kernel.layout, entries: &entries })
 }
 
-/// Bytes of the buffers that stay on the device.
-fn scratch_sizes(problem: &StepProblem) -> [u64; SCRATCH] {
-    let (bodies, impulses) = (problem.bodies.len(), problem.impulse_count());
-    [SCRATCH_ROW * bodies, SCRATCH_ROW * impulses, size_of::<f32>() * impulses.div_ceil(CHUNK)].map(|bytes| bytes as u64)
+/// Bytes of the buffers that stay on the device: all but the first are for accelerated sweeps.
+fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [u64; SCRATCH] {
+    let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
+    let before = if accelerated { bodies } else { 0 };
+    let sums = size_of::<f32>() * impulses.div_ceil(CHUNK);
+    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums].map(|bytes| bytes as u64)
 }
 
 /// The distinct color ranges of the passes, `stride` bytes apart, and where each pass finds its own.
@@ -329,7 +342,7 @@ fn color_ranges(passes: &[Pass], stride: usize) -> (Vec<u8>, Vec<u32>) {
 /// dispatch, beyond which each thread takes several.
 fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
     let rows = match pass.kernel {
-        Kernel::IntegrateVelocities | Kernel::IntegratePositions => problem.bodies.len(),
+        Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
         Kernel::ClearImpulses => problem.impulses.len(),
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),

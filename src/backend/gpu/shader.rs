@@ -10,7 +10,7 @@ use crate::kernels::Rules;
 use crate::plan::Kernel;
 
 /// Name of each binding; the place in this list is its number. All but the last [`SCRATCH`] are fields of `StepProblem`.
-pub const BINDINGS: [&str; 16] = [
+pub const BINDINGS: [&str; 17] = [
     "params",
     "pass_colors",
     "bodies",
@@ -24,13 +24,15 @@ pub const BINDINGS: [&str; 16] = [
     "joint_impulses",
     "convergence",
     "momentum",
+    "free",
     "velocities_before",
     "impulse_steps",
     "squares",
 ];
-/// How many of them, the last, stay on the device: what accelerated sweeps leave for each other.
-pub const SCRATCH: usize = 3;
-/// Size of a row of the first two of these, two vectors [B].
+/// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
+/// sweeps leave for each other.
+pub const SCRATCH: usize = 4;
+/// Size of a row of all of these but the last: two vectors [B].
 pub const SCRATCH_ROW: usize = 32;
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;
@@ -59,7 +61,7 @@ macro_rules! part {
 /// The WGSL of a kernel: the parts it is made of, one after another.
 pub fn source(kernel: Kernel) -> String {
     let own: &[&str] = match kernel {
-        Kernel::IntegrateVelocities => &[part!("integrate_velocities")],
+        Kernel::IntegrateVelocities { .. } => &[part!("integrate_velocities")],
         Kernel::IntegrateGyroscopic => &[part!("integrate_gyroscopic")],
         Kernel::IntegratePositions => &[part!("integrate_positions")],
         Kernel::ClearImpulses => &[part!("clear_impulses")],
@@ -103,6 +105,7 @@ pub fn constants(kernel: Kernel) -> Vec<(&'static str, f64)> {
     };
     let contact = |r: Rules| vec![("ACCUMULATED", yes(r.accumulated)), ("ROUND", yes(r.round))];
     match kernel {
+        Kernel::IntegrateVelocities { carry } => vec![("CARRY", yes(carry))],
         Kernel::BeginSweep { first } => vec![("FIRST", yes(first))],
         Kernel::Extrapolate { first, measured } => vec![("FIRST", yes(first)), ("MEASURED", yes(measured))],
         Kernel::WarmStartJoints => pair(Rules::default()),

@@ -55,7 +55,7 @@ impl Setting {
             sweeps: config.iterations,
             method: "plain".into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
-            more: String::new(),
+            more: unusual(config).join(" "),
         }
     }
 
@@ -70,6 +70,15 @@ impl Setting {
         }
         label
     }
+}
+
+/// Settings that are not at their defaults, as `key=value`, those of [`Setting`] left out.
+fn unusual(config: &SolverConfig) -> Vec<String> {
+    let table = |config: &SolverConfig| toml::Table::try_from(config).expect("a config is a table");
+    let usual = table(&SolverConfig::default());
+    let said = ["substeps", "iterations", "friction"];
+    let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
+    table(config).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
 }
 
 /// Drystone itself.
@@ -107,5 +116,19 @@ impl Contender for Drystone {
 
     fn world(&mut self) -> &World {
         &self.simulation.world
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_says_what_is_not_at_its_default() {
+        let mut config = SolverConfig { substeps: 4, friction: FrictionRule::Box, ..SolverConfig::default() };
+        assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x1 box");
+        config.set("contact_frequency=0.25").unwrap();
+        config.set("relax=2").unwrap();
+        assert_eq!(Setting::drystone("cpu", &config).more, "contact_frequency=0.25 relax=2");
     }
 }

@@ -126,7 +126,7 @@ pub fn race(
                 let world = contender.world();
                 lane.finite = world.first_non_finite().is_none();
                 if lane.finite && 2 * block >= blocks {
-                    detector.detect_anew(world, &SolverConfig::default(), 0.0);
+                    detector.detect_anew(world, &SolverConfig::default(), 0.0, &|_| ());
                     lane.ms.push(ms);
                     lane.penetration.push(Penetration::of(detector.pairs()));
                     lane.speed.push(rms_speed(world));

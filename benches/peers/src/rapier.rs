@@ -1,0 +1,102 @@
+//! rapier3d, from a drystone world and back.
+
+use drystone::report::front::{Contender, Setting};
+use drystone::world::{BodyKind, MassProperties as Mass};
+use drystone::{Body, Error, Result, Scene, World};
+use rapier3d::prelude::*;
+
+use crate::entrant::setting;
+
+/// A scene in Rapier's hands.
+pub(crate) struct Rapier {
+    physics: PhysicsWorld,
+    handles: Vec<RigidBodyHandle>,
+    world: World,
+}
+
+impl Rapier {
+    /// Contact springs between a body that moves and one that does not are twice as stiff, as they are by default.
+    pub(crate) fn new(scene: &Scene, substeps: u32, hertz: f32, threads: usize) -> Result<Self> {
+        let world = scene.world.clone();
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = world.gravity;
+        let parameters = &mut physics.integration_parameters;
+        parameters.dt = scene.dt;
+        parameters.num_solver_iterations = substeps as usize;
+        parameters.contact_softness.natural_frequency = hertz;
+        parameters.static_contact_softness.natural_frequency = 2.0 * hertz;
+        set_threads(&mut physics, threads)?;
+
+        let handles: Vec<_> = world.bodies.iter().map(|body| insert(&mut physics, body)).collect();
+        // The body that stands for the world in joints to it.
+        let ground = physics.insert_body(RigidBodyBuilder::fixed());
+        for joint in &world.joints {
+            let b = joint.body_b.map_or(ground, |b| handles[b]);
+            let anchors = SphericalJointBuilder::new().local_anchor1(joint.anchor_a).local_anchor2(joint.anchor_b);
+            physics.insert_impulse_joint(handles[joint.body_a], b, anchors.contacts_enabled(joint.collide));
+        }
+        Ok(Self { physics, handles, world })
+    }
+}
+
+fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {
+    let builder = match body.kind {
+        BodyKind::Fixed => RigidBodyBuilder::fixed(),
+        BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
+        BodyKind::Dynamic => {
+            let Mass { mass, center, principal_inertia, principal_frame } = body.mass;
+            let mass = MassProperties::with_principal_inertia_frame(center, mass, principal_inertia, principal_frame);
+            RigidBodyBuilder::dynamic().additional_mass_properties(mass)
+        }
+    };
+    let builder = builder.pose(Pose::from_parts(body.position, body.rotation)).can_sleep(false);
+    let handle = physics.insert_body(builder.linvel(body.linear_velocity).angvel(body.angular_velocity));
+    for collider in &body.colliders {
+        let builder = ColliderBuilder::new(collider.shape.parry().clone())
+            .position(Pose::from_parts(collider.position, collider.rotation))
+            // The body has its mass already.
+            .density(0.0)
+            .friction(body.material.friction)
+            .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+            .restitution(body.material.restitution)
+            .restitution_combine_rule(CoefficientCombineRule::Max);
+        physics.insert_collider(builder, Some(handle));
+    }
+    physics.bodies[handle].add_force(body.force, true);
+    handle
+}
+
+#[cfg(feature = "parallel")]
+fn set_threads(physics: &mut PhysicsWorld, threads: usize) -> Result<()> {
+    physics.configure_thread_pool(threads).map_err(|e| Error::input(format!("rapier: {e}")))
+}
+
+#[cfg(not(feature = "parallel"))]
+fn set_threads(_physics: &mut PhysicsWorld, threads: usize) -> Result<()> {
+    match threads {
+        1 => Ok(()),
+        _ => Err(Error::input("rapier was built for one thread; build with --features parallel")),
+    }
+}
+
+impl Contender for Rapier {
+    fn setting(&self) -> Setting {
+        let parameters = &self.physics.integration_parameters;
+        let hertz = parameters.contact_softness.natural_frequency;
+        setting("rapier", parameters.num_solver_iterations as u32, hertz)
+    }
+
+    fn step(&mut self) -> Result<()> {
+        self.physics.step();
+        Ok(())
+    }
+
+    fn world(&mut self) -> &World {
+        for (body, &handle) in self.world.bodies.iter_mut().zip(&self.handles) {
+            let rapier = &self.physics.bodies[handle];
+            (body.position, body.rotation) = (rapier.position().translation, rapier.position().rotation);
+            (body.linear_velocity, body.angular_velocity) = (rapier.linvel(), rapier.angvel());
+        }
+        &self.world
+    }
+}

@@ -1,0 +1,271 @@
+//! Contact problems in FCLIB's HDF5 files, global form:
+//!
+//! ```text
+//! M v = H r + f        u = Hᵀ v + w        three columns of H a contact: normal, two tangents
+//! ```
+//!
+//! Rigid bodies are six rows each, three of the velocity of the center of mass and three of the angular velocity in the body's
+//! own axes. The files do not say how a body is turned; [`frames`] finds a rotation with which all of its contacts have arms.
+//! Written files have the world's axes for the body's, and H and M as entries by row and column.
+
+mod frames;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+
+use super::{ContactProblem, FreeBody, PointContact, Velocity, inverse, is_positive_definite};
+use crate::error::{Error, Result};
+use frames::{Lever, arm, rotation};
+use table::{Global, Sparse, Tables};
+
+/// How far rows that should be opposite or equal may be apart, relative to the larger.
+const TOLERANCE: f64 = 1e-9;
+
+/// The rows of H of one body in one contact: linear and angular, a direction each.
+#[derive(Clone, Copy, Debug)]
+struct Rows {
+    body: usize,
+    linear: [DVec3; 3],
+    angular: [DVec3; 3],
+}
+
+impl ContactProblem {
+    /// From the bytes of an FCLIB file with a global problem of rigid bodies in space.
+    pub(super) fn from_fclib(bytes: Vec<u8>) -> Result<Self> {
+        let tables = Tables::open(bytes)?;
+        if !tables.has("fclib_global") {
+            let other = ["fclib_local", "fclib_global_rolling"].into_iter().find(|group| tables.has(group));
+            return Err(Error::input(match other {
+                Some(other) => format!("{other}: only fclib_global can be read"),
+                None => "no group fclib_global: not an FCLIB file".into(),
+            }));
+        }
+        let dimensions = tables.number("fclib_global/spacedim")?;
+        if dimensions != 3 {
+            return Err(Error::input(format!("fclib_global/spacedim: {dimensions}: must be 3")));
+        }
+        if tables.has("fclib_global/G") {
+            return Err(Error::input("fclib_global/G: joints cannot be read"));
+        }
+        let (m, h) = (tables.matrix("fclib_global/M")?, tables.matrix("fclib_global/H")?);
+        let blocks = mass_blocks(&m).map_err(|e| e.within("fclib_global/M"))?;
+        let contacts = contact_rows(&h, m.rows).map_err(|e| e.within("fclib_global/H"))?;
+        let f = tables.reals("fclib_global/vectors/f", m.rows)?;
+        let w = tables.reals("fclib_global/vectors/w", h.columns)?;
+        let mu = tables.reals("fclib_global/vectors/mu", contacts.len())?;
+        if let Some(i) = mu.iter().position(|&mu| mu < 0.0) {
+            return Err(Error::input(format!(
+                "fclib_global/vectors/mu: {:?} of contact {i}: must not be negative",
+                mu[i]
+            )));
+        }
+
+        let turns = rotations(blocks.len(), &contacts).map_err(|e| e.within("fclib_global/H"))?;
+        let vectors = |numbers: &[f64]| numbers.chunks_exact(3).map(DVec3::from_slice).collect::<Vec<_>>();
+        let free = vectors(&f);
+        let body = |(i, block): (usize, &Block)| {
+            let turn = turns[i];
+            // Unsymmetric inertia is data: it shows in the free velocity, and its symmetric part is what contacts feel.
+            let inertia = (block.angular + block.angular.transpose()) * 0.5;
+            let free = Velocity {
+                linear: free[2 * i] / block.mass,
+                angular: turn * (inverse(block.angular) * free[2 * i + 1]),
+            };
+            FreeBody { mass: block.mass, inertia: turn * inertia * turn.transpose(), free }
+        };
+        let contact = |((sides, offset), &friction): ((&Sides, DVec3), &f64)| {
+            let index = |side: &Option<Rows>| side.map(|s| s.body as u32);
+            let arm = |side: &Option<Rows>| side.map_or(DVec3::ZERO, |s| arm(map(&s), turns[s.body]));
+            PointContact {
+                a: index(&sides.a),
+                b: index(&sides.b),
+                friction,
+                offset,
+                frame: sides.frame(),
+                r_a: arm(&sides.a),
+                r_b: arm(&sides.b),
+            }
+        };
+        Ok(Self {
+            name: tables.text("fclib_global/info/title"),
+            bodies: blocks.iter().enumerate().map(body).collect(),
+            contacts: contacts.iter().zip(vectors(&w)).zip(&mu).map(contact).collect(),
+        })
+    }
+
+    /// As the bytes of an FCLIB file, global form.
+    ///
+    /// # Errors
+    /// It is too large for the 32-bit indices of the format.
+    pub fn to_fclib(&self) -> Result<Vec<u8>> {
+        let mut m = Sparse { rows: 6 * self.bodies.len(), columns: 6 * self.bodies.len(), entries: Vec::new() };
+        let mut f = Vec::new();
+        for (i, body) in self.bodies.iter().enumerate() {
+            (0..3).for_each(|k| m.push(6 * i + k, 6 * i + k, body.mass));
+            for (column, axis) in body.inertia.to_cols_array_2d().into_iter().enumerate() {
+                (0..3).for_each(|row| m.push(6 * i + 3 + row, 6 * i + 3 + column, axis[row]));
+            }
+            f.extend((body.mass * body.free.linear).to_array());
+            f.extend((body.inertia * body.free.angular).to_array());
+        }
+        let mut h = Sparse { rows: m.rows, columns: 3 * self.contacts.len(), entries: Vec::new() };
+        for (i, contact) in self.contacts.iter().enumerate() {
+            for (k, d) in contact.frame.into_iter().enumerate() {
+                for (body, arm, d) in [(contact.a, contact.r_a, -d), (contact.b, contact.r_b, d)] {
+                    let Some(body) = body.map(|b| b as usize) else { continue };
+                    let rows = d.to_array().into_iter().chain(arm.cross(d).to_array());
+                    rows.enumerate().for_each(|(row, x)| h.push(6 * body + row, 3 * i + k, x));
+                }
+            }
+        }
+        let w = self.contacts.iter().flat_map(|c| c.offset.to_array()).collect();
+        let mu = self.contacts.iter().map(|c| c.friction).collect();
+        Global { title: &self.name, m, h, f, w, mu }.to_bytes()
+    }
+
+    /// Into an FCLIB file, global form.
+    ///
+    /// # Errors
+    /// As [`ContactProblem::to_fclib`]; the file cannot be written.
+    pub fn write_fclib(&self, path: impl AsRef<Path>) -> Result<()> {
+        crate::files::write(path.as_ref(), &self.to_fclib()?)
+    }
+}
+
+/// Mass and inertia of one body, its own axes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    mass: f64,
+    angular: DMat3,
+}
+
+/// M of rigid bodies: m 1 and a 3x3 inertia for each.
+fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
+    if m.rows != m.columns || !m.rows.is_multiple_of(6) {
+        let (rows, columns) = (m.rows, m.columns);
+        return Err(Error::input(format!("{rows} x {columns}: rigid bodies have 6 rows and columns each")));
+    }
+    // Before as much memory is asked for.
+    if m.entries.len() < m.rows {
+        return Err(Error::input(format!("{} entries for {} rows: a mass is missing", m.entries.len(), m.rows)));
+    }
+    let mut entries = vec![[[0.0; 6]; 6]; m.rows / 6];
+    for &(row, column, x) in m.entries.iter().filter(|e| e.2 != 0.0) {
+        if row / 6 != column / 6 {
+            return Err(Error::input(format!("({row}, {column}) ties two bodies: only rigid bodies can be read")));
+        }
+        entries[row / 6][row % 6][column % 6] += x;
+    }
+    let block = |(i, e): (usize, &[[f64; 6]; 6])| {
+        let wrong = |what: String| Err(Error::input(format!("body {i}: {what}")));
+        let mass = e[0][0];
+        let axes = || (0..3).flat_map(|row| (0..3).map(move |column| (row, column)));
+        let scalar = |(row, column): (usize, usize)| {
+            let expected = if row == column { mass } else { 0.0 };
+            (e[row][column] - expected).abs() <= TOLERANCE * mass.abs()
+        };
+        // Velocity and angular velocity do not meet in a center of mass.
+        let apart = |(row, column): (usize, usize)| e[row][column + 3] == 0.0 && e[row + 3][column] == 0.0;
+        if !axes().all(|at| scalar(at) && apart(at)) {
+            return wrong("its rows are not one mass and an inertia".into());
+        }
+        let angular = DMat3::from_cols_array_2d(&[3, 4, 5].map(|column| [3, 4, 5].map(|row| e[row][column])));
+        if !(mass > 0.0 && is_positive_definite((angular + angular.transpose()) * 0.5)) {
+            return wrong(format!("mass {mass:?}, inertia {:?}: must be positive", angular.to_cols_array()));
+        }
+        Ok(Block { mass, angular })
+    };
+    entries.iter().enumerate().map(block).collect()
+}
+
+/// The two sides of a contact; the frame of b is right-handed, that of a opposite.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sides {
+    a: Option<Rows>,
+    b: Option<Rows>,
+}
+
+impl Sides {
+    fn frame(&self) -> [DVec3; 3] {
+        match (self.b, self.a) {
+            (Some(b), _) => b.linear,
+            (None, Some(a)) => a.linear.map(|d| -d),
+            (None, None) => unreachable!("a contact has a body"),
+        }
+    }
+}
+
+/// H of contacts between at most two rigid bodies.
+fn contact_rows(h: &Sparse, rows: usize) -> Result<Vec<Sides>> {
+    if h.rows != rows || !h.columns.is_multiple_of(3) {
+        let (found, columns) = (h.rows, h.columns);
+        return Err(Error::input(format!("{found} x {columns}: {rows} rows and 3 columns a contact are needed")));
+    }
+    if h.entries.len() < h.columns {
+        return Err(Error::input(format!("{} entries for {} columns: a contact is empty", h.entries.len(), h.columns)));
+    }
+    let mut contacts = vec![Vec::<Rows>::new(); h.columns / 3];
+    for &(row, column, x) in h.entries.iter().filter(|e| e.2 != 0.0) {
+        let (contact, body) = (&mut contacts[column / 3], row / 6);
+        let place = contact.iter().position(|r| r.body == body).unwrap_or_else(|| {
+            contact.push(Rows { body, linear: [DVec3::ZERO; 3], angular: [DVec3::ZERO; 3] });
+            contact.len() - 1
+        });
+        let half = if row % 6 < 3 { &mut contact[place].linear } else { &mut contact[place].angular };
+        half[column % 3][row % 3] += x;
+    }
+    contacts.iter().enumerate().map(|(i, rows)| sides(rows).map_err(|e| e.within(format!("contact {i}")))).collect()
+}
+
+fn sides(rows: &[Rows]) -> Result<Sides> {
+    let mut sides = Sides::default();
+    for &rows in rows {
+        let volume = directions(&rows).determinant();
+        if volume == 0.0 {
+            return Err(Error::input(format!("its directions on body {} are in one plane", rows.body)));
+        }
+        let side = if volume > 0.0 { &mut sides.b } else { &mut sides.a };
+        if let Some(other) = side.replace(rows) {
+            let (one, other) = (other.body, rows.body);
+            return Err(Error::input(format!("its directions on bodies {one} and {other} are not opposite")));
+        }
+    }
+    match (sides.a, sides.b) {
+        (None, None) => Err(Error::input("no body")),
+        (Some(a), Some(b))
+            if (0..3).any(|k| (a.linear[k] + b.linear[k]).length() > TOLERANCE * b.linear[k].length()) =>
+        {
+            Err(Error::input(format!("its directions on bodies {} and {} are not opposite", a.body, b.body)))
+        }
+        _ => Ok(sides),
+    }
+}
+
+/// D: the directions as rows.
+fn directions(rows: &Rows) -> DMat3 {
+    let [n, t_1, t_2] = rows.linear;
+    DMat3::from_cols(n, t_1, t_2).transpose()
+}
+
+/// K = D⁻¹ B.
+fn map(rows: &Rows) -> DMat3 {
+    let [n, t_1, t_2] = rows.angular;
+    directions(rows).inverse() * DMat3::from_cols(n, t_1, t_2).transpose()
+}
+
+/// The rotation of each body; its own axes for one without contacts.
+fn rotations(bodies: usize, contacts: &[Sides]) -> Result<Vec<DMat3>> {
+    let mut levers = vec![Vec::new(); bodies];
+    for side in contacts.iter().flat_map(|c| [c.a, c.b]).flatten() {
+        // The normal points from a to b, so the rows of either side, -n on a and n on b, point into the body.
+        levers[side.body].push(Lever { map: map(&side), outward: -side.linear[0] });
+    }
+    let of = |(i, levers): (usize, &Vec<Lever>)| {
+        rotation(levers).ok_or_else(|| Error::input(format!("body {i}: its angular rows are not those of arms")))
+    };
+    levers.iter().enumerate().map(of).collect()
+}

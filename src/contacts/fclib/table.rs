@@ -1,0 +1,193 @@
+//! Numbers and sparse matrices of an FCLIB file.
+
+use hdf5_pure::{Dataset, File, FileBuilder, GroupBuilder, LibVer};
+
+use crate::error::{Error, Result};
+
+/// An open file; every error names the dataset.
+pub(super) struct Tables {
+    file: File,
+}
+
+impl Tables {
+    pub(super) fn open(bytes: Vec<u8>) -> Result<Self> {
+        let length = bytes.len() as u64;
+        let file = File::from_bytes(bytes).map_err(|e| Error::input(format!("not a whole HDF5 file: {e}")))?;
+        // Else what comes last, and may be left out, would not be missed.
+        let whole = file.superblock().eof_address;
+        match length < whole {
+            true => Err(Error::input(format!("not a whole HDF5 file: {length} of {whole} bytes"))),
+            false => Ok(Self { file }),
+        }
+    }
+
+    /// Whether there is a group of that name.
+    pub(super) fn has(&self, group: &str) -> bool {
+        self.file.group(group).is_ok()
+    }
+
+    /// Text on one line; empty if there is none.
+    pub(super) fn text(&self, path: &str) -> String {
+        let words = self.file.dataset(path).and_then(|d| d.read_string()).unwrap_or_default();
+        words.join(" ").replace(char::is_control, " ").trim().to_owned()
+    }
+
+    /// One whole number.
+    pub(super) fn number(&self, path: &str) -> Result<i64> {
+        match self.whole(path, 1)?[..] {
+            [number] => Ok(number),
+            _ => unreachable!("one was asked for"),
+        }
+    }
+
+    /// So many whole numbers.
+    fn whole(&self, path: &str, count: usize) -> Result<Vec<i64>> {
+        self.read(path, count, |d| d.read_i64())
+    }
+
+    /// So many numbers, all finite.
+    pub(super) fn reals(&self, path: &str, count: usize) -> Result<Vec<f64>> {
+        let numbers = self.read(path, count, |d| d.read_f64())?;
+        match numbers.iter().position(|x| !x.is_finite()) {
+            Some(i) => Err(Error::input(format!("{path}: number {i} is {:?}: must be finite", numbers[i]))),
+            None => Ok(numbers),
+        }
+    }
+
+    fn read<T>(
+        &self,
+        path: &str,
+        count: usize,
+        read: impl FnOnce(&Dataset) -> std::result::Result<Vec<T>, hdf5_pure::Error>,
+    ) -> Result<Vec<T>> {
+        let wrong = |e: hdf5_pure::Error| Error::input(format!("{path}: {e}"));
+        let dataset = self.file.dataset(path).map_err(wrong)?;
+        let shape = dataset.shape().map_err(wrong)?;
+        // Before anything is read, so that a wrong size asks for no memory.
+        let found = shape.iter().try_fold(1_u64, |all, &n| all.checked_mul(n));
+        if found != Some(count as u64) {
+            return Err(Error::input(format!("{path}: has the shape {shape:?}, and {count} numbers are needed")));
+        }
+        let numbers = read(&dataset).map_err(wrong)?;
+        match numbers.len() == count {
+            true => Ok(numbers),
+            false => Err(Error::input(format!("{path}: holds {} of {count} numbers", numbers.len()))),
+        }
+    }
+
+    /// A sparse matrix, in any of the three forms: `nz` entries by row `i` and column `p`, columns (-1) or rows (-2) one after
+    /// another, each from `p[k]` to `p[k + 1]`.
+    pub(super) fn matrix(&self, group: &str) -> Result<Sparse> {
+        let path = |name: &str| format!("{group}/{name}");
+        let size = |name: &str| {
+            let number = self.number(&path(name))?;
+            usize::try_from(number).map_err(|_| Error::input(format!("{}: {number}: is not a size", path(name))))
+        };
+        let (rows, columns) = (size("m")?, size("n")?);
+        let form = self.number(&path("nz"))?;
+        let (count, pointers) = match form {
+            -1 => (size("nzmax")?, Some(columns)),
+            -2 => (size("nzmax")?, Some(rows)),
+            nz => (usize::try_from(nz).map_err(|_| Error::input(format!("{}: {nz}: is no form", path("nz"))))?, None),
+        };
+        let outer = self.whole(&path("p"), pointers.map_or(count, |n| n.saturating_add(1)))?;
+        let inner = self.whole(&path("i"), count)?;
+        let outer = match pointers {
+            None => outer,
+            Some(_) => unfold(&outer, count).ok_or_else(|| {
+                Error::input(format!("{}: must rise from 0 to the number of entries, {count}", path("p")))
+            })?,
+        };
+        let values = self.reals(&path("x"), count)?;
+        let place = |name: &str, index: i64, least: usize| match usize::try_from(index) {
+            Ok(i) if i < least => Ok(i),
+            _ => Err(Error::input(format!("{}: {index}: must be 0 or more and less than {least}", path(name)))),
+        };
+        let entries = inner.into_iter().zip(outer).zip(values).map(|((inner, outer), x)| match form {
+            -2 => Ok((place("p", outer, rows)?, place("i", inner, columns)?, x)),
+            _ => Ok((place("i", inner, rows)?, place("p", outer, columns)?, x)),
+        });
+        Ok(Sparse { rows, columns, entries: entries.collect::<Result<_>>()? })
+    }
+}
+
+/// Which row or column each entry is in, from where each begins; an `nzmax` beyond the last is room that is not used.
+fn unfold(pointers: &[i64], count: usize) -> Option<Vec<i64>> {
+    let rises = pointers.first() == Some(&0) && pointers.is_sorted() && pointers.last() == Some(&(count as i64));
+    let run = |(k, range): (usize, &[i64])| std::iter::repeat_n(k as i64, (range[1] - range[0]) as usize);
+    rises.then(|| pointers.windows(2).enumerate().flat_map(run).collect())
+}
+
+/// A sparse matrix: row, column, value. A place that is named twice holds the sum.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sparse {
+    pub rows: usize,
+    pub columns: usize,
+    pub entries: Vec<(usize, usize, f64)>,
+}
+
+impl Sparse {
+    /// Adds what is not zero.
+    pub(super) fn push(&mut self, row: usize, column: usize, value: f64) {
+        if value != 0.0 {
+            self.entries.push((row, column, value));
+        }
+    }
+
+    /// As entries by row and column: the only form that all readers of the global problem take.
+    fn write(&self, group: &mut GroupBuilder, name: &str) -> Result<()> {
+        let mut matrix = group.create_group(name);
+        let index = |i: usize| i32::try_from(i).map_err(|_| Error::input(format!("{i} does not fit an FCLIB file")));
+        let indices = |of: fn(&(usize, usize, f64)) -> usize| self.entries.iter().map(|e| index(of(e))).collect();
+        let (i, p): (Result<Vec<i32>>, Result<Vec<i32>>) = (indices(|e| e.0), indices(|e| e.1));
+        let x: Vec<f64> = self.entries.iter().map(|e| e.2).collect();
+        let count = self.entries.len();
+        for (name, size) in [("nzmax", count), ("m", self.rows), ("n", self.columns), ("nz", count)] {
+            matrix.create_dataset(name).with_i32_data(&[index(size)?]);
+        }
+        matrix.create_dataset("p").with_i32_data(&p?);
+        matrix.create_dataset("i").with_i32_data(&i?);
+        matrix.create_dataset("x").with_f64_data(&x);
+        group.add_group(matrix.finish());
+        Ok(())
+    }
+}
+
+/// A global problem as a file: M v = H r + f, u = Hᵀ v + w.
+pub(super) struct Global<'a> {
+    pub title: &'a str,
+    pub m: Sparse,
+    pub h: Sparse,
+    pub f: Vec<f64>,
+    pub w: Vec<f64>,
+    pub mu: Vec<f64>,
+}
+
+impl Global<'_> {
+    /// In the layout of HDF5 1.8, which every reader knows.
+    pub(super) fn to_bytes(&self) -> Result<Vec<u8>> {
+        let mut file = FileBuilder::new();
+        file.with_libver_bounds(LibVer::Earliest, LibVer::V18);
+        let mut global = file.create_group("fclib_global");
+        global.create_dataset("spacedim").with_i32_data(&[3]);
+        self.m.write(&mut global, "M")?;
+        self.h.write(&mut global, "H")?;
+        let mut vectors = global.create_group("vectors");
+        for (name, numbers) in [("f", &self.f), ("w", &self.w), ("mu", &self.mu)] {
+            vectors.create_dataset(name).with_f64_data(numbers);
+        }
+        global.add_group(vectors.finish());
+        let mut info = global.create_group("info");
+        let description = concat!("contacts of rigid bodies, written by drystone ", env!("CARGO_PKG_VERSION"));
+        for (name, text) in [("title", self.title), ("description", description)] {
+            let text: String = text.chars().map(|c| if c.is_ascii() && !c.is_control() { c } else { '?' }).collect();
+            // One byte more, for the zero at the end of a string in C.
+            let width = text.len() as u32 + 1;
+            let dataset = info.create_dataset(name).with_ascii_strings_sized(&[&text], width).map_err(Error::input)?;
+            dataset.with_shape(&[]);
+        }
+        global.add_group(info.finish());
+        file.add_group(global.finish());
+        file.finish().map_err(Error::input)
+    }
+}

@@ -1,0 +1,228 @@
+//! The game: tilts the board, steps the world, and knows when it is won or lost.
+
+use glam::{Quat, Vec3};
+use serde::Serialize;
+
+use super::board::{BALL, BOARD, CELL, GOAL, RADIUS, center_of, scene};
+use super::map::Map;
+use super::script::{Script, TILT_LIMIT};
+use crate::backend::Backend;
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::simulation::Simulation;
+
+/// How fast the board tilts [degrees/s].
+const TILT_RATE: f32 = 60.0;
+/// Steps after which a ball on the floor rolls: a tenth of a second.
+const SETTLED: u32 = 12;
+/// The ball has arrived when its middle is this near to the goal's [m].
+const ARRIVED: f32 = 0.4 * CELL;
+
+/// How a game ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outcome {
+    /// The ball is at the goal: won.
+    Goal,
+    /// The ball fell into a hole: lost.
+    Hole,
+    /// The script ended before either.
+    Time,
+}
+
+/// Speed of the ball's surface against the floor where they touch, while it rolls: it has touched nothing else for a tenth of
+/// a second, in which friction ends what a wall began [m/s].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Slip {
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Largest.
+    pub max: f64,
+    /// Steps that were measured.
+    pub steps: u32,
+}
+
+/// A game that is played.
+pub struct Game {
+    /// The board.
+    pub map: Map,
+    /// Its world; the board is body [`BOARD`], the ball [`BALL`].
+    pub simulation: Simulation,
+    /// How it ended, if it did.
+    pub outcome: Option<Outcome>,
+    /// Tilts of the board now, to the right and to the front [degrees].
+    pub tilt: [f32; 2],
+    steps: u32,
+    dt: f32,
+    /// Steps for which the floor was all that the ball touched.
+    rolled: u32,
+    slips: (f64, f64, u32),
+    deepest: f32,
+}
+
+impl Game {
+    /// A game that has not begun.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
+        let scene = scene(&map)?;
+        let simulation = Simulation::new(scene.world, config, backend)?;
+        Ok(Self {
+            map,
+            simulation,
+            outcome: None,
+            tilt: [0.0; 2],
+            steps: 0,
+            dt: scene.dt,
+            rolled: 0,
+            slips: (0.0, 0.0, 0),
+            deepest: 0.0,
+        })
+    }
+
+    /// Seconds since the start.
+    pub fn time(&self) -> f32 {
+        self.steps as f32 * self.dt
+    }
+
+    /// Length of a step [s].
+    pub fn dt(&self) -> f32 {
+        self.dt
+    }
+
+    /// Where the ball is, on the board [m].
+    pub fn ball(&self) -> Vec3 {
+        let bodies = &self.simulation.world.bodies;
+        bodies[BOARD].rotation.inverse() * bodies[BALL].position
+    }
+
+    /// Tilts the board towards `wanted` (right and front, degrees) and moves everything by one step, unless the game has ended.
+    ///
+    /// # Errors
+    /// The backend cannot run the step.
+    pub fn step(&mut self, wanted: [f32; 2]) -> Result<()> {
+        if self.outcome.is_some() {
+            return Ok(());
+        }
+        let reach = TILT_RATE * self.dt;
+        for (tilt, wanted) in self.tilt.iter_mut().zip(wanted) {
+            *tilt += (wanted.clamp(-TILT_LIMIT, TILT_LIMIT) - *tilt).clamp(-reach, reach);
+        }
+        let [right, front] = self.tilt.map(f32::to_radians);
+        let rotation = Quat::from_rotation_x(front) * Quat::from_rotation_z(-right);
+        for body in &mut self.simulation.world.bodies[..BALL] {
+            body.move_to(Vec3::ZERO, rotation, self.dt);
+        }
+        self.simulation.step(self.dt)?;
+        self.steps += 1;
+        self.measure();
+
+        let ball = self.ball();
+        let mut to_goal = ball - center_of(&self.map, self.map.goal);
+        to_goal.y = 0.0;
+        if ball.y < 0.0 {
+            self.outcome = Some(Outcome::Hole);
+        } else if to_goal.length() < ARRIVED {
+            self.outcome = Some(Outcome::Goal);
+        }
+        Ok(())
+    }
+
+    /// Slip while the floor is all that the ball touches, and overlap.
+    fn measure(&mut self) {
+        let (world, pairs) = self.simulation.world_and_pairs();
+        let (board, ball) = (&world.bodies[BOARD], &world.bodies[BALL]);
+        let up = board.rotation * Vec3::Y;
+        let (mut on_floor, mut elsewhere) = (false, false);
+        for (pair, manifold) in pairs.iter().flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
+            let is_floor = [BOARD, GOAL].contains(&(pair.body_a as usize)) && manifold.normal.dot(up) > 0.999;
+            let bears = manifold.points().iter().any(|p| p.normal_impulse > 0.0);
+            on_floor |= is_floor && bears;
+            elsewhere |= !is_floor && bears;
+            let depth = manifold.points().iter().map(|p| -p.separation).fold(0.0, f32::max);
+            self.deepest = self.deepest.max(depth);
+        }
+        self.rolled = if on_floor && !elsewhere { self.rolled + 1 } else { 0 };
+        if self.rolled > SETTLED {
+            let at = ball.position - RADIUS * up;
+            let slip = f64::from((ball.velocity_at(at) - board.velocity_at(at)).length());
+            let (squares, max, steps) = &mut self.slips;
+            *squares += slip * slip;
+            *max = max.max(slip);
+            *steps += 1;
+        }
+    }
+
+    /// Slip so far.
+    pub fn slip(&self) -> Slip {
+        let (squares, max, steps) = self.slips;
+        Slip { rms: (squares / f64::from(steps.max(1))).sqrt(), max, steps }
+    }
+
+    /// Deepest overlap at the beginning of any step so far [m].
+    pub fn penetration(&self) -> f32 {
+        self.deepest
+    }
+}
+
+/// Where the ball was.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Sample {
+    /// Seconds since the start.
+    pub time: f32,
+    /// Place on the board: to the right, up, to the front of its middle [m].
+    pub ball: [f32; 3],
+}
+
+/// A game as it went.
+#[derive(Clone, Debug, Serialize)]
+pub struct Played {
+    /// Name of the board.
+    pub board: String,
+    /// What ran the sweeps.
+    pub backend: String,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// When it ended [s].
+    pub time: f32,
+    /// Steps until then.
+    pub steps: u32,
+    /// Deepest overlap [m].
+    pub penetration: f32,
+    /// Slip while rolling.
+    pub slip: Slip,
+    /// The ball's way, 20 samples a second.
+    pub track: Vec<Sample>,
+}
+
+/// Steps between two samples of the track.
+const SAMPLE: u32 = 6;
+
+/// Plays `script` to its end, or until the game is won or lost. `game` has not begun.
+///
+/// # Errors
+/// The backend cannot run a step.
+pub fn play(mut game: Game, script: &Script) -> Result<Played> {
+    let mut track = Vec::new();
+    loop {
+        let ended = game.outcome.is_some() || game.time() >= script.end();
+        if game.steps.is_multiple_of(SAMPLE) || ended {
+            track.push(Sample { time: game.time(), ball: game.ball().to_array() });
+        }
+        if ended {
+            break;
+        }
+        game.step(script.at(game.time()))?;
+    }
+    Ok(Played {
+        outcome: game.outcome.unwrap_or(Outcome::Time),
+        time: game.time(),
+        steps: game.steps,
+        penetration: game.penetration(),
+        slip: game.slip(),
+        backend: game.simulation.backend().name().into(),
+        board: game.map.name,
+        track,
+    })
+}

@@ -1,0 +1,159 @@
+//! A run, or a recorded motion, as frames; and the pictures of them, all from one place.
+
+use std::path::Path;
+
+use glam::{Quat, Vec3};
+
+use super::camera::{Bounds, Camera};
+use super::canvas::{Canvas, Picture};
+use super::colors::ColorBy;
+use super::mesh::poses;
+use super::renderer::Shot;
+use crate::collide::Pair;
+use crate::error::{Error, Result};
+use crate::scenes::Scene;
+use crate::world::{BodyKind, World};
+
+/// A world at one time.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Seconds since the start.
+    pub time: f64,
+    /// Position [m] and rotation of each body.
+    pub poses: Vec<(Vec3, Quat)>,
+    /// What each body is colored by, as [`ColorBy::values`] gives it.
+    pub values: Vec<f32>,
+}
+
+/// Where a film is seen from.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Turn of the camera around the scene [rad].
+    pub yaw: f32,
+    /// Its height above the horizon as an angle [rad].
+    pub pitch: f32,
+}
+
+/// Frames of one scene.
+#[derive(Clone, Debug)]
+pub struct Film {
+    scene: Scene,
+    color: ColorBy,
+    frames: Vec<Frame>,
+}
+
+impl Film {
+    /// A film without frames.
+    pub fn new(scene: Scene, color: ColorBy) -> Self {
+        Self { scene, color, frames: Vec::new() }
+    }
+
+    /// Adds the world as it is; `pairs` are the contacts of the last step.
+    pub fn add(&mut self, time: f64, world: &World, pairs: &[Pair]) {
+        self.frames.push(Frame { time, poses: poses(world), values: self.color.values(world, pairs) });
+    }
+
+    /// The frames.
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// Keeps `count` of the frames, evenly spaced and the last one among them.
+    pub fn thin(&mut self, count: usize) {
+        let kept: Vec<usize> = evenly(self.frames.len(), count).collect();
+        let mut index = 0;
+        self.frames.retain(|_| {
+            index += 1;
+            kept.binary_search(&(index - 1)).is_ok()
+        });
+    }
+
+    /// Reads the motion that `drystone run --out` wrote.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not such a motion of this scene; the line is named.
+    pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
+        if color.needs_contacts() {
+            return Err(Error::input("--from: a recorded motion has no contacts; color by material or speed"));
+        }
+        let file = std::fs::File::open(path).map_err(Error::file(path))?;
+        let mut film = Self::new(scene, color);
+        let mut world = film.scene.world.clone();
+        let mut last: Option<(u32, f64)> = None;
+        for (i, row) in csv::Reader::from_reader(file).deserialize::<[f64; 16]>().enumerate() {
+            // The first line names the columns.
+            let line = i + 2;
+            let refuse = |what: String| Error::input(format!("{}: line {line}: {what}", path.display()));
+            let row = row.map_err(|e| match e.into_kind() {
+                csv::ErrorKind::Io(e) => Error::file(path)(e),
+                csv::ErrorKind::Deserialize { err, .. } => refuse(err.to_string()),
+                csv::ErrorKind::UnequalLengths { len, .. } => refuse(format!("{len} values instead of 16")),
+                _ => refuse("not a row of 16 numbers".into()),
+            })?;
+            let (step, time, index) = (row[0] as u32, row[1], row[2] as usize);
+            if let Some((before, then)) = last.filter(|(before, _)| *before != step) {
+                if step < before {
+                    return Err(refuse(format!("step {step} after step {before}")));
+                }
+                film.add(then, &world, &[]);
+            }
+            last = Some((step, time));
+            let bodies = world.bodies.len();
+            let Some(body) = world.bodies.get_mut(index).filter(|b| b.kind != BodyKind::Fixed) else {
+                return Err(refuse(format!("body {index} is not one of the {bodies} of the scene that can move")));
+            };
+            let [x, y, z, qx, qy, qz, qw, vx, vy, vz] = std::array::from_fn(|k| row[3 + k] as f32);
+            body.rotation = Quat::from_xyzw(qx, qy, qz, qw);
+            body.position = Vec3::new(x, y, z) - body.rotation * body.mass.center;
+            body.linear_velocity = Vec3::new(vx, vy, vz);
+        }
+        match last {
+            Some((_, time)) => film.add(time, &world, &[]),
+            None => return Err(Error::input(format!("{}: no motion in it", path.display()))),
+        }
+        Ok(film)
+    }
+
+    /// What of the scene is in the pictures: everything that moves, over all frames, and the container it is in.
+    pub fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        let world = &self.scene.world;
+        for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
+            let reach = |c: &crate::world::Collider| c.position.length() + c.shape.bounding_radius();
+            let reach = body.colliders.iter().map(reach).fold(0.0, f32::max);
+            for frame in &self.frames {
+                // With room around it.
+                bounds = bounds.join(Bounds::around(frame.poses[i].0, 1.5 * reach));
+            }
+        }
+        for anchor in world.joints.iter().flat_map(|j| world.anchors(j)) {
+            bounds = bounds.join(Bounds::around(anchor, 0.0));
+        }
+        bounds
+    }
+
+    /// Draws every frame from one place, in order, on a canvas for the film's world.
+    ///
+    /// # Errors
+    /// The device was lost, or what `show` returns.
+    pub fn draw(&self, canvas: &mut Canvas, look: &Look, mut show: impl FnMut(&Picture) -> Result<()>) -> Result<()> {
+        let world = &self.scene.world;
+        let bounds = self.bounds();
+        let up = -world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+        let camera = Camera::framing(&bounds, up, look.yaw, look.pitch, canvas.aspect());
+        let scale = self.frames.iter().map(|f| self.color.scale(world, &f.values)).fold(0.0, f32::max);
+        let container = self.scene.container.map(|(low, high)| Bounds { low, high });
+        for frame in &self.frames {
+            let colors = self.color.paint(world, &frame.values, scale);
+            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &[] };
+            show(&canvas.draw(&shot)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` of the numbers below `all`, evenly spaced, the last one among them.
+pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
+    let count = count.min(all);
+    (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
+}

@@ -1,0 +1,29 @@
+//! Pictures of a world, with or without a window.
+//!
+//! ```text
+//! mesh      world -> one mesh a geometry, one instance a collider
+//! colors    bodies -> colors by material, batch, speed or impulse
+//! camera    frames a scene by itself; orbit, pan, zoom; the ray under the cursor
+//! renderer  poses, colors, camera -> a texture: light, shadow map, lines on top
+//! canvas    the same, read back: pictures on whatever adapter there is
+//! film      a run or a recorded motion as frames -> pictures -> png, gif, frames, mp4 (output)
+//! window    the live view, with a panel and a mouse that pushes
+//! ```
+
+mod camera;
+mod canvas;
+mod colors;
+mod film;
+mod mesh;
+mod output;
+mod overlay;
+mod renderer;
+
+pub use camera::{Bounds, Camera};
+pub use canvas::{Canvas, Picture};
+pub use colors::{ColorBy, Rgba, batch_color};
+pub use film::{Film, Frame, Look, evenly};
+pub use mesh::{Meshes, Poses, poses};
+pub use output::Output;
+pub use overlay::{LineEnd, Overlay, lines};
+pub use renderer::{Renderer, Shot};

@@ -1,0 +1,176 @@
+//! Where pictures go: one PNG, an animated GIF, a folder of PNGs, or an MP4 through ffmpeg.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use super::canvas::Picture;
+use crate::error::{Error, Result};
+
+/// A place for pictures that is known to be writable; nothing is under its name until [`Output::finish`].
+pub struct Output {
+    path: PathBuf,
+    /// Where the pictures are until then.
+    draft: Draft,
+    kind: Kind,
+    size: (u32, u32),
+    /// Hundredths of a second that a frame of a GIF is shown.
+    delay: u16,
+}
+
+enum Kind {
+    Png(File),
+    Gif(Box<gif::Encoder<BufWriter<File>>>),
+    Frames(u32),
+    Mp4(Child),
+}
+
+/// A file or folder that goes away again unless it is kept.
+struct Draft(Option<PathBuf>);
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if let Some(path) = &self.0 {
+            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+        }
+    }
+}
+
+impl Output {
+    /// Opens `path` for pictures of `size`, `rate` of them a second; its ending says in which form: `.png`, `.gif`, `.mp4`, or a
+    /// slash for a folder of numbered PNGs.
+    ///
+    /// # Errors
+    /// Another ending, a place that cannot be written, or no ffmpeg for `.mp4`.
+    pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
+        let name = path.file_name().ok_or_else(|| unknown(path))?.to_string_lossy().into_owned();
+        let hidden = path.with_file_name(format!(".{}.{}", std::process::id(), name));
+        let draft = Draft(Some(hidden.clone()));
+        let create = || File::create(&hidden).map_err(|e| Error::file(path)(e));
+        let folder = path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR]);
+        let kind = match path.extension().and_then(|e| e.to_str()) {
+            _ if folder => {
+                std::fs::create_dir(&hidden).map_err(Error::file(path))?;
+                Kind::Frames(0)
+            }
+            Some("png") => Kind::Png(create()?),
+            Some("gif") => {
+                let side =
+                    |s: u32| u16::try_from(s).map_err(|_| Error::input(format!("{s} pixels: a GIF has at most 65535")));
+                let mut encoder = gif::Encoder::new(BufWriter::new(create()?), side(size.0)?, side(size.1)?, &[])
+                    .map_err(|e| failed(path, e))?;
+                encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| failed(path, e))?;
+                Kind::Gif(Box::new(encoder))
+            }
+            Some("mp4") => {
+                // That the place can be written shows before ffmpeg starts.
+                drop(create()?);
+                Kind::Mp4(ffmpeg(&hidden, size, rate)?)
+            }
+            _ => return Err(unknown(path)),
+        };
+        let delay = (100.0 / rate).round().clamp(2.0, 1000.0) as u16;
+        Ok(Self { path: path.into(), draft, kind, size, delay })
+    }
+
+    /// Adds a picture.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn add(&mut self, picture: &Picture) -> Result<()> {
+        let path = &self.path;
+        match &mut self.kind {
+            Kind::Png(file) => write_png(file, picture).map_err(|e| failed(path, e)),
+            Kind::Frames(count) => {
+                let folder = self.draft.0.as_deref().unwrap_or(path);
+                let name = format!("{count:05}.png");
+                *count += 1;
+                let file = File::create(folder.join(&name)).map_err(Error::file(path.join(&name)))?;
+                write_png(&file, picture).map_err(|e| failed(path, e))
+            }
+            Kind::Gif(encoder) => {
+                let (width, height) = (self.size.0 as u16, self.size.1 as u16);
+                let mut frame = gif::Frame::from_rgba_speed(width, height, &mut picture.rgba.clone(), 10);
+                frame.delay = self.delay;
+                encoder.write_frame(&frame).map_err(|e| failed(path, e))
+            }
+            Kind::Mp4(child) => {
+                let Some(pipe) = &mut child.stdin else { return Ok(()) };
+                pipe.write_all(&picture.rgba).map_err(|e| failed(path, format!("ffmpeg ended early: {e}")))
+            }
+        }
+    }
+
+    /// Ends the file and gives it its name.
+    ///
+    /// # Errors
+    /// It cannot be written, or ffmpeg says no.
+    pub fn finish(self) -> Result<()> {
+        let Self { path, mut draft, kind, .. } = self;
+        match kind {
+            Kind::Gif(encoder) => {
+                let mut file = encoder.into_inner().map_err(|e| failed(&path, e))?;
+                file.flush().map_err(Error::file(&path))?;
+            }
+            Kind::Mp4(mut child) => {
+                drop(child.stdin.take());
+                let status = child.wait().map_err(Error::file(&path))?;
+                if !status.success() {
+                    return Err(failed(&path, format!("ffmpeg ended with {status}")));
+                }
+            }
+            Kind::Frames(_) if path.is_dir() => {
+                // A folder that is there keeps what else is in it.
+                let hidden = draft.0.as_deref().unwrap_or(&path);
+                for entry in std::fs::read_dir(hidden).map_err(Error::file(&path))? {
+                    let entry = entry.map_err(Error::file(&path))?;
+                    std::fs::rename(entry.path(), path.join(entry.file_name())).map_err(Error::file(&path))?;
+                }
+                return Ok(());
+            }
+            Kind::Png(_) | Kind::Frames(_) => {}
+        }
+        if let Some(hidden) = draft.0.take() {
+            std::fs::rename(hidden, &path).map_err(Error::file(&path))?;
+        }
+        Ok(())
+    }
+}
+
+fn unknown(path: &Path) -> Error {
+    Error::input(format!(
+        "{}: pictures are written as .png, .gif, .mp4 or to a folder, with a slash at the end",
+        path.display()
+    ))
+}
+
+fn failed(path: &Path, e: impl std::fmt::Display) -> Error {
+    Error::file(path)(std::io::Error::other(e.to_string()))
+}
+
+fn write_png(file: &File, picture: &Picture) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(BufWriter::new(file), picture.width, picture.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()
+}
+
+/// An ffmpeg that takes rows of pixels and writes H.264.
+fn ffmpeg(to: &Path, (width, height): (u32, u32), rate: f64) -> Result<Child> {
+    let mut command = Command::new("ffmpeg");
+    command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
+    command.args(["-s", &format!("{width}x{height}"), "-r", &format!("{rate:.4}"), "-i", "-"]);
+    // Players want even sides.
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-c:v", "libx264", "-f", "mp4"]);
+    command.arg(to).stdin(Stdio::piped()).spawn().map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => {
+            Error::input("mp4 needs ffmpeg, which is not installed; write a .gif or a folder instead")
+        }
+        _ => Error::file("ffmpeg")(e),
+    })
+}
