@@ -44,6 +44,7 @@ pub mod report;
 pub mod residuals;
 pub mod scenes;
 pub mod simulation;
+pub mod sleep;
 pub mod solver;
 pub mod stats;
 #[cfg(feature = "view")]

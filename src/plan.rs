@@ -148,6 +148,11 @@ pub struct StepPlan {
     pub passes: Vec<Pass>,
 }
 
+/// Shortest substep over which impulses are carried as velocities [s]. What a sweep corrects by less than the last bit of a velocity
+/// is then lost until the step ends, and the shorter the substep, the less it corrects. Squared error of the scene `rolling` with
+/// and without: 9e-7 and 6e-7 at 1/2000 s, 6e-6 and 3e-6 at 1/4000 s, 5e-5 and 3e-6 at 1/8000 s.
+const SHORTEST_CARRIED: f32 = 1.0 / 4100.0;
+
 impl StepPlan {
     /// The plan of `problem` under `config`: in each substep velocities, warm start, biased sweeps, positions, relax
     /// sweeps; bounces at the end.
@@ -182,8 +187,9 @@ impl StepPlan {
 
         let mut plan = Self::default();
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
-        // velocities that they gave. The arms of joints turn.
-        let carried = shared.accumulated && joints.is_empty();
+        // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
+        let long_enough = problem.params.substep >= SHORTEST_CARRIED;
+        let carried = shared.accumulated && joints.is_empty() && long_enough;
         for substep in 0..config.substeps {
             let carry = carried && substep > 0;
             plan.over_bodies(Kernel::IntegrateVelocities { carry });

@@ -10,6 +10,7 @@ use crate::graph::ConstraintGraph;
 use crate::metrics::Penetration;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::{Prepared, StepProblem};
+use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
 
@@ -29,11 +30,15 @@ use crate::world::World;
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies. Poses, velocities and forces may be changed between steps; number, shapes and kinds may not.
+    /// The bodies. Poses, velocities, forces and joints may be changed between steps; number, shapes and kinds of bodies may
+    /// not, and which bodies joints keep from colliding.
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
     detector: Detector,
+    sleep: Sleep,
+    /// Joints of the problem that the plan is for.
+    planned_joints: usize,
     graph: ConstraintGraph,
     joint_graph: ConstraintGraph,
     prepared: Prepared,
@@ -51,6 +56,8 @@ impl Simulation {
         world.check()?;
         Ok(Self {
             detector: Detector::new(&world),
+            sleep: Sleep::new(&world, &config),
+            planned_joints: 0,
             world,
             config,
             backend,
@@ -62,17 +69,20 @@ impl Simulation {
         })
     }
 
-    /// Moves the world by `dt` seconds.
+    /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
     ///
     /// # Errors
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
-        let stats = self.assemble(dt);
-        self.run(stats)
+        let mut stats = StepStats::default();
+        if self.begin_step(dt, &mut stats) {
+            self.end_step(dt, &mut stats)?;
+        }
+        Ok(stats)
     }
 
     /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
-    /// itself: [`ContactProblem::of_step`].
+    /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
     ///
     /// # Errors
     /// As [`Simulation::step`], or the world has joints, which a contact problem has not.
@@ -81,43 +91,86 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
         }
-        let stats = self.assemble(dt);
+        let mut stats = StepStats::default();
+        if !self.begin_step(dt, &mut stats) {
+            return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
+        }
         let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
         let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
         let mut problem = self.problem.clone();
         Reference::<f32>::new().run(&mut problem, &first)?;
-        Ok((ContactProblem::of_step(name.into(), &problem), self.run(stats)?))
+        let contacts = ContactProblem::of_step(name.into(), &problem);
+        self.end_step(dt, &mut stats)?;
+        Ok((contacts, stats))
+    }
+
+    /// Assembles a step; false if there is nothing to do in it.
+    fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> bool {
+        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
+        if self.sleep.is_everything_still() {
+            stats.asleep = self.sleep.count();
+            return false;
+        }
+        self.assemble(dt, stats);
+        true
     }
 
     /// Runs and stores what is assembled.
-    fn run(&mut self, mut stats: StepStats) -> Result<StepStats> {
+    fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
-        timed(&mut stats.times.store, || self.prepared.store(&self.problem, &mut self.world));
+        timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
+        timed(&mut stats.times.store, || {
+            self.sleep.after_step(&mut self.world, self.detector.pairs(), dt);
+        });
+        stats.asleep = self.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
-        Ok(stats)
+        Ok(())
     }
 
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
-        self.assemble(dt);
+        self.sleep.before_step(&self.world, self.detector.pairs());
+        self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
     }
 
     /// Detects, colors, prepares and plans.
-    fn assemble(&mut self, dt: f32) -> StepStats {
-        let mut stats = StepStats::default();
+    fn assemble(&mut self, dt: f32, stats: &mut StepStats) {
         let times = &mut stats.times;
         let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
-        let found = timed(&mut times.detect, || self.detector.detect(&self.world, &self.config, dt, &give_back));
+        let found = timed(&mut times.detect, || {
+            let (detector, sleep) = (&mut self.detector, &mut self.sleep);
+            let mut found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
+            // Who wakes takes part in this step already.
+            while sleep.wake_touched(detector.pairs()) {
+                let reshaped = found.reshaped;
+                found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
+                found.reshaped |= reshaped;
+            }
+            found
+        });
         timed(&mut times.color, || {
             self.prepared.color(&self.world, &mut self.detector, &mut self.graph, self.config.max_colors);
             self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
-            self.prepared.prepare(&self.world, &self.detector, &self.config, dt, &mut self.problem);
-            self.plan = StepPlan::new(&self.config, &self.problem);
+            self.prepared.prepare(
+                &self.world,
+                self.sleep.asleep(),
+                &self.detector,
+                &self.config,
+                dt,
+                &mut self.problem,
+            );
+            // Where nothing was computed, the plan of the last step is the plan of this one.
+            let joints = self.problem.joints.len();
+            let same = found.computed == 0 && !found.reshaped && joints == self.planned_joints;
+            if !same || self.plan.passes.is_empty() {
+                self.planned_joints = joints;
+                self.plan = StepPlan::new(&self.config, &self.problem);
+            }
         });
         stats.pairs = found.pairs;
         stats.computed = found.computed;
@@ -129,7 +182,11 @@ impl Simulation {
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.plan.bytes_moved(&self.problem);
         stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
-        stats
+    }
+
+    /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
+    pub fn is_asleep(&self, body: usize) -> bool {
+        self.sleep.asleep().get(body) == Some(&true)
     }
 
     /// Overlap of the world as it is now, from contacts computed anew.
@@ -144,7 +201,7 @@ impl Simulation {
         self.world_and_pairs().1
     }
 
-    /// The bodies, with contacts and impulses of the last step.
+    /// The bodies, and contacts and impulses of the last step.
     pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
         let pairs = self.detector.pairs_mut();
         pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
@@ -154,6 +211,21 @@ impl Simulation {
     /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].
     pub fn joint_impulses(&self) -> &[glam::Vec3] {
         self.prepared.joint_impulses()
+    }
+
+    /// Changes the settings from the next step on.
+    ///
+    /// # Errors
+    /// One is out of range or contradicts another; they are then as they were.
+    pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
+        config.check()?;
+        self.config = config;
+        Ok(())
+    }
+
+    /// Changes what runs the steps, from the next one on.
+    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
+        self.backend = backend;
     }
 
     /// The settings.

@@ -19,6 +19,8 @@ pub struct StepStats {
     pub colors: usize,
     /// Manifolds that found no color and were swept alone.
     pub overflow: usize,
+    /// Bodies that sleep.
+    pub asleep: usize,
     /// Joints.
     pub joints: usize,
     /// Sweeps that were done, where the settings have a tolerance; else 0.

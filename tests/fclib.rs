@@ -44,19 +44,35 @@ fn an_exported_problem_is_the_same_problem() {
 }
 
 #[test]
+fn a_step_of_a_scene_is_exported_and_solved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = run(folder.path(), "export pile -p n=27 --step 60 --fclib pile.hdf5");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let pile = ContactProblem::read(folder.path().join("pile.hdf5")).expect("read");
+    assert!(pile.name == "pile, step 60" && pile.bodies.len() == 27 && pile.contacts.len() > 27, "{}", pile.name);
+    let sweeps = sweeps_to(&pile, (Method::Accelerated, Order::Manifolds), None, &[1e-6], 20_000);
+    assert!(sweeps[0].is_some(), "{} contacts", pile.contacts.len());
+}
+
+#[test]
 fn bad_input_ends_in_one_line_that_names_the_file_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = |name: &str| folder.path().join(name);
     tower(&[1.0]).write(file("tower.contacts")).expect("written");
     let whole = tower(&[1.0]).to_fclib().expect("written");
     std::fs::write(file("torn.hdf5"), &whole[..whole.len() - 1]).expect("written");
-    std::fs::write(file("zeros"), [0xff; 64]).expect("written");
+    std::fs::write(file("zeros.hdf5"), [0xff; 64]).expect("written");
     let before = std::fs::read_dir(folder.path()).expect("a folder").count();
     for (arguments, named) in [
         ("export nowhere.contacts --fclib out.hdf5", &["nowhere.contacts"][..]),
         ("export torn.hdf5 --fclib out.hdf5", &["torn.hdf5: not a whole HDF5 file", "bytes"]),
-        ("export zeros --fclib out.hdf5", &["zeros: neither text nor HDF5"]),
+        ("export zeros.hdf5 --fclib out.hdf5", &["zeros.hdf5: neither text nor HDF5"]),
         ("export tower.contacts --fclib nowhere/out.hdf5", &["nowhere/out.hdf5"]),
+        ("export tower.contacts --step 3 --fclib out.hdf5", &["tower.contacts", "--step"]),
+        ("export tower --fclib out.hdf5", &["tower", "--step N"]),
+        ("export twoer --step 3 --fclib out.hdf5", &["twoer", "neither a scene"]),
+        ("export chain --step 3 --fclib out.hdf5", &["chain, step 3", "joints"]),
+        ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: nothing touches"]),
         ("solve torn.hdf5", &["torn.hdf5: not a whole HDF5 file"]),
     ] {
         let output = run(folder.path(), arguments);

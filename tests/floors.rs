@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 9] = [
     &["world", "config"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
-    &["kernels", "plan", "metrics", "residuals"],
+    &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
     &["report", "compare", "view", "maze"],

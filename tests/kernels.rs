@@ -210,7 +210,9 @@ mod must_fail {
         let problem = random::problem(0, false);
         let passes = accelerated_sweeps(&problem, false);
         let good = by_the_reference(&problem, &passes);
-        for kernel in [Kernel::MeasureStep, Kernel::UpdateMomentum, Kernel::Extrapolate { first: false, measured: false }] {
+        for kernel in
+            [Kernel::MeasureStep, Kernel::UpdateMomentum, Kernel::Extrapolate { first: false, measured: false }]
+        {
             let mut passes = passes.clone();
             let last = passes.iter().rposition(|p| p.kernel == kernel).expect("there are some");
             passes.remove(last);

@@ -26,7 +26,7 @@ fn script(name: &str) -> Script {
 }
 
 fn played(board: &str, script: &Script, backend: Box<dyn Backend>) -> Played {
-    play(game(Map::find(board).expect("a board"), backend), script).expect("a game")
+    play(game(Map::find(board).expect("a board"), backend), script, |_| ()).expect("a game")
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing() {
     assert_eq!(played("easy", &script("lose"), reference()).outcome, Outcome::Hole);
     let nothing = Script::parse("s", "1 0 0\n").expect("a script");
     let game = game(Map::find("easy").expect("a board"), reference());
-    let played = play(game, &nothing).expect("a game");
+    let played = play(game, &nothing, |_| ()).expect("a game");
     assert_eq!((played.outcome, played.steps), (Outcome::Time, 120));
 }
 

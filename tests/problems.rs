@@ -65,11 +65,7 @@ fn backends() -> Vec<Option<Box<dyn Backend>>> {
 }
 
 /// Sweeps over those of the anchor, for each error.
-fn ratios(
-    (anchor, problem): &(Anchor, ContactProblem),
-    order: Order,
-    backend: Option<Box<dyn Backend>>,
-) -> [f64; 3] {
+fn ratios((anchor, problem): &(Anchor, ContactProblem), order: Order, backend: Option<Box<dyn Backend>>) -> [f64; 3] {
     let name = backend.as_ref().map_or("f64", |b| b.name());
     let sweeps = sweeps_to(problem, (anchor.method, order), backend, &ERRORS, MOST);
     let method = format!("{:?}", anchor.method);
@@ -132,7 +128,8 @@ fn acceleration_pays() {
         let after_32 = |method| curve(&problem, (method, Order::Manifolds), None, 32)[31];
         let gain = after_32(Method::Plain) / after_32(Method::Accelerated);
         println!("{name:<18} {plain:?} and {accelerated:?} sweeps; after 32 {gain:.1} times lower");
-        let counts = |sweeps: &[Option<u32>]| -> Vec<f64> { sweeps.iter().map(|s| s.expect("reached").into()).collect() };
+        let counts =
+            |sweeps: &[Option<u32>]| -> Vec<f64> { sweeps.iter().map(|s| s.expect("reached").into()).collect() };
         let (plain, accelerated) = (counts(&plain), counts(&accelerated));
         assert!(plain.iter().zip(&accelerated).all(|(p, a)| a <= p), "{name}: worse than plain");
         fewer.push(plain[2] / accelerated[2]);

@@ -13,8 +13,11 @@ use drystone::{Backend, Body, Cpu, Reference, Scene, Shape, Simulation, SolverCo
 fn simulation(scene: &str, parameters: &[&str], steps: u32) -> Simulation {
     let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
     let scene = Scene::find(scene, &parameters).expect("a scene of the catalogue");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("it is sound");
-    (0..steps).for_each(|_| drop(simulation.step(1.0 / 60.0).expect("a step")));
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("it is sound");
+    for _ in 0..steps {
+        simulation.step(1.0 / 60.0).expect("a step");
+    }
     simulation
 }
 
@@ -33,7 +36,13 @@ fn a_saved_step_is_read_back_and_solved() {
         let read = ContactProblem::parse(&problem.to_text()).expect("a problem");
         assert_eq!(read, problem);
         let solved = solution(&problem, 1e-8, 20_000).expect("good frames");
-        println!("{}: {} contacts, {} sweeps, {:?}", problem.name, problem.contacts.len(), solved.sweeps, solved.residuals);
+        println!(
+            "{}: {} contacts, {} sweeps, {:?}",
+            problem.name,
+            problem.contacts.len(),
+            solved.sweeps,
+            solved.residuals
+        );
         assert!(solved.residuals.e_vel <= 1e-8 && !problem.contacts.is_empty(), "{}", problem.name);
     }
 }

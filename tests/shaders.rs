@@ -26,8 +26,7 @@ mod layouts {
     use super::*;
     use drystone::problem::{
         BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-        MomentumRow,
-        Params, PassColors, PointRow, Softness,
+        MomentumRow, Params, PassColors, PointRow, Softness,
     };
 
     const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
@@ -67,7 +66,7 @@ mod layouts {
             Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {
-                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b preload
+                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
             }
             Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
             Joint = JointRow { r_a body_a r_b body_b gap }

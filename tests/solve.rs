@@ -86,7 +86,7 @@ fn a_step_of_a_run_is_saved_and_solved() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
         command.args(arguments.split(' ')).current_dir(folder.path()).output().expect("it starts")
     };
-    let output = drystone("run pile -p n=40 --steps 90 --save-problem 90:pile.contacts --backend cpu");
+    let output = drystone("run pile -p n=40 --steps 90 --no-sleep --save-problem 90:pile.contacts --backend cpu");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let output = drystone("solve pile.contacts --tolerance 1e-6 --json");
     let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
@@ -100,7 +100,7 @@ fn a_step_of_a_run_is_saved_and_solved() {
         ("run pile --steps 10 --save-problem 11:x", &["--save-problem 11:x", "1 to 10"][..]),
         ("run pile --steps 10 --save-problem 0:x", &["1 to 10"]),
         ("run chain --steps 10 --save-problem 1:x", &["chain", "joints"]),
-        ("run pile --steps 1 --save-problem 1:nowhere/x", &["nowhere/x"]),
+        ("run tower --steps 1 --save-problem 1:nowhere/x", &["nowhere/x"]),
     ] {
         let output = drystone(arguments);
         let line = text(&output.stderr).lines().last().expect("a line");

@@ -129,7 +129,9 @@ fn belts_and_gaps_are_what_the_offsets_say() {
     let mut problem = tower(&[1.0]);
     problem.contacts.iter_mut().for_each(|c| c.offset = DVec3::new(0.05, 0.03, -0.04));
     for order in ORDERS {
-        for backend in [None, reference(), Some(Box::new(Cpu::new()) as Box<_>), gpu(true).map(|g| Box::new(g) as Box<_>)] {
+        for backend in
+            [None, reference(), Some(Box::new(Cpu::new()) as Box<_>), gpu(true).map(|g| Box::new(g) as Box<_>)]
+        {
             let mut solver = Solver::new(&problem, Method::Plain, order, backend).expect("good frames");
             solver.advance(300).expect("it runs");
             let v = solver.velocities()[0].linear;
@@ -152,7 +154,7 @@ fn a_left_handed_frame_is_taken_and_one_that_is_none_is_refused() {
     assert!(left.residuals.e_vel <= 1e-12, "{:?}", left.residuals);
     assert!(left.velocities[1].linear.distance(right.velocities[1].linear) < 1e-12);
     problem.contacts[5].frame[2] = DVec3::new(0.1, 1.0, 0.0);
-    let refused = solution(&problem, 1e-12, 10).err().expect("refused").to_string();
+    let refused = solution(&problem, 1e-12, 10).expect_err("refused").to_string();
     assert!(refused.starts_with("contact 5: second tangent"), "{refused}");
 }
 

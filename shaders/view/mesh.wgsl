@@ -4,6 +4,9 @@
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
 
+// How many texels to either side the shadow map is compared at.
+override SHADOW_REACH: i32 = 1;
+
 const PLAIN = 0u;
 const CHECKERED = 1u;
 const OCTANTS = 2u;
@@ -54,7 +57,7 @@ fn transform(v: Vertex) -> Fragment {
     return out;
 }
 
-// Share of the light that reaches a point, the mean of nine comparisons.
+// Share of the light that reaches a point: the mean of comparisons around it.
 fn lit(world: vec3f, normal: vec3f) -> f32 {
     // Off the surface by two texels, so that nothing shades itself.
     let moved = world + normal * (2.0 * view.light.w);
@@ -62,14 +65,14 @@ fn lit(world: vec3f, normal: vec3f) -> f32 {
     let uv = at.xy * vec2f(0.5, -0.5) + 0.5;
     let step = 1.0 / f32(textureDimensions(shadow_map).x);
     var sum = 0.0;
-    for (var i = -1; i <= 1; i++) {
-        for (var k = -1; k <= 1; k++) {
+    for (var i = -SHADOW_REACH; i <= SHADOW_REACH; i++) {
+        for (var k = -SHADOW_REACH; k <= SHADOW_REACH; k++) {
             let offset = vec2f(f32(i), f32(k)) * step;
             sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + offset, at.z);
         }
     }
     // Beyond the map nothing is in the way.
-    return select(sum / 9.0, 1.0, any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)));
+    return select(sum / f32((2 * SHADOW_REACH + 1) * (2 * SHADOW_REACH + 1)), 1.0, any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)));
 }
 
 // Faint squares on the ground, which show how far things are and how they move.

@@ -10,6 +10,8 @@ mod render;
 mod report;
 mod run;
 mod solve;
+#[cfg(feature = "view")]
+mod view;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -18,8 +20,11 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use crate::config::{Method, SolverConfig};
+use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::stats::StepStats;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -37,6 +42,12 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
+    /// Run a scene in a window.
+    #[cfg(feature = "view")]
+    View(view::ViewArgs),
+    /// Run a scene in a window (in builds with `--features view`).
+    #[cfg(not(feature = "view"))]
+    View(NotBuilt),
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
@@ -45,12 +56,30 @@ enum Command {
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
     #[cfg(feature = "view")]
     Render(render::RenderArgs),
+    /// Draw a scene (in builds with `--features view`).
+    #[cfg(not(feature = "view"))]
+    Render(NotBuilt),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
     Scenes(list::ScenesArgs),
     /// List the adapters that can run the shaders.
     Adapters(list::AdaptersArgs),
+}
+
+/// A command that this build leaves out.
+#[cfg(not(feature = "view"))]
+#[derive(Args)]
+struct NotBuilt {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    rest: Vec<String>,
+}
+
+#[cfg(not(feature = "view"))]
+impl NotBuilt {
+    fn run(&self) -> Result<()> {
+        Err(Error::input("pictures and windows need a build with them: `cargo install --path . --features view`"))
+    }
 }
 
 /// A scene, and how to solve it.
@@ -130,6 +159,20 @@ impl SceneArgs {
     }
 }
 
+/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
+fn step_with_contacts(
+    simulation: &mut Simulation,
+    scene: &str,
+    dt: f32,
+    number: u32,
+) -> Result<(ContactProblem, StepStats)> {
+    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
+    match problem.contacts.is_empty() {
+        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
+        false => Ok((problem, stats)),
+    }
+}
+
 /// A progress bar on a terminal, nothing elsewhere.
 fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
@@ -160,10 +203,10 @@ pub fn main() -> std::process::ExitCode {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Solve(args) => args.run(),
+        Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
         Command::Play(args) => args.run(),
-        #[cfg(feature = "view")]
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),

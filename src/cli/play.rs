@@ -34,6 +34,14 @@ struct MazeArgs {
     /// Find the way, follow it, and write the tilts as a script.
     #[arg(long, value_name = "FILE", conflicts_with = "script")]
     pilot: Option<PathBuf>,
+    /// Draw the game: FILE.gif, FILE.mp4, FOLDER/, or FILE.png of its middle.
+    #[cfg(feature = "view")]
+    #[arg(long, value_name = "PATH", requires = "script")]
+    out: Option<PathBuf>,
+    /// Width and height of the pictures in pixels.
+    #[cfg(feature = "view")]
+    #[arg(long, value_name = "WxH", default_value = "480x360", value_parser = super::render::parse_size)]
+    size: (u32, u32),
     /// Print one JSON object, with the ball's track.
     #[arg(long, requires = "script")]
     json: bool,
@@ -61,18 +69,53 @@ impl MazeArgs {
         let map = Map::find(&self.board)?;
         let mut config = SolverConfig::default();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
-        let (backend, _) = choose(self.backend, 1, self.exact)?;
+        let begin = |map, config| Game::new(map, config, choose(self.backend, 1, self.exact)?.0);
         if let Some(path) = &self.script {
             let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
             let script = Script::parse(&path.display().to_string(), &text)?;
-            return self.print(&play(Game::new(map, config, backend)?, &script)?);
+            let game = begin(map, config)?;
+            #[cfg(feature = "view")]
+            if let Some(out) = &self.out {
+                return self.print(&self.draw(game, &script, out)?);
+            }
+            return self.print(&play(game, &script, |_| ())?);
         }
         if let Some(path) = &self.pilot {
-            let script = pilot(Game::new(map, config, backend)?)?;
+            let script = pilot(begin(map, config)?)?;
             write(path, &script.text())?;
             return print(path.display());
         }
-        window(Game::new(map, config, backend)?)
+        self.window(map, config)
+    }
+
+    /// Plays, and draws what was played.
+    #[cfg(feature = "view")]
+    fn draw(&self, game: Game, script: &Script, out: &Path) -> Result<crate::maze::Played> {
+        use crate::maze::SAMPLES;
+        use crate::view::{Canvas, Output, draw_game, poses};
+        // What cannot be drawn or written is refused before the game.
+        let (map, world) = (game.map.clone(), game.simulation.world.clone());
+        let mut canvas = Canvas::new(&world, self.size)?;
+        let mut output = Output::open(out, self.size, SAMPLES)?;
+        let mut frames = Vec::new();
+        let played = play(game, script, |game| frames.push(poses(&game.simulation.world)))?;
+        if out.extension().is_some_and(|e| e == "png") {
+            frames = vec![frames.swap_remove(frames.len() / 2)];
+        }
+        draw_game(&mut canvas, &map, &world, &frames, |picture| output.add(picture))?;
+        output.finish()?;
+        Ok(played)
+    }
+
+    #[cfg(feature = "view")]
+    fn window(&self, map: Map, config: SolverConfig) -> Result<()> {
+        use crate::view::{Labyrinth, window};
+        window::run(Box::new(Labyrinth::new(map, config, self.backend)?))
+    }
+
+    #[cfg(not(feature = "view"))]
+    fn window(&self, _: Map, _: SolverConfig) -> Result<()> {
+        Err(Error::input("play maze: a window needs a build with `--features view`; --script FILE plays without one"))
     }
 
     fn print(&self, played: &crate::maze::Played) -> Result<()> {
@@ -99,8 +142,4 @@ fn write(path: &Path, text: &str) -> Result<()> {
         let _ = std::fs::remove_file(&hidden);
     }
     written.map_err(Error::file(path))
-}
-
-fn window(_game: Game) -> Result<()> {
-    Err(Error::input("play maze: give --script FILE; a window needs a build with `--features view`"))
 }

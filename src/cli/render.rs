@@ -116,7 +116,12 @@ impl RenderArgs {
     /// Every scene of the catalogue, a third of the way through its run, and a page.
     fn gallery(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
-        let mut page = String::from(GALLERY_HEAD);
+        let (width, height) = self.size;
+        let mut page = format!(
+            "# Every scene of the catalogue\n\nMade by `drystone render --gallery {} --size {width}x{height}`: each scene a \
+             third of the way through its run.\n",
+            folder.display()
+        );
         for entry in CATALOGUE {
             let mut scene = entry.build(&[])?;
             scene.steps = (scene.steps / 3).max(1);
@@ -140,10 +145,7 @@ impl RenderArgs {
     }
 }
 
-const GALLERY_HEAD: &str = "# Every scene of the catalogue\n\nMade by `drystone render --gallery docs/gallery`; each picture shows the \
-    scene a third of the way through its run.\n";
-
-fn parse_size(text: &str) -> std::result::Result<(u32, u32), String> {
+pub(super) fn parse_size(text: &str) -> std::result::Result<(u32, u32), String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     parsed
         .filter(|&(w, h): &(u32, u32)| (1..=16_384).contains(&w) && (1..=16_384).contains(&h))

@@ -6,13 +6,12 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, print, print_json, progress};
+use super::{SceneArgs, print, print_json, progress, step_with_contacts};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
-use crate::stats::StepStats;
 
 /// Arguments of `drystone run`.
 #[derive(Args)]
@@ -25,6 +24,9 @@ pub struct RunArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
+    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
+    #[arg(long)]
+    no_sleep: bool,
     /// Write poses and velocities of the bodies that can move, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -68,21 +70,18 @@ impl SaveProblem {
         }
         Ok(())
     }
-
-    /// Runs the step and writes its problem.
-    fn step(&self, scene: &Scene, simulation: &mut Simulation) -> Result<StepStats> {
-        let name = format!("{}, step {}", scene.name, self.step);
-        let (contacts, stats) = simulation.step_with_contacts(&name, scene.dt)?;
-        contacts.write(&self.file)?;
-        Ok(stats)
-    }
 }
 
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load()?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
+        if self.no_sleep {
+            config.sleep_after = 0.0;
+        } else if config.sleep_after == 0.0 {
+            config.sleep_after = 0.5;
+        }
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
@@ -93,7 +92,11 @@ impl RunArgs {
         for step in 0..=scene.steps {
             if step > 0 {
                 let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
-                    Some(save) => save.step(&scene, &mut simulation)?,
+                    Some(save) => {
+                        let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
+                        problem.write(&save.file)?;
+                        stats
+                    }
                     None => simulation.step(scene.dt)?,
                 };
                 report.add(&stats);

@@ -80,7 +80,8 @@ impl SolveArgs {
             Numbers::Cpu => Some(BackendChoice::Cpu),
             Numbers::Gpu => Some(BackendChoice::Gpu),
         };
-        let backend = choice.map(|c| choose(c, problem.bodies.len(), self.exact)).transpose()?.map(|(backend, _)| backend);
+        let backend =
+            choice.map(|c| choose(c, problem.bodies.len(), self.exact)).transpose()?.map(|(backend, _)| backend);
         let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;

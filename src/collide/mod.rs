@@ -22,6 +22,17 @@ use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, World};
 use narrow::{ColliderInfo, Margins, Moving, Scratch, Update};
 
+/// What a body is to the detection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activity {
+    /// Does not move, and nothing is solved for it.
+    Still,
+    /// Moves by itself: cannot be pushed, but may wake what it touches.
+    Moving,
+    /// Can be pushed.
+    Awake,
+}
+
 /// What one detection did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DetectStats {
@@ -43,6 +54,10 @@ pub struct Detector {
     workspace: BvhWorkspace,
     /// Fattened box of each collider, as the tree has it.
     fat: Vec<Aabb>,
+    /// Box now of each collider that left its fattened one.
+    left: Vec<Option<Aabb>>,
+    /// Colliders whose fattened boxes are new.
+    moved: Vec<u32>,
     pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
@@ -64,6 +79,7 @@ impl Detector {
                 body: body as u32,
                 shape: c.shape.0.clone(),
                 local: Pose::from_parts(c.position, c.rotation),
+                cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
                 size: c.shape.smallest_half_extent(),
                 reach: c.position.length() + bounding,
                 unbounded: c.shape.0.as_halfspace().is_some(),
@@ -81,6 +97,8 @@ impl Detector {
             tree: Bvh::new(),
             workspace: BvhWorkspace::default(),
             fat: Vec::new(),
+            left: Vec::new(),
+            moved: Vec::new(),
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
@@ -107,12 +125,14 @@ impl Detector {
 
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
     /// their pairs know how the bodies moved since. A manifold that is computed anew inherits the impulses of the old one,
-    /// which `give_back` fetches from where the last step left them.
+    /// which `give_back` fetches from where the last step left them. Pairs of bodies that are still keep what they have, and take
+    /// no part in the step; without `activity` all take part.
     pub fn detect(
         &mut self,
         world: &World,
         config: &SolverConfig,
         dt: f32,
+        activity: &[Activity],
         give_back: &(dyn Fn(&mut Pair) + Sync),
     ) -> DetectStats {
         let moving = |b: &Body| Moving {
@@ -131,8 +151,8 @@ impl Detector {
             dt,
             detection: self.detections,
         };
-        let parted = self.broad_phase(margins);
-        let mut stats = self.narrow_phase(margins, give_back);
+        let parted = self.broad_phase(margins, activity);
+        let mut stats = self.narrow_phase(margins, activity, give_back);
         stats.reshaped |= parted;
         if stats.reshaped {
             self.reshaped_in = self.detections;
@@ -159,17 +179,17 @@ impl Detector {
         give_back: &(dyn Fn(&mut Pair) + Sync),
     ) -> DetectStats {
         self.pairs.iter_mut().for_each(Pair::invalidate);
-        self.detect(world, config, dt, give_back)
+        self.detect(world, config, dt, &[], give_back)
     }
 
     /// Finds new pairs and ends parted ones; returns whether it ended any.
-    fn broad_phase(&mut self, margins: Margins) -> bool {
+    fn broad_phase(&mut self, margins: Margins, activity: &[Activity]) -> bool {
         let mut parted = false;
         // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
         let tight = |c: &ColliderInfo| {
             let body = &self.moving[c.body as usize];
-            let pose = Pose::from_parts(body.position, body.rotation) * c.local;
-            let mut aabb = c.shape.compute_aabb(&pose).loosened(margins.speculative * c.size + margins.fall);
+            let pose = Pose::from_parts(body.position, body.rotation);
+            let mut aabb = c.aabb(pose).loosened(margins.speculative * c.size + margins.fall);
             let sweep = body.v * margins.dt;
             aabb.mins += sweep.min(glam::Vec3::ZERO);
             aabb.maxs += sweep.max(glam::Vec3::ZERO);
@@ -182,29 +202,34 @@ impl Detector {
             self.found.clear();
             let found = &mut self.found;
             self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-            self.find_unbounded((0..self.colliders.len() as u32).collect());
+            self.moved.extend(0..self.colliders.len() as u32);
+            self.find_unbounded();
         } else {
             let kinds = &self.kinds;
-            let left = |(i, c): (usize, &ColliderInfo)| {
-                if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded {
+            let left = |(c, fat): (&ColliderInfo, &Aabb)| {
+                let still = activity.get(c.body as usize) == Some(&Activity::Still);
+                if kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
                     return None;
                 }
                 let aabb = tight(c);
-                (!self.fat[i].contains(&aabb) && is_finite(&aabb)).then_some((i as u32, aabb))
+                (!fat.contains(&aabb) && is_finite(&aabb)).then_some(aabb)
             };
-            let moved: Vec<_> = self.colliders.par_iter().enumerate().filter_map(left).collect();
+            let colliders = self.colliders.par_iter().with_min_len(256);
+            colliders.zip(&self.fat).map(left).collect_into_vec(&mut self.left);
             self.found.clear();
-            if !moved.is_empty() {
-                for (i, aabb) in &moved {
-                    let margin = FAT * self.colliders[*i as usize].size;
-                    self.tree.insert_or_update_partially(*aabb, *i, margin);
-                    self.fat[*i as usize] = aabb.loosened(margin);
-                }
+            self.moved.clear();
+            for (i, aabb) in self.left.iter().enumerate().filter_map(|(i, left)| Some((i, left.as_ref()?))) {
+                let margin = FAT * self.colliders[i].size;
+                self.tree.insert_or_update_partially(*aabb, i as u32, margin);
+                self.fat[i] = aabb.loosened(margin);
+                self.moved.push(i as u32);
+            }
+            if !self.moved.is_empty() {
                 self.tree.optimize_incremental(&mut self.workspace);
                 self.tree.refit(&mut self.workspace);
                 let found = &mut self.found;
                 self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-                self.find_unbounded(moved.iter().map(|m| m.0).collect());
+                self.find_unbounded();
                 parted = self.drop_parted();
             }
         }
@@ -213,10 +238,10 @@ impl Detector {
     }
 
     /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
-    fn find_unbounded(&mut self, moved: Vec<u32>) {
+    fn find_unbounded(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         for &plane in &self.unbounded {
-            let near = moved.iter().filter(|&&c| plane != c && self.touches(plane, c));
+            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(plane, c));
             found.extend(near.map(|&c| (plane, c)));
         }
         self.found = found;
@@ -280,11 +305,34 @@ impl Detector {
         }
     }
 
-    fn narrow_phase(&mut self, margins: Margins, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+    fn narrow_phase(
+        &mut self,
+        margins: Margins,
+        activity: &[Activity],
+        give_back: &(dyn Fn(&mut Pair) + Sync),
+    ) -> DetectStats {
         let (colliders, moving) = (&self.colliders, &self.moving);
         let update = |scratch: &mut Scratch, pair: &mut Pair| {
             let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
-            let update = pair.update(colliders, a, b, margins, scratch, give_back);
+            let of = |body: u32| activity.get(body as usize).copied().unwrap_or(Activity::Awake);
+            let both = [of(pair.body_a), of(pair.body_b)];
+            // What a pair has belongs to its manifolds while it takes no part, and to their rows while it does.
+            let takes_part = both.contains(&Activity::Awake);
+            let changes = pair.rests == takes_part;
+            if changes && !takes_part {
+                give_back(pair);
+            }
+            let mut update = Update::Reused;
+            if both != [Activity::Still; 2] {
+                update = pair.update(colliders, a, b, margins, scratch, give_back);
+            }
+            if changes && takes_part {
+                pair.computed_in = margins.detection;
+            }
+            pair.rests = !takes_part;
+            if changes && !pair.manifolds.is_empty() {
+                update = Update::Reshaped;
+            }
             (usize::from(update != Update::Reused), update == Update::Reshaped)
         };
         let both = |x: (usize, bool), y: (usize, bool)| (x.0 + y.0, x.1 | y.1);

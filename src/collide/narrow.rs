@@ -1,6 +1,7 @@
 //! The contact of one pair of colliders: reused while they hardly moved, else asked of parry.
 
 use glam::{Quat, Vec3};
+use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{SharedShape, TypedShape};
@@ -15,6 +16,8 @@ pub(super) struct ColliderInfo {
     pub shape: SharedShape,
     /// Place in the body's frame.
     pub local: Pose,
+    /// Half extents of a cuboid [m].
+    pub cuboid: Option<Vec3>,
     /// Half of the smallest side [m].
     pub size: f32,
     /// Radius around the body's origin that holds the collider [m].
@@ -24,6 +27,14 @@ pub(super) struct ColliderInfo {
 }
 
 impl ColliderInfo {
+    /// The box around it when its body is at `pose`. That of a cuboid needs nothing from elsewhere in memory.
+    pub fn aabb(&self, pose: Pose) -> Aabb {
+        let pose = pose * self.local;
+        let Some(half) = self.cuboid else { return self.shape.compute_aabb(&pose) };
+        let axes = glam::Mat3::from_quat(pose.rotation);
+        Aabb::from_half_extents(pose.translation, axes.abs() * half)
+    }
+
     fn is_composite(&self) -> bool {
         self.shape.as_trimesh().is_some() || self.shape.as_heightfield().is_some()
     }
@@ -52,6 +63,8 @@ pub struct Pair {
     motion: Motion,
     /// The detection, counted from 1, that computed the manifolds; 0 if none did.
     pub(crate) computed_in: u64,
+    /// Whether it takes no part in steps, so that its manifolds have no rows.
+    pub(crate) rests: bool,
     /// Where the first of the manifolds stands among the contacts that were last prepared. Written by `problem`.
     pub(crate) contact: u32,
 }
@@ -156,6 +169,7 @@ impl Pair {
             computed_at: None,
             motion: Motion::default(),
             computed_in: 0,
+            rests: false,
             contact: 0,
         }
     }

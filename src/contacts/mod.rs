@@ -96,9 +96,3 @@ fn is_positive_definite(m: DMat3) -> bool {
     let (p_yy, p_yz, p_zz) = (yy - xy * xy / xx, yz - xy * xz / xx, zz - xz * xz / xx);
     xx > 0.0 && p_yy > 0.0 && p_zz - p_yz * p_yz / p_yy > 0.0
 }
-
-/// Scaled to order 1 meanwhile, so that the determinant of a small body's inertia does not vanish.
-fn inverse(m: DMat3) -> DMat3 {
-    let scale = 3.0 / (m.x_axis.x + m.y_axis.y + m.z_axis.z);
-    (m * scale).inverse() * scale
-}

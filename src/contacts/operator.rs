@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, Velocity, inverse};
+use super::{ContactProblem, Velocity};
 
 /// A problem with the inverse of its masses.
 #[derive(Clone, Debug)]
@@ -87,4 +87,10 @@ impl<'a> Operator<'a> {
         }
         DMat3::from_cols_array_2d(&block)
     }
+}
+
+/// The inverse of an inertia, scaled to order 1 on the way, so that the determinant of a small one does not vanish.
+pub(super) fn inverse(inertia: DMat3) -> DMat3 {
+    let scale = 3.0 / (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z);
+    (inertia * scale).inverse() * scale
 }

@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, FreeBody, PointContact, Velocity, inverse};
+use super::operator::inverse;
+use super::{ContactProblem, FreeBody, PointContact, Velocity};
 use crate::problem::{BodyRow, ContactRow, MassRow, StepProblem};
 
 impl ContactProblem {

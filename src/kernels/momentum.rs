@@ -79,14 +79,27 @@ pub fn squared_step<L: Lane>(impulse: Vec3<L>, step: &Step<L>) -> L {
     dot3(d, d)
 }
 
+/// Sum of some numbers as the kernels form it: `measure_step` that of each chunk, `update_momentum` that of those.
+pub fn chunked_sum<L: Lane>(numbers: &[L]) -> L {
+    let mut sums = [L::constant(0.0); WORKGROUP];
+    for (i, chunk) in numbers.chunks(CHUNK).enumerate() {
+        sums[i % WORKGROUP] = sums[i % WORKGROUP] + workgroup_sum(chunk);
+    }
+    sum_of_halves(sums)
+}
+
 /// Sum of some numbers as a workgroup forms it: each thread takes every 64th, then halves are added.
-pub fn workgroup_sum<L: Lane>(numbers: &[L]) -> L {
+fn workgroup_sum<L: Lane>(numbers: &[L]) -> L {
     let mut sums = [L::constant(0.0); WORKGROUP];
     for row in numbers.chunks(WORKGROUP) {
         for (sum, &x) in sums.iter_mut().zip(row) {
             *sum = *sum + x;
         }
     }
+    sum_of_halves(sums)
+}
+
+fn sum_of_halves<L: Lane>(mut sums: [L; WORKGROUP]) -> L {
     let mut half = WORKGROUP / 2;
     while half > 0 {
         for i in 0..half {
@@ -117,10 +130,10 @@ mod tests {
     }
 
     #[test]
-    fn a_workgroup_sums_everything_once() {
-        for count in [0_u32, 1, 63, 64, 65, 1000, 1024] {
+    fn a_chunked_sum_has_everything_once() {
+        for count in [0_u32, 1, 63, 64, 65, 1000, 1024, 1025, 70_000, 140_000] {
             let numbers: Vec<f64> = (0..count).map(f64::from).collect();
-            assert_eq!(workgroup_sum(&numbers), numbers.iter().sum::<f64>());
+            assert_eq!(chunked_sum(&numbers), numbers.iter().sum::<f64>());
         }
     }
 }

@@ -198,17 +198,20 @@ pub struct Played {
 
 /// Steps between two samples of the track.
 const SAMPLE: u32 = 6;
+/// Samples of the track a second.
+pub const SAMPLES: f64 = 20.0;
 
-/// Plays `script` to its end, or until the game is won or lost. `game` has not begun.
+/// Plays `script` to its end, or until the game is won or lost. `game` has not begun; `watch` sees every sample of the track.
 ///
 /// # Errors
 /// The backend cannot run a step.
-pub fn play(mut game: Game, script: &Script) -> Result<Played> {
+pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Result<Played> {
     let mut track = Vec::new();
     loop {
         let ended = game.outcome.is_some() || game.time() >= script.end();
         if game.steps.is_multiple_of(SAMPLE) || ended {
             track.push(Sample { time: game.time(), ball: game.ball().to_array() });
+            watch(&game);
         }
         if ended {
             break;

@@ -133,7 +133,8 @@ impl Writer<'_> {
             let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);
             let computed = &mut chunk.computed[own.clone()];
             if pair.computed_in > self.seen {
-                self.write_points(row, &pair.manifolds[source.manifold as usize], points, impulses, computed);
+                let manifold = &pair.manifolds[source.manifold as usize];
+                self.write_points(row, manifold, pair.motion(), points, impulses, computed);
             } else {
                 if let (Some(before), Some(from)) = (self.before, source.row_before) {
                     let from = before.contacts[from as usize].first_point as usize;
@@ -175,6 +176,7 @@ impl Writer<'_> {
         &self,
         row: &ContactRow,
         manifold: &Manifold,
+        motion: &Motion,
         points: &mut [PointRow],
         impulses: &mut [ImpulseRow],
         computed: &mut [f32],
@@ -190,7 +192,7 @@ impl Writer<'_> {
             *computed = p.computed_separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
-                separation: p.separation,
+                separation: manifold.separation(p, motion),
                 r_b: p.r_b.to_array(),
                 normal_mass: effective.normal(p.r_a, p.r_b),
                 tangent_mass,

@@ -8,9 +8,8 @@ pub mod softness;
 mod store;
 
 pub use layout::{
-    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
-    Params,
-    PassColors, PointRow, Softness,
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+    MomentumRow, Params, PassColors, PointRow, Softness,
 };
 pub use prepare::Prepared;
 

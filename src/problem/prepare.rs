@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::contacts::{Chunk, ContactRows, Source, Writer};
 use super::layout::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow, Params,
-    PointRow, Softness,
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
+    Params, PointRow, Softness,
 };
 use super::softness::softness;
 use crate::collide::Detector;
@@ -37,7 +37,9 @@ pub struct Prepared {
     sources_before: Vec<Source>,
     edges_before: Vec<Edge>,
     joint_edges: Vec<Edge>,
-    pub(super) joint_coloring: Coloring,
+    joint_coloring: Coloring,
+    /// Which joint each row is of: those of bodies that are awake.
+    pub(super) joint_rows: Vec<u32>,
     /// Impulse of each joint at the end of the step before.
     pub(super) joint_impulses: Vec<Vec3>,
 }
@@ -58,6 +60,9 @@ impl Prepared {
         self.edges.clear();
         let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
         for (i, pair) in detector.pairs_mut().iter_mut().enumerate() {
+            if pair.rests {
+                continue;
+            }
             let before = pair.contact as usize;
             pair.contact = self.sources.len() as u32;
             for k in 0..pair.manifolds.len() {
@@ -87,6 +92,9 @@ impl Prepared {
 
     /// Gives every joint of the world a color; joints and contacts share none.
     pub fn color_joints(&mut self, world: &World, graph: &mut ConstraintGraph, max_colors: u32) {
+        if self.joint_edges.len() == world.joints.len() {
+            return;
+        }
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
         self.joint_edges.truncate(world.joints.len());
         let fresh = &world.joints[self.joint_edges.len()..];
@@ -96,16 +104,17 @@ impl Prepared {
         self.joint_impulses.resize(world.joints.len(), Vec3::ZERO);
     }
 
-    /// Writes the rows of a step of `dt` seconds into `problem`.
+    /// Writes the rows of a step of `dt` seconds into `problem`. Who is `asleep` stands in them as one that nothing moves.
     pub fn prepare(
         &mut self,
         world: &World,
+        asleep: &[bool],
         detector: &Detector,
         config: &SolverConfig,
         dt: f32,
         problem: &mut StepProblem,
     ) {
-        prepare_bodies(world, config, problem);
+        prepare_bodies(world, asleep, config, problem);
         let h = dt / config.substeps as f32;
         problem.params = Params {
             substep: h,
@@ -125,21 +134,35 @@ impl Prepared {
         problem.momentum = MomentumRow::default();
         problem.colors.clone_from(&self.coloring.offsets);
         problem.first_joint_color = problem.colors.len() as u32;
-        if !world.joints.is_empty() {
-            problem.colors.extend(&self.joint_coloring.offsets);
-        }
         self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
-        self.prepare_joints(world, problem);
+        self.prepare_joints(world, asleep, problem);
         self.prepare_contacts(world, detector, config, dt, problem);
         problem.params.point_count = problem.points.len() as u32;
         problem.params.joint_count = problem.joints.len() as u32;
     }
 
-    fn prepare_joints(&self, world: &World, problem: &mut StepProblem) {
+    fn prepare_joints(&mut self, world: &World, asleep: &[bool], problem: &mut StepProblem) {
         problem.joints.clear();
         problem.joint_impulses.clear();
+        self.joint_rows.clear();
+        // A joint holds bodies of one island, which are asleep together.
+        let rests = |body: usize| asleep.get(body) == Some(&true);
+        let is_awake = |i: u32| {
+            let joint = &world.joints[i as usize];
+            !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
+        };
+        for color in self.joint_coloring.offsets.windows(2) {
+            problem.colors.push(self.joint_rows.len() as u32);
+            let own = &self.joint_coloring.order[color[0] as usize..color[1] as usize];
+            self.joint_rows.extend(own.iter().filter(|&&i| is_awake(i)));
+        }
+        if self.joint_rows.is_empty() {
+            problem.colors.truncate(problem.first_joint_color as usize);
+            return;
+        }
+        problem.colors.push(self.joint_rows.len() as u32);
         let world_row = world.bodies.len() as u32;
-        for &i in &self.joint_coloring.order {
+        for &i in &self.joint_rows {
             let joint = &world.joints[i as usize];
             let [anchor_a, anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
@@ -182,11 +205,11 @@ impl Prepared {
             pairs: detector.pairs(),
             config,
             substep: problem.params.substep,
-            bodies: &problem.bodies,
-            masses: &problem.masses,
             movable_compliance: problem.params.movable.compliance(),
             fixed_compliance: problem.params.fixed.compliance(),
             preload_share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
+            bodies: &problem.bodies,
+            masses: &problem.masses,
             bounces: world.bodies.iter().any(|b| b.material.restitution > 0.0),
             patches: self.patches,
             seen: self.seen,
@@ -235,15 +258,16 @@ fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
     }
 }
 
-fn prepare_bodies(world: &World, config: &SolverConfig, problem: &mut StepProblem) {
-    let state = |b: &Body| {
-        let moves = b.kind != BodyKind::Fixed;
+fn prepare_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
+    let rests = |i: usize| asleep.get(i) == Some(&true);
+    let state = |(i, b): (usize, &Body)| {
+        let moves = b.kind != BodyKind::Fixed && !rests(i);
         let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
         BodyRow { v: velocity(b.linear_velocity), w: velocity(b.angular_velocity), ..BodyRow::AT_REST }
     };
-    world.bodies.par_iter().with_min_len(CHUNK).map(state).collect_into_vec(&mut problem.bodies);
-    let mass = |b: &Body| {
-        if b.kind != BodyKind::Dynamic {
+    world.bodies.par_iter().with_min_len(CHUNK).enumerate().map(state).collect_into_vec(&mut problem.bodies);
+    let mass = |(i, b): (usize, &Body)| {
+        if b.kind != BodyKind::Dynamic || rests(i) {
             return MassRow::default();
         }
         let i = b.mass.world_inverse_inertia(b.rotation);
@@ -255,7 +279,7 @@ fn prepare_bodies(world: &World, config: &SolverConfig, problem: &mut StepProble
             ..MassRow::default()
         }
     };
-    world.bodies.par_iter().with_min_len(CHUNK).map(mass).collect_into_vec(&mut problem.masses);
+    world.bodies.par_iter().with_min_len(CHUNK).enumerate().map(mass).collect_into_vec(&mut problem.masses);
     problem.inertias.clear();
     if config.gyroscopic {
         let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic();
@@ -266,6 +290,6 @@ fn prepare_bodies(world: &World, config: &SolverConfig, problem: &mut StepProble
             frame: (b.rotation * b.mass.principal_frame).to_array(),
             ..InertiaRow::default()
         };
-        problem.inertias.extend(world.bodies.iter().enumerate().filter(|(_, b)| turns(b)).map(row));
+        problem.inertias.extend(world.bodies.iter().enumerate().filter(|&(i, b)| turns(b) && !rests(i)).map(row));
     }
 }

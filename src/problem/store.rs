@@ -9,10 +9,12 @@ use crate::collide::Pair;
 use crate::world::{BodyKind, World};
 
 impl Prepared {
-    /// Writes poses and velocities into the world. The impulses of contacts stay in the rows, where the next step finds them.
-    pub fn store(&mut self, problem: &StepProblem, world: &mut World) {
-        world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies).for_each(|(body, row)| {
-            if body.kind == BodyKind::Fixed {
+    /// Writes poses and velocities into the world, but for those who are asleep. The impulses of contacts stay in the rows,
+    /// where the next step finds them.
+    pub fn store(&mut self, problem: &StepProblem, asleep: &[bool], world: &mut World) {
+        let bodies = world.bodies.par_iter_mut().with_min_len(256).zip(&problem.bodies);
+        bodies.enumerate().for_each(|(i, (body, row))| {
+            if body.kind == BodyKind::Fixed || asleep.get(i) == Some(&true) {
                 return;
             }
             let center = body.center_of_mass() + Vec3::from_array(row.dp);
@@ -21,7 +23,7 @@ impl Prepared {
             body.linear_velocity = Vec3::from_array(row.v);
             body.angular_velocity = Vec3::from_array(row.w);
         });
-        for (&i, row) in self.joint_coloring.order.iter().zip(&problem.joint_impulses) {
+        for (&i, row) in self.joint_rows.iter().zip(&problem.joint_impulses) {
             self.joint_impulses[i as usize] = Vec3::from_array(row.linear);
         }
     }
@@ -29,7 +31,7 @@ impl Prepared {
     /// Brings colors, separations and impulses of the rows of `problem` to the manifolds of a pair, unless they were computed
     /// since.
     pub fn give_back(&self, problem: &StepProblem, pair: &mut Pair) {
-        if pair.computed_in > self.seen {
+        if pair.computed_in > self.seen || pair.rests {
             return;
         }
         for (k, manifold) in pair.manifolds.iter_mut().enumerate() {

@@ -38,7 +38,9 @@ const MOST: u32 = 40_000;
 pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) -> Result<String> {
     let problems = problems(folder)?;
     let mut page = include_str!("convergence_head.md").to_owned();
-    page.push_str("\n| problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |\n|---|--:|---|--:|--:|--:|--:|--:|\n");
+    page.push_str(
+        "\n| problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |\n|---|--:|---|--:|--:|--:|--:|--:|\n",
+    );
     let mut gains = [const { (Vec::new(), Vec::new()) }; KINDS.len()];
     for problem in &problems {
         let mut first = None;
@@ -53,11 +55,14 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
             let (name, contacts) = (&problem.name, problem.contacts.len());
             let (name, contacts) =
                 if *kind == KINDS[0] { (name.as_str(), contacts.to_string()) } else { ("", String::new()) };
-            line(&mut page, format_args!(
-                "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
-                kind_name(*kind),
-                sweeps.join(" | ")
-            ));
+            line(
+                &mut page,
+                format_args!(
+                    "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
+                    kind_name(*kind),
+                    sweeps.join(" | ")
+                ),
+            );
         }
         after_problem(problems.len());
     }

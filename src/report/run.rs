@@ -36,6 +36,8 @@ pub struct RunReport {
     pub manifolds: usize,
     /// Contact points of the last step.
     pub points: usize,
+    /// Bodies that sleep at the end.
+    pub asleep: usize,
     /// Joints.
     pub joints: usize,
     /// Largest distance between the anchors of a joint at the end [m]; none if the scene has no joints.
@@ -127,6 +129,7 @@ impl RunReport {
             stage_ms: Vec::new(),
             manifolds: 0,
             points: 0,
+            asleep: 0,
             joints: scene.world.joints.len(),
             joint_gap: None,
             sweeps: None,
@@ -164,6 +167,7 @@ impl RunReport {
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
         self.manifolds = stats.manifolds;
         self.points = stats.points;
+        self.asleep = stats.asleep;
         if self.config.tolerance > 0.0 {
             *self.sweeps.get_or_insert(0) += u64::from(stats.sweeps);
             *self.planned_sweeps.get_or_insert(0) += u64::from(stats.planned_sweeps);
@@ -236,6 +240,9 @@ impl RunReport {
                 100.0 * self.reused
             ),
         );
+        if self.asleep > 0 {
+            row("asleep", format!("{} bodies", self.asleep));
+        }
         if let Some(gap) = self.joint_gap {
             row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
         }

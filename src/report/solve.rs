@@ -93,11 +93,7 @@ impl SolveReport {
     ///
     /// # Errors
     /// A contact that no kernel takes ([`Solver::new`]), or a backend that cannot run.
-    pub fn new(
-        problem: &ContactProblem,
-        settings: &SolveSettings,
-        backend: Option<Box<dyn Backend>>,
-    ) -> Result<Self> {
+    pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
         let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;
         let measure = Measure::new(problem);
         let name = backend.as_ref().map_or("f64", |b| b.name());

@@ -1,6 +1,6 @@
 //! Pictures without a window: drawn into a texture and read back.
 
-use super::renderer::{Renderer, Shot};
+use super::renderer::{Quality, Renderer, Shot};
 use crate::backend::gpu::{AdapterChoice, open_device};
 use crate::error::{Error, Result};
 use crate::world::World;
@@ -56,7 +56,7 @@ impl Canvas {
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        let renderer = Renderer::new(&device, &queue, FORMAT, world);
+        let renderer = Renderer::new(&device, &queue, FORMAT, Quality::FINE, world);
         Ok(Self { device, queue, renderer, size: (width, height), texture, read_back, adapter: summary.to_string() })
     }
 

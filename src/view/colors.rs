@@ -171,8 +171,9 @@ mod tests {
 
     #[test]
     fn batches_that_share_a_body_have_different_colors() {
-        let tower = settled("tower", &[]);
-        let values = ColorBy::Batch.values(&tower.world, tower.pairs());
+        let mut tower = settled("tower", &[]);
+        let (world, pairs) = tower.world_and_pairs();
+        let values = ColorBy::Batch.values(world, pairs);
         assert!(values[1..].iter().all(|v| v.is_finite()), "every box touches something");
         let distinct: std::collections::HashSet<Rgba> = (0..24).map(batch_color).collect();
         assert_eq!(distinct.len(), 24);
@@ -180,8 +181,9 @@ mod tests {
 
     #[test]
     fn the_lowest_box_of_a_tower_bears_most() {
-        let tower = settled("tower", &[]);
-        let values = ColorBy::Impulse.values(&tower.world, tower.pairs());
+        let mut tower = settled("tower", &[]);
+        let (world, pairs) = tower.world_and_pairs();
+        let values = ColorBy::Impulse.values(world, pairs);
         assert!(values[1] > 1.5 * values[6] && values[10] > 0.0, "{values:?}");
         let scale = ColorBy::Impulse.scale(&tower.world, &values);
         let colors = ColorBy::Impulse.paint(&tower.world, &values, scale);

@@ -7,12 +7,12 @@ use glam::{Quat, Vec3};
 use super::camera::{Bounds, Camera};
 use super::canvas::{Canvas, Picture};
 use super::colors::ColorBy;
-use super::mesh::poses;
+use super::mesh::{Poses, poses};
 use super::renderer::Shot;
 use crate::collide::Pair;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
-use crate::world::{BodyKind, World};
+use crate::world::{BodyKind, Collider, World};
 
 /// A world at one time.
 #[derive(Clone, Debug)]
@@ -114,22 +114,9 @@ impl Film {
         Ok(film)
     }
 
-    /// What of the scene is in the pictures: everything that moves, over all frames, and the container it is in.
+    /// What of the scene is in the pictures: everything that moves, over all frames.
     pub fn bounds(&self) -> Bounds {
-        let mut bounds = Bounds::EMPTY;
-        let world = &self.scene.world;
-        for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
-            let reach = |c: &crate::world::Collider| c.position.length() + c.shape.bounding_radius();
-            let reach = body.colliders.iter().map(reach).fold(0.0, f32::max);
-            for frame in &self.frames {
-                // With room around it.
-                bounds = bounds.join(Bounds::around(frame.poses[i].0, 1.5 * reach));
-            }
-        }
-        for anchor in world.joints.iter().flat_map(|j| world.anchors(j)) {
-            bounds = bounds.join(Bounds::around(anchor, 0.0));
-        }
-        bounds
+        self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(bounds_at(&self.scene.world, &frame.poses)))
     }
 
     /// Draws every frame from one place, in order, on a canvas for the film's world.
@@ -156,4 +143,20 @@ impl Film {
 pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(all);
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
+}
+
+/// Around everything in a world that moves, with room around it, and the points that it hangs from.
+pub fn bounds(world: &World) -> Bounds {
+    bounds_at(world, &poses(world))
+}
+
+fn bounds_at(world: &World, poses: &Poses) -> Bounds {
+    let reach = |c: &Collider| c.position.length() + c.shape.bounding_radius();
+    let moving = world.bodies.iter().zip(poses).filter(|(b, _)| b.kind != BodyKind::Fixed);
+    let around = moving.map(|(body, &(position, _))| {
+        Bounds::around(position, 1.5 * body.colliders.iter().map(reach).fold(0.0, f32::max))
+    });
+    let hung = world.joints.iter().filter(|j| j.body_b.is_none());
+    let anchors = hung.map(|j| Bounds::around(j.anchor_b, 0.0));
+    around.chain(anchors).fold(Bounds::EMPTY, Bounds::join)
 }

@@ -14,10 +14,24 @@ use super::mesh::{Instance, Meshes, Poses, Vertex};
 use super::overlay::LineEnd;
 use crate::world::World;
 
-/// Samples of a pixel.
-const SAMPLES: u32 = 4;
-/// Side of the shadow map in texels.
-const SHADOW_SIZE: u32 = 2048;
+/// How much work goes into a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quality {
+    /// Samples of a pixel, 1 or 4.
+    samples: u32,
+    /// Side of the shadow map in texels.
+    shadow_size: u32,
+    /// Places of the shadow map that are compared on either side of a point.
+    shadow_reach: u32,
+}
+
+impl Quality {
+    /// For pictures, and for windows on hardware.
+    pub const FINE: Self = Self { samples: 4, shadow_size: 2048, shadow_reach: 1 };
+    /// For windows on a software adapter.
+    pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
+}
+
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
@@ -65,13 +79,26 @@ pub struct Renderer {
     bodies: wgpu::RenderPipeline,
     lines: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
-    /// Color and depth with several samples, as large as the picture.
-    targets: Option<(u32, u32, wgpu::TextureView, wgpu::TextureView)>,
+    quality: Quality,
+    /// Depth, and color where there are several samples, as large as the picture.
+    targets: Option<Targets>,
+}
+
+struct Targets {
+    size: (u32, u32),
+    color: Option<wgpu::TextureView>,
+    depth: wgpu::TextureView,
 }
 
 impl Renderer {
     /// A renderer for the bodies of `world` into textures of `format`, which is not one that encodes sRGB by itself.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, format: wgpu::TextureFormat, world: &World) -> Self {
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        format: wgpu::TextureFormat,
+        quality: Quality,
+        world: &World,
+    ) -> Self {
         let meshes = Meshes::new(world);
         let vertices = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("vertices"),
@@ -85,7 +112,7 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let shadow_map = texture(device, (SHADOW_SIZE, SHADOW_SIZE), DEPTH, 1, usage);
+        let shadow_map = texture(device, (quality.shadow_size, quality.shadow_size), DEPTH, 1, usage);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -130,7 +157,7 @@ impl Renderer {
         ];
         let ends = [layout_of::<LineEnd>(wgpu::VertexStepMode::Vertex, &end)];
         let make = |layout, module, vertex, fragment, buffers, topology, depth| {
-            pipeline(device, &Drawing { layout, module, vertex, fragment, buffers, topology, depth, format })
+            pipeline(device, &Drawing { layout, module, vertex, fragment, buffers, topology, depth, format, quality })
         };
         use wgpu::CompareFunction::{Always, Less};
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
@@ -148,13 +175,14 @@ impl Renderer {
             shadow_group,
             main_group,
             format,
+            quality,
             targets: None,
         }
     }
 
-    /// Draws `shot` into `target`, which is `width` by `height` pixels.
-    pub fn draw(&mut self, target: &wgpu::TextureView, (width, height): (u32, u32), shot: &Shot) {
-        self.write_view(shot, width as f32 / height as f32);
+    /// Draws `shot` into `target`, which is `size` in pixels: width, height.
+    pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), shot: &Shot) {
+        self.write_view(shot, size.0 as f32 / size.1 as f32);
         let eye = shot.camera.eye();
         let container = shot.container.filter(|c| c.low.is_finite() && c.high.is_finite());
         let hidden = |b: &Bounds| container.is_some_and(|c| stands_before(b, &c, eye));
@@ -167,13 +195,12 @@ impl Renderer {
         };
         let (rows, ends) = (buffer(bytemuck::cast_slice(&instances)), buffer(bytemuck::cast_slice(shot.lines)));
 
-        if self.targets.as_ref().is_none_or(|t| (t.0, t.1) != (width, height)) {
-            let of = |format| {
-                texture(&self.device, (width, height), format, SAMPLES, wgpu::TextureUsages::RENDER_ATTACHMENT)
-            };
-            self.targets = Some((width, height, of(self.format), of(DEPTH)));
+        if self.targets.as_ref().is_none_or(|t| t.size != size) {
+            let samples = self.quality.samples;
+            let of = |format| texture(&self.device, size, format, samples, wgpu::TextureUsages::RENDER_ATTACHMENT);
+            self.targets = Some(Targets { size, color: (samples > 1).then(|| of(self.format)), depth: of(DEPTH) });
         }
-        let Some((_, _, color, depth)) = &self.targets else { return };
+        let Some(Targets { color, depth, .. }) = &self.targets else { return };
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let draw_bodies = |pass: &mut wgpu::RenderPass, pipeline, group| {
             pass.set_pipeline(pipeline);
@@ -192,12 +219,12 @@ impl Renderer {
         }
         let [r, g, b] = BACKGROUND.map(f64::from);
         let attachment = wgpu::RenderPassColorAttachment {
-            view: color,
+            view: color.as_ref().unwrap_or(target),
             depth_slice: None,
-            resolve_target: Some(target),
+            resolve_target: color.as_ref().map(|_| target),
             ops: wgpu::Operations {
                 load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                store: wgpu::StoreOp::Discard,
+                store: if color.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
             },
         };
         {
@@ -229,7 +256,7 @@ impl Renderer {
             view_projection: camera.projection(aspect, radius).to_cols_array_2d(),
             light_projection: (around * from).to_cols_array_2d(),
             eye: camera.eye().extend(camera.distance + 2.0 * radius).to_array(),
-            light: light.extend(2.0 * radius / SHADOW_SIZE as f32).to_array(),
+            light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
             up: camera.up.extend(pattern_edge(radius)).to_array(),
             background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
         };
@@ -315,6 +342,7 @@ struct Drawing<'a> {
     topology: wgpu::PrimitiveTopology,
     depth: wgpu::CompareFunction,
     format: wgpu::TextureFormat,
+    quality: Quality,
 }
 
 fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
@@ -325,6 +353,7 @@ fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
     });
     let targets = [Some(d.format.into())];
     let buffers: Vec<_> = d.buffers.iter().cloned().map(Some).collect();
+    let constants = [("SHADOW_REACH", f64::from(d.quality.shadow_reach))];
     let compilation_options = wgpu::PipelineCompilationOptions::default;
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(d.vertex),
@@ -338,7 +367,10 @@ fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
         fragment: d.fragment.map(|entry| wgpu::FragmentState {
             module: d.module,
             entry_point: Some(entry),
-            compilation_options: compilation_options(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: if entry == "shade" { &constants } else { &[] },
+                ..Default::default()
+            },
             targets: &targets,
         }),
         primitive: wgpu::PrimitiveState { topology: d.topology, ..Default::default() },
@@ -350,7 +382,7 @@ fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState {
-            count: if d.fragment.is_some() { SAMPLES } else { 1 },
+            count: if d.fragment.is_some() { d.quality.samples } else { 1 },
             ..Default::default()
         },
         multiview_mask: None,

@@ -42,7 +42,9 @@ impl Rapier {
 fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {
     let builder = match body.kind {
         BodyKind::Fixed => RigidBodyBuilder::fixed(),
-        BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
+        // Any mass at its origin, which it turns about: colliders have none to say where its center is.
+        BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based()
+            .additional_mass_properties(MassProperties::new(Vector::ZERO, 1.0, Vector::ONE)),
         BodyKind::Dynamic => {
             let Mass { mass, center, principal_inertia, principal_frame } = body.mass;
             let mass = MassProperties::with_principal_inertia_frame(center, mass, principal_inertia, principal_frame);

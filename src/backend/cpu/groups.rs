@@ -2,12 +2,9 @@
 
 #![allow(unsafe_code)]
 
-use rayon::prelude::*;
-
+use super::crew::Crew;
 use super::lane8::{Lane8, Portable, Row8};
-use super::lanes::MIN_ROWS;
 use super::shared::Shared;
-use super::sweep::spread;
 use crate::kernels::Step;
 use crate::kernels::momentum::{extrapolate, squared_step};
 use crate::math::{Lane, Vec3, vec3};
@@ -43,14 +40,14 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Takes over the contacts of a problem.
-    pub fn load(&mut self, problem: &StepProblem) {
+    pub fn load(&mut self, problem: &StepProblem, crew: &Crew) {
         self.deal(problem);
         let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
         self.points.resize(count, [Row8::default(); 12]);
         self.impulses.resize(count, [Row8::default(); 4]);
         let (points, impulses) = (Shared::new(&mut self.points), Shared::new(&mut self.impulses));
         let (len, all) = (self.all.len(), Shared::new(&mut self.all));
-        spread(0..len, &|range| {
+        crew.spread(0..len, &|range| {
             // SAFETY: tasks have different groups.
             for group in unsafe { all.slice(range) } {
                 let rows = group.first_point as usize..(group.first_point + group.points) as usize;
@@ -62,9 +59,9 @@ impl Groups {
     }
 
     /// Gives the impulses back.
-    pub fn store(&self, problem: &mut StepProblem) {
+    pub fn store(&self, problem: &mut StepProblem, crew: &Crew) {
         let (contacts, impulses) = (&problem.contacts, Shared::new(&mut problem.impulses));
-        spread(0..self.all.len(), &|range| {
+        crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                     let to = contacts[row as usize].first_point as usize;
@@ -80,21 +77,25 @@ impl Groups {
     }
 
     /// Goes on with all impulses.
-    pub fn extrapolate(&mut self, first: bool, factor: f32) {
-        self.steps.resize(self.impulses.len(), Step::default());
+    pub fn extrapolate(&mut self, first: bool, factor: f32, crew: &Crew) {
+        let len = self.impulses.len();
+        self.steps.resize(len, Step::default());
         let factor = Portable::constant(factor.into());
-        let impulses = self.impulses.par_iter_mut().with_min_len(MIN_ROWS);
-        impulses.zip(&mut self.steps).for_each(|(impulse, step)| {
-            let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
-            [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+        let (impulses, steps) = (Shared::new(&mut self.impulses), Shared::new(&mut self.steps));
+        crew.spread(0..len, &|range| {
+            // SAFETY: tasks have different impulses.
+            let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
+            for (impulse, step) in impulses.iter_mut().zip(steps) {
+                let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
+                [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+            }
         });
     }
 
     /// How far the last sweep moved the impulse of each point of the problem, squared.
-    pub fn squared_steps(&self, problem: &StepProblem) -> Vec<f32> {
-        let mut squares = vec![0.0; problem.impulses.len()];
-        let shared = Shared::new(&mut squares);
-        spread(0..self.all.len(), &|range| {
+    pub fn squared_steps(&self, problem: &StepProblem, squares: &mut [f32], crew: &Crew) {
+        let squares = Shared::new(squares);
+        crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for k in 0..group.points as usize {
                     let at = group.first_point as usize + k;
@@ -102,12 +103,11 @@ impl Groups {
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                         let to = problem.contacts[row as usize].first_point as usize + k;
                         // SAFETY: a contact is in one lane of one group, and its points are its own.
-                        unsafe { shared.write(to, square.0[lane]) };
+                        unsafe { squares.write(to, square.0[lane]) };
                     }
                 }
             }
         });
-        squares
     }
 
     /// Deals the contacts of each color out to groups by their number of points, in one walk.

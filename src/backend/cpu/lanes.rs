@@ -7,25 +7,21 @@
 
 use std::sync::atomic::AtomicBool;
 
-use rayon::prelude::*;
-
 use super::super::Backend;
-use super::{begin_sweep, chunk_sums};
+use super::begin_sweep;
+use super::crew::Crew;
 use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, spread, velocity_row};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_velocities, load_mass, velocity_row};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::momentum::{extrapolate, extrapolated, squared_step, workgroup_sum};
+use crate::kernels::momentum::{chunked_sum, extrapolate, squared_step};
 use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
 use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
-
-/// Rows that one task extrapolates at least.
-pub(super) const MIN_ROWS: usize = 1024;
 
 /// The backend of the processor.
 pub struct Cpu {
@@ -83,7 +79,7 @@ impl Cpu {
         }
     }
 
-    fn load(&mut self, problem: &StepProblem) {
+    fn load(&mut self, problem: &StepProblem, crew: &Crew) {
         let rows8 = |row: &crate::problem::BodyRow| {
             let all: &[f32; 16] = bytemuck::cast_ref(row);
             let half = |at: usize| Row8(std::array::from_fn(|i| all[at + i]));
@@ -114,12 +110,12 @@ impl Cpu {
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
         self.momentum = Momentum::load(&problem.momentum);
-        self.groups.load(problem);
+        self.groups.load(problem, crew);
     }
 
-    fn store(&self, problem: &mut StepProblem) {
+    fn store(&self, problem: &mut StepProblem, crew: &Crew) {
         self.store_bodies(problem);
-        self.groups.store(problem);
+        self.groups.store(problem, crew);
         for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
             row.linear = impulse.store();
         }
@@ -135,7 +131,7 @@ impl Cpu {
         }
     }
 
-    fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
+    fn run_pass(&mut self, problem: &StepProblem, pass: &Pass, crew: &Crew) {
         match pass.kernel {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::ClearImpulses => {
@@ -149,7 +145,7 @@ impl Cpu {
                 let (bodies, free) = (Shared::new(&mut self.bodies), Shared::new(&mut self.free));
                 let (instructions, accelerations) = (self.instructions, &self.accelerations);
                 let work = BodyWork { kernel, params, bodies, free, accelerations };
-                spread(groups, &|range| work.run(instructions, range));
+                crew.spread(groups, &|range| work.run(instructions, range));
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
@@ -168,7 +164,7 @@ impl Cpu {
                         impulses: Shared::new(&mut self.groups.impulses),
                         moving: &moving,
                     };
-                    spread(groups, &|range| work.run(self.instructions, range));
+                    crew.spread(groups, &|range| work.run(self.instructions, range));
                     self.convergence.moving |= u32::from(moving.into_inner());
                 }
             }
@@ -188,15 +184,18 @@ impl Cpu {
             }
             Kernel::Extrapolate { first, measured } => {
                 if !(measured && self.convergence.done != 0) {
-                    self.extrapolate(first);
+                    self.extrapolate(first, crew);
                 }
             }
             Kernel::MeasureStep => {
-                let points = self.groups.squared_steps(problem);
-                let joints = self.joint_impulses.iter().zip(&self.joint_steps).map(|(now, step)| squared_step(*now, step));
-                self.squares = chunk_sums(&points.into_iter().chain(joints).collect::<Vec<_>>());
+                self.squares.resize(problem.impulse_count(), 0.0);
+                self.groups.squared_steps(problem, &mut self.squares, crew);
+                let joints = self.joint_impulses.iter().zip(&self.joint_steps);
+                for (square, (now, step)) in self.squares[problem.impulses.len()..].iter_mut().zip(joints) {
+                    *square = squared_step(*now, step);
+                }
             }
-            Kernel::UpdateMomentum => self.momentum.update(workgroup_sum(&self.squares)),
+            Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.squares)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),
@@ -210,23 +209,16 @@ impl Cpu {
         }
     }
 
-    fn extrapolate(&mut self, first: bool) {
+    fn extrapolate(&mut self, first: bool, crew: &Crew) {
         if first {
             self.momentum.begin();
         }
         let factor = self.momentum.factor;
-        self.velocities_before.resize(self.bodies.len(), Row8::default());
-        let bodies = self.bodies.par_iter_mut().with_min_len(MIN_ROWS);
-        bodies.zip(&mut self.velocities_before).for_each(|(body, before)| {
-            let now = body.velocity;
-            if !first {
-                for (x, before) in body.velocity.0.iter_mut().zip(&before.0) {
-                    *x = extrapolated(*x, *before, factor);
-                }
-            }
-            *before = now;
-        });
-        self.groups.extrapolate(first, factor);
+        let len = self.bodies.len();
+        self.velocities_before.resize(len, Row8::default());
+        let (bodies, before) = (Shared::new(&mut self.bodies), Shared::new(&mut self.velocities_before));
+        crew.spread(0..len, &|range| extrapolate_velocities(first, factor, &bodies, &before, range));
+        self.groups.extrapolate(first, factor, crew);
         self.joint_steps.resize(self.joint_impulses.len(), Step::default());
         for (impulse, step) in self.joint_impulses.iter_mut().zip(&mut self.joint_steps) {
             *impulse = extrapolate(first, factor, *impulse, step);
@@ -274,11 +266,14 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        self.load(problem);
-        for pass in passes {
-            self.run_pass(problem, pass);
-        }
-        self.store(problem);
+        let widest = problem.bodies.len().max(problem.contacts.len()).div_ceil(8);
+        Crew::lead(widest, |crew| {
+            self.load(problem, crew);
+            for pass in passes {
+                self.run_pass(problem, pass, crew);
+            }
+            self.store(problem, crew);
+        });
         Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! The CPU backends: the reference, one constraint at a time, and the same kernels over eight lanes and all threads.
 
+mod crew;
 mod groups;
 mod lane8;
 mod lanes;
@@ -10,10 +11,6 @@ mod sweep;
 pub use lanes::Cpu;
 pub use reference::Reference;
 
-use rayon::prelude::*;
-
-use crate::kernels::momentum::{CHUNK, workgroup_sum};
-use crate::math::Lane;
 use crate::problem::ConvergenceRow;
 
 /// Decides whether the sweep that follows is still needed, and counts. Double of the kernel `begin_sweep`.
@@ -23,9 +20,4 @@ fn begin_sweep(first: bool, convergence: &mut ConvergenceRow) {
     convergence.sweeps += u32::from(!done);
     convergence.planned += 1;
     convergence.moving = 0;
-}
-
-/// The sums of `squares` that the workgroups of the kernel `measure_step` form.
-fn chunk_sums<L: Lane>(squares: &[L]) -> Vec<L> {
-    squares.par_chunks(CHUNK).map(workgroup_sum).collect()
 }

@@ -1,12 +1,12 @@
 //! The CPU reference: one thread, one constraint at a time, in the order of the plan.
 
 use super::super::Backend;
-use super::{begin_sweep, chunk_sums};
+use super::begin_sweep;
 use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::momentum::{extrapolate, extrapolated, squared_step, workgroup_sum};
+use crate::kernels::momentum::{chunked_sum, extrapolate, extrapolated, squared_step};
 use crate::kernels::{Contact, Free, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
@@ -86,10 +86,10 @@ impl<S: Scalar> Reference<S> {
             Kernel::MeasureStep => {
                 let points = self.rows.impulses.iter().map(Impulse::components).zip(&self.point_steps);
                 let joints = self.rows.joint_impulses.iter().copied().zip(&self.joint_steps);
-                let squares: Vec<_> = points.chain(joints).map(|(now, step)| squared_step(now, step)).collect();
-                self.squares = chunk_sums(&squares);
+                self.squares.clear();
+                self.squares.extend(points.chain(joints).map(|(now, step)| squared_step(now, step)));
             }
-            Kernel::UpdateMomentum => self.rows.momentum.update(workgroup_sum(&self.squares)),
+            Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.squares)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),

@@ -5,13 +5,12 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
-
 use super::groups::Group;
 use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
+use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
@@ -91,20 +90,6 @@ macro_rules! eight {
             },
         ]
     };
-}
-
-/// Groups that one task takes at least: some ten microseconds of work.
-const TASK_GROUPS: usize = 64;
-
-/// Runs `work` over the groups, on all threads if there are enough of them.
-pub(super) fn spread(groups: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
-    let threads = rayon::current_num_threads();
-    if threads == 1 || groups.len() < 2 * TASK_GROUPS {
-        return work(groups);
-    }
-    let tasks = (groups.len() / TASK_GROUPS).min(2 * threads);
-    let cut = |i: usize| groups.start + groups.len() * i / tasks;
-    (0..tasks).into_par_iter().for_each(|i| work(cut(i)..cut(i + 1)));
 }
 
 /// What a processor can do.
@@ -201,6 +186,27 @@ impl BodyWork<'_> {
                 unsafe { self.bodies.write(i, state) };
             }
         }
+    }
+}
+
+/// Goes on with the velocities of some bodies, and remembers where they were; no other task has the same.
+pub(super) fn extrapolate_velocities(
+    first: bool,
+    factor: f32,
+    bodies: &Shared<State>,
+    before: &Shared<Row8>,
+    range: Range<usize>,
+) {
+    // SAFETY: tasks have different bodies.
+    let (bodies, before) = unsafe { (bodies.slice(range.clone()), before.slice(range)) };
+    for (body, before) in bodies.iter_mut().zip(before) {
+        let now = body.velocity;
+        if !first {
+            for (x, before) in body.velocity.0.iter_mut().zip(&before.0) {
+                *x = extrapolated(*x, *before, factor);
+            }
+        }
+        *before = now;
     }
 }
 

@@ -80,15 +80,48 @@ fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         });
-        let all = pollster::block_on(instance.enumerate_adapters(backends));
-        let mut usable: Vec<_> = all.into_iter().filter(can_compute).map(|a| (summarize(&a), a)).collect();
-        usable.retain(|(s, _)| s.to_string().to_lowercase().contains(&wanted));
-        usable.sort_by_key(|(_, a)| rank(a.get_info().device_type));
+        let usable = usable(&instance, backends, &wanted);
         if !usable.is_empty() {
-            return usable.into_iter().map(|(s, a)| (a, s)).collect();
+            return usable;
         }
     }
     Vec::new()
+}
+
+/// Adapters of an instance that can run the kernels and whose summary contains `wanted`, the one with the most hardware first.
+fn usable(instance: &wgpu::Instance, backends: wgpu::Backends, wanted: &str) -> Vec<(wgpu::Adapter, AdapterSummary)> {
+    let all = pollster::block_on(instance.enumerate_adapters(backends));
+    let mut usable: Vec<_> = all.into_iter().filter(can_compute).map(|a| (summarize(&a), a)).collect();
+    usable.retain(|(s, _)| s.to_string().to_lowercase().contains(wanted));
+    usable.sort_by_key(|(_, a)| rank(a.get_info().device_type));
+    usable.into_iter().map(|(s, a)| (a, s)).collect()
+}
+
+/// Opens the best adapter that can draw on `window`.
+///
+/// # Errors
+/// There is none, or it cannot be opened.
+#[cfg(feature = "view")]
+pub(crate) fn open_for_surface(
+    display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
+    window: impl Into<wgpu::SurfaceTarget<'static>>,
+) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {
+    let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        flags: wgpu::InstanceFlags::empty(),
+        ..wgpu::InstanceDescriptor::new_with_display_handle(display)
+    });
+    let surface = instance
+        .create_surface(window)
+        .map_err(|e| Error::Adapter(format!("no adapter can draw on this display ({e}): {INSTALL}")))?;
+    let mut all = if wanted == "none" { Vec::new() } else { usable(&instance, wgpu::Backends::all(), &wanted) };
+    all.retain(|(a, _)| a.is_surface_supported(&surface));
+    if all.is_empty() {
+        return Err(Error::Adapter(format!("no adapter can draw on this display: {INSTALL}")));
+    }
+    let (adapter, _) = all.swap_remove(0);
+    let (device, queue) = open(&adapter, false)?;
+    Ok((surface, adapter, device, queue))
 }
 
 fn can_compute(adapter: &wgpu::Adapter) -> bool {

@@ -30,6 +30,9 @@ pub(crate) fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::
     Ok((device, queue, summary))
 }
 
+#[cfg(feature = "view")]
+pub(crate) use adapter::open_for_surface;
+
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,

@@ -17,7 +17,8 @@ use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, FreeBody, PointContact, Velocity, inverse, is_positive_definite};
+use super::operator::inverse;
+use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
 use crate::error::{Error, Result};
 use frames::{Lever, arm, rotation};
 use table::{Global, Sparse, Tables};

@@ -1,0 +1,230 @@
+//! Bodies that lie still are left alone until something disturbs them.
+//!
+//! Bodies that touch, or that a joint holds together, form an island. An island whose bodies were all slow for a while falls
+//! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
+//! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it, or when
+//! somebody changes the pose, velocity or force of one of its bodies, the pose of what it lies on, or gravity. A body that
+//! touches nothing never sleeps. Everything is decided in the order of bodies and pairs, whatever the number of threads.
+
+use glam::{Quat, Vec3};
+
+use crate::collide::{Activity, Pair};
+use crate::config::SolverConfig;
+use crate::world::{Body, BodyKind, World};
+
+/// What somebody may change between two steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Known {
+    position: Vec3,
+    rotation: Quat,
+    linear_velocity: Vec3,
+    angular_velocity: Vec3,
+    force: Vec3,
+}
+
+impl Known {
+    fn of(body: &Body) -> Self {
+        Self {
+            position: body.position,
+            rotation: body.rotation,
+            linear_velocity: body.linear_velocity,
+            angular_velocity: body.angular_velocity,
+            force: body.force,
+        }
+    }
+}
+
+/// Who sleeps, and since when the others are slow.
+#[derive(Debug, Default)]
+pub struct Sleep {
+    /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
+    after: f32,
+    speed: f32,
+    gravity: Vec3,
+    /// Whether each body sleeps; empty if nothing ever does.
+    asleep: Vec<bool>,
+    /// What each body is to the detection; empty likewise.
+    activity: Vec<Activity>,
+    /// How long each body has been slow [s].
+    slow_for: Vec<f32>,
+    /// Radius around the origin of each body that holds its shapes [m].
+    reach: Vec<f32>,
+    /// Bodies that sleep, and those that cannot be pushed, as they were left.
+    known: Vec<Known>,
+    /// Root of the island of each body, and the next of its island, around; of bodies that sleep.
+    island: Vec<u32>,
+    next: Vec<u32>,
+    count: usize,
+    steps: u32,
+}
+
+/// Islands are looked for in every so many steps.
+const EVERY: u32 = 8;
+
+impl Sleep {
+    /// Everything is awake.
+    pub fn new(world: &World, config: &SolverConfig) -> Self {
+        if config.sleep_after == 0.0 {
+            return Self::default();
+        }
+        let reach =
+            |b: &Body| b.colliders.iter().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max);
+        let bodies = world.bodies.len();
+        Self {
+            after: config.sleep_after,
+            speed: config.sleep_speed,
+            gravity: world.gravity,
+            asleep: vec![false; bodies],
+            activity: vec![Activity::Awake; bodies],
+            slow_for: vec![0.0; bodies],
+            reach: world.bodies.iter().map(reach).collect(),
+            known: world.bodies.iter().map(Known::of).collect(),
+            island: (0..bodies as u32).collect(),
+            next: (0..bodies as u32).collect(),
+            count: 0,
+            steps: 0,
+        }
+    }
+
+    /// Whether each body sleeps; empty if none ever does.
+    pub fn asleep(&self) -> &[bool] {
+        &self.asleep
+    }
+
+    /// What each body is to the detection; empty if nothing ever sleeps.
+    pub fn activity(&self) -> &[Activity] {
+        &self.activity
+    }
+
+    /// Bodies that sleep.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether a step would change nothing: something sleeps, and nothing else moves.
+    pub fn is_everything_still(&self) -> bool {
+        self.count > 0 && self.activity.iter().all(|a| *a == Activity::Still)
+    }
+
+    /// Wakes what was changed since the last step, and what touches what moves by itself.
+    pub fn before_step(&mut self, world: &World, pairs: &[Pair]) {
+        let everything = std::mem::replace(&mut self.gravity, world.gravity) != world.gravity;
+        for i in 0..self.asleep.len() {
+            let body = &world.bodies[i];
+            let changed = || everything || self.known[i] != Known::of(body);
+            if self.asleep[i] && changed() {
+                self.wake(i);
+            }
+            self.activity[i] = match body.kind {
+                BodyKind::Dynamic if self.asleep[i] => Activity::Still,
+                BodyKind::Dynamic => Activity::Awake,
+                BodyKind::Kinematic if body.linear_velocity != Vec3::ZERO || body.angular_velocity != Vec3::ZERO => {
+                    Activity::Moving
+                }
+                _ if self.known[i] != Known::of(body) => Activity::Moving,
+                _ => Activity::Still,
+            };
+        }
+        self.wake_touched(pairs);
+    }
+
+    /// Wakes what sleeps and is touched by what does not; returns whether that was anything.
+    pub fn wake_touched(&mut self, pairs: &[Pair]) -> bool {
+        let before = self.count;
+        if before > 0 && self.activity.iter().any(|a| *a != Activity::Still) {
+            for pair in pairs.iter().filter(|p| !p.manifolds.is_empty()) {
+                let [a, b] = [pair.body_a as usize, pair.body_b as usize];
+                for (one, other) in [(a, b), (b, a)] {
+                    if self.asleep[one] && self.activity[other] != Activity::Still {
+                        self.wake(one);
+                    }
+                }
+            }
+        }
+        self.count < before
+    }
+
+    /// Wakes the island of a body that sleeps.
+    fn wake(&mut self, body: usize) {
+        let mut i = body;
+        while self.asleep[i] {
+            self.asleep[i] = false;
+            self.activity[i] = Activity::Awake;
+            self.slow_for[i] = 0.0;
+            self.count -= 1;
+            i = std::mem::replace(&mut self.next[i], i as u32) as usize;
+        }
+    }
+
+    /// Notes who was slow in a step of `dt` seconds, and lets islands fall asleep that were for long enough. Returns whether
+    /// any did.
+    pub fn after_step(&mut self, world: &mut World, pairs: &[Pair], dt: f32) -> bool {
+        let mut ready = false;
+        for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
+            if body.kind != BodyKind::Dynamic {
+                self.known[i] = Known::of(body);
+            } else if !self.asleep[i] {
+                let speed = body.linear_velocity.length() + self.reach[i] * body.angular_velocity.length();
+                self.slow_for[i] = if speed < self.speed { self.slow_for[i] + dt } else { 0.0 };
+                ready |= self.slow_for[i] >= self.after;
+            }
+        }
+        self.steps += 1;
+        let before = self.count;
+        if ready && self.steps.is_multiple_of(EVERY) {
+            self.let_islands_sleep(world, pairs);
+        }
+        self.count > before
+    }
+
+    fn let_islands_sleep(&mut self, world: &mut World, pairs: &[Pair]) {
+        // Islands of those awake, the smallest index as root; and who is held by anything, and by nothing that moves by itself.
+        let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+        let mut held = vec![false; self.asleep.len()];
+        let mut driven = vec![false; self.asleep.len()];
+        (0..self.island.len()).filter(|&i| !self.asleep[i]).for_each(|i| self.island[i] = i as u32);
+        let touching =
+            pairs.iter().filter(|p| !p.manifolds.is_empty()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
+        let joined = world.joints.iter().map(|j| (j.body_a, j.body_b));
+        for (a, b) in touching.chain(joined) {
+            for (one, other) in [(Some(a), b), (b, Some(a))] {
+                let Some(one) = one else { continue };
+                held[one] = true;
+                driven[one] |= other.is_some_and(|other| self.activity[other] == Activity::Moving);
+            }
+            if let Some(b) = b.filter(|&b| is_dynamic(a) && is_dynamic(b) && !self.asleep[a] && !self.asleep[b]) {
+                let (a, b) = (self.root(a), self.root(b));
+                self.island[a.max(b) as usize] = a.min(b);
+            }
+        }
+        let mut restless = vec![false; self.asleep.len()];
+        let awake: Vec<usize> = (0..self.asleep.len()).filter(|&i| is_dynamic(i) && !self.asleep[i]).collect();
+        for &i in &awake {
+            self.island[i] = self.root(i);
+            restless[self.island[i] as usize] |= self.slow_for[i] < self.after || !held[i] || driven[i];
+        }
+        for i in awake.into_iter().filter(|&i| !restless[self.island[i] as usize]) {
+            let body = &mut world.bodies[i];
+            (body.linear_velocity, body.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
+            self.known[i] = Known::of(body);
+            self.asleep[i] = true;
+            self.activity[i] = Activity::Still;
+            self.count += 1;
+            // Into the ring of its island.
+            let root = self.island[i] as usize;
+            if root != i {
+                self.next[i] = std::mem::replace(&mut self.next[root], i as u32);
+            }
+        }
+    }
+
+    /// The root of a body's island; halves the way there.
+    fn root(&mut self, body: usize) -> u32 {
+        let mut i = body;
+        while self.island[i] as usize != i {
+            self.island[i] = self.island[self.island[i] as usize];
+            i = self.island[i] as usize;
+        }
+        i as u32
+    }
+}

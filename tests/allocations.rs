@@ -1,0 +1,53 @@
+//! A settled step allocates nothing. One test only: what another one allocates would be counted, too.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use drystone::{Cpu, Scene, Simulation, SolverConfig};
+
+/// Counts what is asked of the system.
+struct Counting;
+
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: does what `System` does.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ASKED.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Allocations of 20 steps of a pile of 500 boxes that lies still, in a pool of `threads` threads.
+fn allocations(threads: usize, config: SolverConfig) -> usize {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    pool.install(|| {
+        let scene = Scene::find("pile", &["n=500".into()]).expect("the scene");
+        let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("good settings");
+        for _ in 0..400 {
+            simulation.step(scene.dt).expect("a step");
+        }
+        let before = ASKED.load(Ordering::Relaxed);
+        for _ in 0..20 {
+            simulation.step(scene.dt).expect("a step");
+        }
+        ASKED.load(Ordering::Relaxed) - before
+    })
+}
+
+#[test]
+fn a_settled_step_allocates_nothing_and_one_that_computes_its_contacts_does() {
+    for threads in [1, 2] {
+        assert_eq!(allocations(threads, SolverConfig::default()), 0, "{threads} threads");
+    }
+    let anew = SolverConfig { recycle_distance: 0.0, ..SolverConfig::default() };
+    assert!(allocations(1, anew) > 0, "the counter counts nothing");
+}

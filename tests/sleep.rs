@@ -1,0 +1,230 @@
+//! What lies still sleeps, stays where it is, costs nothing, and wakes when it is disturbed.
+
+use drystone::{BallJoint, Body, Cpu, Scene, Shape, Simulation, SolverConfig, StepStats, World};
+use glam::{Quat, Vec3};
+
+const DT: f32 = 1.0 / 60.0;
+
+fn sleepy() -> SolverConfig {
+    SolverConfig { sleep_after: 0.5, ..SolverConfig::default() }
+}
+
+fn simulation(world: World, config: SolverConfig) -> Simulation {
+    Simulation::new(world, config, Box::new(Cpu::new())).expect("good settings")
+}
+
+fn run(simulation: &mut Simulation, steps: u32) -> StepStats {
+    let mut stats = StepStats::default();
+    for _ in 0..steps {
+        stats = simulation.step(DT).expect("a step");
+    }
+    stats
+}
+
+/// Every bit of every pose and velocity.
+fn bits(world: &World) -> Vec<u32> {
+    let of = |b: &Body| {
+        let vectors = [b.position, b.linear_velocity, b.angular_velocity].map(|v| v.to_array()).concat();
+        [&vectors[..], &b.rotation.to_array()].concat().into_iter().map(f32::to_bits).collect::<Vec<_>>()
+    };
+    world.bodies.iter().flat_map(of).collect()
+}
+
+fn cube(x: f32, y: f32) -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, y, 0.0)
+}
+
+fn floor() -> Body {
+    Body::fixed().shape(Shape::half_space(Vec3::Y))
+}
+
+/// A floor and two stacks of three, 10 m apart; bodies 1 to 3 and 4 to 6.
+fn stacks() -> World {
+    let mut world = World::new();
+    world.add(floor());
+    for x in [0.0, 10.0] {
+        for k in 0..3 {
+            world.add(cube(x, 0.5 + k as f32));
+        }
+    }
+    world
+}
+
+fn asleep(simulation: &Simulation, bodies: std::ops::Range<usize>) -> bool {
+    let count = bodies.clone().filter(|&b| simulation.is_asleep(b)).count();
+    assert!(count == 0 || count == bodies.len(), "{count} of {bodies:?} sleep: an island sleeps as a whole");
+    count > 0
+}
+
+/// Two stacks that have fallen asleep.
+fn sleeping() -> Simulation {
+    let mut simulation = simulation(stacks(), sleepy());
+    let stats = run(&mut simulation, 300);
+    assert_eq!(stats.asleep, 6);
+    simulation
+}
+
+#[test]
+fn stacks_fall_asleep_and_stay_where_they_are_to_the_last_bit() {
+    let mut simulation = sleeping();
+    let before = bits(&simulation.world);
+    let deepest = simulation.penetration().max;
+    let stats = run(&mut simulation, 600);
+    assert_eq!((stats.asleep, stats.manifolds, stats.pairs), (6, 0, 0), "nothing is worked on");
+    assert_eq!(before, bits(&simulation.world));
+    assert_eq!(simulation.penetration().max, deepest);
+    assert!(deepest < 1e-3, "{deepest}");
+}
+
+#[test]
+fn nothing_sleeps_unless_asked() {
+    let mut simulation = simulation(stacks(), SolverConfig::default());
+    assert_eq!(run(&mut simulation, 300).asleep, 0);
+}
+
+#[test]
+fn where_nothing_sleeps_sleeping_changes_no_bit() {
+    let world = || Scene::find("pile", &["n=100".into()]).expect("the scene").world;
+    let mut with = simulation(world(), sleepy());
+    let mut without = simulation(world(), SolverConfig::default());
+    for step in 0..60 {
+        let stats = with.step(DT).expect("a step");
+        without.step(DT).expect("a step");
+        assert_eq!(stats.asleep, 0);
+        assert_eq!(bits(&with.world), bits(&without.world), "step {step}");
+    }
+}
+
+#[test]
+fn a_thrown_box_wakes_the_stack_that_it_hits_and_no_other() {
+    let mut world = stacks();
+    let thrown = world.add(cube(30.0, 50.0));
+    let mut simulation = simulation(world, sleepy());
+    // On its way for 3 s: the stacks sleep by then, and the box does not, though it touches nothing.
+    run(&mut simulation, 170);
+    assert!(asleep(&simulation, 1..4) && asleep(&simulation, 4..7) && !simulation.is_asleep(thrown));
+    let body = &mut simulation.world.bodies[thrown];
+    (body.position, body.linear_velocity) = (Vec3::new(4.0, 1.5, 0.0), Vec3::new(-20.0, 0.0, 0.0));
+    let before = simulation.world.bodies[2].position;
+    run(&mut simulation, 30);
+    assert!(!asleep(&simulation, 1..4) && asleep(&simulation, 4..7));
+    assert!(simulation.world.bodies[2].position.distance(before) > 0.5);
+}
+
+#[test]
+fn whatever_is_changed_from_outside_wakes_its_island() {
+    type Change = fn(&mut World);
+    let changes: [(&str, Change); 5] = [
+        ("velocity", |w| w.bodies[3].linear_velocity.y = 1.0),
+        ("position", |w| w.bodies[1].position.x += 0.01),
+        ("rotation", |w| w.bodies[2].rotation = Quat::from_rotation_y(0.1)),
+        ("force", |w| w.bodies[1].force = Vec3::X),
+        ("spin", |w| w.bodies[1].angular_velocity = Vec3::Y),
+    ];
+    for (what, change) in changes {
+        let mut simulation = sleeping();
+        change(&mut simulation.world);
+        run(&mut simulation, 1);
+        assert!(!asleep(&simulation, 1..4) && asleep(&simulation, 4..7), "{what}");
+    }
+    let mut simulation = sleeping();
+    simulation.world.gravity = Vec3::new(5.0, -9.81, 0.0);
+    run(&mut simulation, 1);
+    assert!(!asleep(&simulation, 1..4) && !asleep(&simulation, 4..7));
+}
+
+/// A cube on a kinematic plate.
+fn on_a_plate() -> Simulation {
+    let mut world = World::new();
+    world.add(Body::kinematic().shape(Shape::cuboid(2.0, 0.5, 2.0)).position(0.0, -0.5, 0.0));
+    world.add(cube(0.0, 0.5));
+    let mut simulation = simulation(world, sleepy());
+    run(&mut simulation, 300);
+    assert!(simulation.is_asleep(1));
+    simulation
+}
+
+#[test]
+fn a_kinematic_body_that_moves_wakes_what_lies_on_it_and_lets_nothing_sleep() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].linear_velocity = Vec3::new(5e-4, 0.0, 0.0);
+    run(&mut simulation, 300);
+    assert!(!simulation.is_asleep(1), "slow, but carried");
+    let ahead = simulation.world.bodies[1].position.x;
+    assert!((ahead - 5e-4 * 5.0).abs() < 1e-4, "{ahead}");
+    simulation.world.bodies[0].linear_velocity = Vec3::ZERO;
+    run(&mut simulation, 120);
+    assert!(simulation.is_asleep(1));
+}
+
+#[test]
+fn what_lay_on_a_body_that_is_taken_away_falls() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].position.y = -50.0;
+    run(&mut simulation, 60);
+    assert!(simulation.world.bodies[1].position.y < -3.0, "{}", simulation.world.bodies[1].position);
+}
+
+#[test]
+fn a_chain_sleeps_and_wakes_as_a_whole() {
+    let mut world = World::new();
+    let link = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, 0.0);
+    let first = world.add(link(-0.5));
+    world.join(BallJoint::to_world(first, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    let mut last = first;
+    for k in 1..4 {
+        let next = world.add(link(-0.5 - k as f32));
+        world.join(BallJoint::new(last, Vec3::new(0.0, -0.5, 0.0), next, Vec3::new(0.0, 0.5, 0.0)));
+        last = next;
+    }
+    // Beside it a body that stays awake, so that steps go on.
+    let awake = world.add(cube(100.0, 0.0));
+    let mut simulation = simulation(world, sleepy());
+    run(&mut simulation, 120);
+    assert!(asleep(&simulation, 0..4) && !simulation.is_asleep(awake));
+    assert_eq!(simulation.problem().joints.len(), 0);
+    let impulse = simulation.joint_impulses()[0];
+    simulation.world.bodies[last].linear_velocity.x = 0.5;
+    let stats = run(&mut simulation, 1);
+    assert!(!asleep(&simulation, 0..4) && stats.joints == 4);
+    // It carries what it carried.
+    assert!(simulation.joint_impulses()[0].distance(impulse) < 0.05 * impulse.length());
+    run(&mut simulation, 60);
+    assert!(simulation.world.joint_gap() < 1e-3);
+}
+
+#[test]
+fn a_pile_that_sleeps_and_is_hit_gives_the_same_bits_for_any_number_of_threads() {
+    let after = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut world = Scene::find("pile", &["n=100".into()]).expect("the scene").world;
+            let thrown = world.add(cube(0.0, 300.0));
+            let mut simulation = simulation(world, sleepy());
+            let sleeping = run(&mut simulation, 360).asleep;
+            assert!(sleeping >= 90, "{sleeping} sleep");
+            let body = &mut simulation.world.bodies[thrown];
+            (body.position, body.linear_velocity) = (Vec3::new(0.0, 8.0, 0.0), Vec3::new(0.0, -10.0, 0.0));
+            let woken = run(&mut simulation, 40).asleep;
+            assert!(woken < sleeping, "{woken} of {sleeping}");
+            run(&mut simulation, 40);
+            bits(&simulation.world)
+        })
+    };
+    let one = after(1);
+    for threads in [2, 5] {
+        assert!(one == after(threads), "{threads} threads");
+    }
+}
+
+#[test]
+fn every_domino_of_a_row_still_falls() {
+    let scene = Scene::find("dominoes", &[]).expect("the scene");
+    let mut with = simulation(scene.world.clone(), sleepy());
+    let mut without = simulation(scene.world, SolverConfig::default());
+    run(&mut with, scene.steps);
+    run(&mut without, scene.steps);
+    let fallen = |s: &Simulation| s.world.bodies.iter().filter(|b| (b.rotation * Vec3::Y).y < 0.7).count();
+    assert!(fallen(&without) > 5, "{}", fallen(&without));
+    assert_eq!(fallen(&with), fallen(&without));
+}
