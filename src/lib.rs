@@ -39,6 +39,7 @@ pub mod math;
 pub mod maze;
 pub mod metrics;
 pub mod plan;
+pub mod preset;
 pub mod problem;
 pub mod report;
 pub mod residuals;

@@ -22,6 +22,8 @@ use clap::{Args, Parser, Subcommand};
 use crate::config::{Method, SolverConfig};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
+use crate::load::Load;
+use crate::preset::Preset;
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::stats::StepStats;
@@ -96,6 +98,13 @@ struct SceneArgs {
     /// Length of a step in seconds; the scene says if this does not.
     #[arg(long, value_name = "SECONDS")]
     dt: Option<f32>,
+    /// Settings by name, before --set and the others.
+    #[arg(long, value_enum, conflicts_with = "config", default_value_t)]
+    preset: Preset,
+    /// Choose the substeps so that what stands overlaps no deeper at rest, as 1mm or 0.001 (meters); a heavy load
+    /// that comes on at once swings up to twice as deep.
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "substeps")]
+    max_penetration: Option<f64>,
     /// Substeps of a step.
     #[arg(long)]
     substeps: Option<u32>,
@@ -127,7 +136,7 @@ impl SceneArgs {
     fn load(&self) -> Result<(Scene, SolverConfig)> {
         let mut config = match &self.config {
             Some(path) => SolverConfig::from_toml_file(path)?,
-            None => SolverConfig::default(),
+            None => self.preset.config(),
         };
         for assignment in &self.set {
             config.set(assignment)?;
@@ -147,6 +156,9 @@ impl SceneArgs {
             scene.dt = dt;
         }
         scene.steps = self.steps.unwrap_or(scene.steps);
+        if let Some(most) = self.max_penetration {
+            choose_substeps(&mut config, &scene, most)?;
+        }
         Ok((scene, config))
     }
 
@@ -171,6 +183,35 @@ fn step_with_contacts(
         true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
         false => Ok((problem, stats)),
     }
+}
+
+/// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
+fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
+    let Some(load) = Load::heaviest(&scene.world, config) else {
+        eprintln!("substeps {}: no body of {} bears another", config.substeps, scene.name);
+        return Ok(());
+    };
+    config.substeps = load.substeps(most, scene.dt, config)?;
+    let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
+    let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
+    eprintln!(
+        "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"
+    );
+    Ok(())
+}
+
+/// A length as `1mm`, `0.1cm` or `0.001m`; a bare number is in meters.
+fn length(text: &str) -> std::result::Result<f64, String> {
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_alphabetic() && c != 'e').unwrap_or(text.len()));
+    let unit = match unit {
+        "" | "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" => 1e-3,
+        "um" => 1e-6,
+        _ => return Err("write it as 1mm, 0.1cm or 0.001m".into()),
+    };
+    let meters = number.trim().parse::<f64>().map_err(|_| "write it as 1mm, 0.1cm or 0.001m")? * unit;
+    if meters > 0.0 && meters.is_finite() { Ok(meters) } else { Err("must be more than 0".into()) }
 }
 
 /// A progress bar on a terminal, nothing elsewhere.
