@@ -181,7 +181,7 @@ pub(super) fn nearly_parallel(setup: &Setup) -> Result<Vec<Check>> {
 
 pub(super) fn no_inertia(setup: &Setup) -> Result<Vec<Check>> {
     let mut world = floor(0.5);
-    let point = MassProperties { mass: 1.0, ..MassProperties::IMMOVABLE };
+    let point = MassProperties { mass: 1.0, principal_inertia: Vec3::splat(1e-9), ..MassProperties::IMMOVABLE };
     let mut still = Vec::new();
     still.push(world.add(Body::dynamic().shape(Shape::ball(0.1)).mass_properties(point).position(0.0, 0.1, 0.0)));
     still.push(
