@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// The modules of each floor, the ground floor first.
 const FLOORS: [&[&str]; 9] = [
     &["math", "error", "files", "stats"],
-    &["world", "config"],
+    &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "sleep"],

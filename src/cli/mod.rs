@@ -3,6 +3,7 @@
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
+mod hard;
 mod list;
 mod play;
 #[cfg(feature = "view")]
@@ -21,11 +22,14 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::config::SolverConfig;
+use crate::config::{Method, SolverConfig};
+use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::load::Load;
 use crate::preset::Preset;
 use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::stats::StepStats;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -52,6 +56,8 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
+    /// Run hard cases and say which pass.
+    Hard(hard::HardArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
@@ -113,6 +119,9 @@ struct SceneArgs {
     /// Relax sweeps of a substep.
     #[arg(long)]
     relax: Option<u32>,
+    /// What is done with the sweeps of a substep.
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Any setting of the solver, as key=value; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -142,6 +151,7 @@ impl SceneArgs {
                 config.set(&format!("{name}={value}"))?;
             }
         }
+        config.method = self.method.unwrap_or(config.method);
         config.check()?;
         let mut scene = Scene::find(&self.scene, &self.parameter)?;
         if let Some(dt) = self.dt {
@@ -163,6 +173,20 @@ impl SceneArgs {
         // Fails only if it was set before, which nothing does.
         // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+    }
+}
+
+/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
+fn step_with_contacts(
+    simulation: &mut Simulation,
+    scene: &str,
+    dt: f32,
+    number: u32,
+) -> Result<(ContactProblem, StepStats)> {
+    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
+    match problem.contacts.is_empty() {
+        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
+        false => Ok((problem, stats)),
     }
 }
 
@@ -197,12 +221,17 @@ fn length(text: &str) -> std::result::Result<f64, String> {
 
 /// A progress bar on a terminal, nothing elsewhere.
 fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
+    progress_of("step", steps.into(), quiet)
+}
+
+/// A progress bar over `count` of what `unit` names.
+fn progress_of(unit: &str, count: u64, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
         return indicatif::ProgressBar::hidden();
     }
-    let style = "{bar:40} step {pos}/{len}  {per_sec}  {eta} left";
-    let style = indicatif::ProgressStyle::with_template(style).expect("a fixed template");
-    indicatif::ProgressBar::new(steps.into()).with_style(style)
+    let style = format!("{{bar:40}} {unit} {{pos}}/{{len}}  {{per_sec}}  {{eta}} left  {{msg}}");
+    let style = indicatif::ProgressStyle::with_template(&style).expect("a fixed template");
+    indicatif::ProgressBar::new(count).with_style(style)
 }
 
 /// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
@@ -228,6 +257,7 @@ pub fn main() -> std::process::ExitCode {
         Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
+        Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),

@@ -6,9 +6,9 @@ use clap::{Args, Subcommand};
 
 use super::{print, progress};
 use crate::backend::gpu::adapters;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone};
-use crate::report::{RUNS, rules};
+use crate::report::{RUNS, convergence, rules};
 use crate::scenes::Scene;
 
 /// Arguments of `drystone report`.
@@ -28,6 +28,15 @@ enum Page {
         /// Directory that the page and its pictures are written into.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
+    },
+    /// How many sweeps contact problems take to which error.
+    Convergence {
+        /// Directory that the page is written into.
+        #[arg(long, default_value = "docs")]
+        out: PathBuf,
+        /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+        #[arg(long, value_name = "DIR")]
+        problems: Option<PathBuf>,
     },
 }
 
@@ -64,6 +73,17 @@ impl ReportArgs {
                 bar.finish_and_clear();
                 report.write(out)?;
                 print(out.join("rules.md").display())
+            }
+            Some(Page::Convergence { out, problems }) => {
+                let bar = progress(0, false);
+                let page = convergence(problems.as_deref(), |problems| {
+                    bar.set_length(problems as u64);
+                    bar.inc(1);
+                })?;
+                bar.finish_and_clear();
+                let path = out.join("convergence.md");
+                std::fs::write(&path, page).map_err(Error::file(&path))?;
+                print(path.display())
             }
         }
     }

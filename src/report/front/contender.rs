@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::Backend;
 use crate::backend::cpu::{Cpu, Reference};
 use crate::backend::gpu::{AdapterChoice, Gpu};
-use crate::config::{FrictionRule, SolverConfig};
+use crate::config::{FrictionRule, Method, SolverConfig};
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
@@ -65,7 +65,7 @@ impl Setting {
             backend: backend.into(),
             substeps: config.substeps,
             sweeps: config.iterations,
-            method: table(config).get("method").and_then(|m| m.as_str()).unwrap_or("plain").into(),
+            method: if config.method == Method::Plain { "plain" } else { "accelerated" }.into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
             more: unusual(config).join(" "),
         }

@@ -74,7 +74,12 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
     let mut points: Vec<(&str, String)> = vec![("cpu", String::new())];
     points.extend(substeps(scene, extent).filter(|&n| n != default).map(|n| ("cpu", format!("substeps={n}"))));
     for (substeps, sweeps) in SWEEPS.into_iter().take(if few { 2 } else { SWEEPS.len() }) {
-        points.push(("cpu", format!("substeps={substeps} iterations={sweeps} relax={sweeps}")));
+        let point = format!("substeps={substeps} iterations={sweeps} relax={sweeps}");
+        if sweeps > 2 {
+            // Momentum begins with the third sweep.
+            points.push(("cpu", format!("{point} method=accelerated")));
+        }
+        points.push(("cpu", point));
     }
     for rule in ["friction=box", "friction_at=manifold", "contact_frequency=0.25"] {
         let some = if few { [default].as_slice() } else { &[4, 8, 16] };

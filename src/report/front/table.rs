@@ -1,6 +1,6 @@
 //! Rows in a CSV file, which grows whenever a block of them is finished.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -47,10 +47,5 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
     /// All rows, the oldest first.
     pub fn rows(&self) -> &[R] {
         &self.rows
-    }
-
-    /// Where they are.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 }
