@@ -22,7 +22,7 @@ fn scenes() -> Vec<Scene> {
 }
 
 fn survey<'a>(team: &'a Team<'a>, out: &Path) -> Survey<'a> {
-    Survey { scenes: scenes(), teams: vec![team], extent: Extent::Full, out: out.to_owned() }
+    Survey { scenes: scenes(), teams: vec![team], extent: Extent::Full, problems: Vec::new(), out: out.to_owned() }
 }
 
 fn origin(build: &str) -> Origin {

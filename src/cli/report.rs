@@ -8,7 +8,7 @@ use super::{print, progress};
 use crate::backend::gpu::adapters;
 use crate::error::{Error, Result};
 use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone};
-use crate::report::{RUNS, convergence, rules};
+use crate::report::{RUNS, convergence, problems, rules};
 use crate::scenes::Scene;
 
 /// Arguments of `drystone report`.
@@ -45,7 +45,7 @@ enum Page {
 /// Stopped, it goes on where it stopped: scenes whose rows are there already, from the same program and machine, are not run again.
 #[derive(Args)]
 pub struct SurveyArgs {
-    /// Directory for index.html, speed-against-error.svg and scenes.csv.
+    /// Directory for index.html, speed-against-error.svg, scenes.csv and problems.csv.
     #[arg(long, default_value = "report")]
     out: PathBuf,
     /// Fewer scenes and settings: two minutes.
@@ -54,11 +54,14 @@ pub struct SurveyArgs {
     /// Only this scene, as tower or tower:n=20,top_ratio=100, or the path of a file; may be given several times.
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
+    /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+    #[arg(long, value_name = "DIR")]
+    problems: Option<PathBuf>,
     /// Threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
     /// Draw the rows that are there, and run nothing.
-    #[arg(long, conflicts_with_all = ["quick", "scene", "threads"])]
+    #[arg(long, conflicts_with_all = ["quick", "scene", "problems", "threads"])]
     draw: bool,
 }
 
@@ -112,12 +115,14 @@ impl SurveyArgs {
             true => course(extent)?,
             false => self.scene.iter().map(|word| Scene::named(word)).collect::<Result<_>>()?,
         };
+        let some = self.scene.is_empty() || self.problems.is_some();
+        let problems = if some { problems(self.problems.as_deref())? } else { Vec::new() };
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();
         let adapter = adapters().into_iter().next().map(|a| a.to_string());
         let style = indicatif::ProgressStyle::with_template("{bar:40} {percent} %  {eta} left  {msg}");
         let bar = indicatif::ProgressBar::new(1).with_style(style.expect("a fixed template"));
-        let survey = Survey { scenes, teams, extent, out: self.out.clone() };
+        let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
         let report = survey.run(&Origin::here(adapter), &mut |&Progress { what, done, total }| {
             bar.set_length(total);
             bar.set_position(done);

@@ -9,7 +9,7 @@ mod run;
 mod solve;
 mod trajectory;
 
-pub use convergence::convergence;
+pub use convergence::{convergence, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{RunReport, StageRow, Standing};
 pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};

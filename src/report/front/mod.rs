@@ -7,6 +7,7 @@ mod page;
 mod pareto;
 mod picture;
 mod race;
+mod solves;
 mod survey;
 mod table;
 
@@ -14,6 +15,7 @@ pub use contender::{Contender, Drystone, Extent, Setting, Team};
 pub use course::{course, drystone, substeps};
 pub use origin::Origin;
 pub use race::{Row, blocks, race};
+pub use solves::SolveRow;
 pub use survey::{Progress, Report, Survey};
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::fmt::{Display, Write as _};
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least, profile};
 use super::picture::{Frame, Series, svg};
 use super::race::Row;
+use super::solves::SolveRow;
 use crate::error::Result;
 
 /// The HTML, and the picture that stands for all of it.
@@ -26,7 +27,7 @@ const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 ///
 /// # Errors
 /// A race has rows of several runs.
-pub fn page(races: &[Vec<Row>]) -> Result<Page> {
+pub fn page(races: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     let sides = sides(races);
     let main =
         grid(&races.iter().map(|race| picture(race, &sides, faults(race)[0], (410, 320))).collect::<Vec<_>>(), 3);
@@ -42,6 +43,7 @@ pub fn page(races: &[Vec<Row>]) -> Result<Page> {
     for race in races {
         scene(&mut html, race, &sides);
     }
+    problems(&mut html, solves);
     html.push_str("</body></html>\n");
     Ok(Page { html, main })
 }
@@ -162,21 +164,8 @@ fn profiles(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<(
             races.iter().map(of).collect()
         };
         let costs = sides.iter().map(cost).collect::<Result<Vec<_>>>()?;
-        let named = sides.iter().enumerate().zip(profile(&costs));
-        let series = |((look, name), ratios): ((usize, &String), Vec<f64>)| {
-            let share = |n: usize| n as f64 / races.len() as f64;
-            let line = ratios.iter().enumerate().map(|(i, &ratio)| (ratio, share(i + 1))).collect();
-            Series { name: name.clone(), look, points: Vec::new(), line }
-        };
         let title = format!("error of at most {} mm", level * 1e3);
-        let frame = Frame {
-            title: &title,
-            x: "time, relative to the fastest",
-            y: "share of scenes",
-            share: true,
-            size: (400, 280),
-        };
-        html.push_str(&inline(&svg(&frame, &named.map(series).collect::<Vec<_>>())));
+        html.push_str(&inline(&profile_picture(&title, "share of scenes", races.len(), sides, &costs)));
     }
     html.push_str("</div>\n");
     Ok(())
@@ -263,6 +252,104 @@ fn all_rows(html: &mut String, race: &[Row]) {
         let _ = writeln!(html, "<td>{in_place}</td></tr>");
     }
     html.push_str("</table></div></details>\n");
+}
+
+/// Errors that contact problems are solved to.
+const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
+
+fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
+    if solves.is_empty() {
+        return;
+    }
+    // In the order of the rows.
+    let mut solvers: Vec<String> = Vec::new();
+    for solver in solves.iter().flatten().map(SolveRow::solver) {
+        if !solvers.contains(&solver) {
+            solvers.push(solver);
+        }
+    }
+    let _ = writeln!(
+        html,
+        "<h2>Contact problems</h2>\n<p>Single steps with hard contacts, solved from zero impulses; what is left is the natural map in \
+         velocities, e_vel. Time is that of the sweeps one by one on one core, the median of three turns; f64, or cpu, which is f32 in \
+         lanes. Below: the share of {} problems that are solved to an error within a factor of the time of the fastest solver.</p>\n\
+         <div class=\"pictures\">",
+        solves.len()
+    );
+    for level in SOLVED {
+        let costs: Vec<Vec<_>> =
+            solvers.iter().map(|s| solves.iter().map(|rows| time_to(rows, s, level)).collect()).collect();
+        let title = format!("e_vel of at most {level}");
+        html.push_str(&inline(&profile_picture(&title, "share of problems", solves.len(), &solvers, &costs)));
+    }
+    html.push_str(
+        "</div>\n<h3>Time to an error [ms]</h3>\n<div class=\"wide\"><table><tr><th>problem</th><th>contacts</th>",
+    );
+    for level in SOLVED {
+        solvers.iter().for_each(|s| html.push_str(&format!("<th>{level}<br>{s}</th>")));
+    }
+    html.push_str("</tr>\n");
+    for rows in solves {
+        let _ = write!(html, "<tr><td>{}</td><td>{}</td>", escape(&rows[0].problem), rows[0].contacts);
+        for level in SOLVED {
+            for solver in &solvers {
+                let _ = write!(html, "<td>{}</td>", time_to(rows, solver, level).map_or("-".into(), number));
+            }
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</table></div>\n<h3>e_vel in a given time</h3>\n<div class=\"wide\"><table><tr><th>problem</th><th>contacts</th>");
+    const TIMES: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+    for ms in TIMES {
+        solvers.iter().for_each(|s| html.push_str(&format!("<th>{ms} ms<br>{s}</th>")));
+    }
+    html.push_str("</tr>\n");
+    for rows in solves {
+        let _ = write!(html, "<tr><td>{}</td><td>{}</td>", escape(&rows[0].problem), rows[0].contacts);
+        for ms in TIMES {
+            for solver in &solvers {
+                let fit = rows.iter().filter(|row| row.solver() == *solver && row.ms <= ms).map(|row| row.e_vel);
+                let cell = fit.min_by(f64::total_cmp).map_or("-".into(), |e| format!("{e:.1e}"));
+                let _ = write!(html, "<td>{cell}</td>");
+            }
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</table></div>\n<details><summary>Curves of all problems</summary><div class=\"pictures\">");
+    for rows in solves {
+        html.push_str(&inline(&curves(rows, &solvers)));
+    }
+    html.push_str("</div></details>\n");
+}
+
+/// Least time in which a solver had an error of at most `level` [ms].
+fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
+    let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
+    fit.map(|row| row.ms).min_by(f64::total_cmp)
+}
+
+/// Time against error in one problem.
+fn curves(rows: &[SolveRow], solvers: &[String]) -> String {
+    let series = solvers.iter().enumerate().map(|(look, name)| {
+        let of = rows.iter().filter(|row| row.solver() == *name && row.e_vel > 0.0);
+        let line: Vec<_> = of.clone().map(|row| (row.ms, row.e_vel)).collect();
+        let points = line.iter().map(|&(ms, e)| (ms, e, String::new())).collect();
+        Series { name: name.clone(), look, points, line }
+    });
+    let frame = Frame { title: &rows[0].problem, x: "time [ms]", y: "e_vel", share: false, size: (400, 300) };
+    svg(&frame, &series.collect::<Vec<_>>())
+}
+
+/// A profile of what each of some solvers costs on each of `count` problems.
+fn profile_picture(title: &str, y: &str, count: usize, names: &[String], costs: &[Vec<Option<f64>>]) -> String {
+    let named = names.iter().enumerate().zip(profile(costs));
+    let series = |((look, name), ratios): ((usize, &String), Vec<f64>)| {
+        let share = |n: usize| n as f64 / count as f64;
+        let line = ratios.iter().enumerate().map(|(i, &ratio)| (ratio, share(i + 1))).collect();
+        Series { name: name.clone(), look, points: Vec::new(), line }
+    };
+    let frame = Frame { title, x: "time, relative to the fastest", y, share: true, size: (400, 280) };
+    svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 
 /// An error in the unit for people, with the unit.

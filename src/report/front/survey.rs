@@ -6,7 +6,9 @@ use super::contender::{Contender, Extent, Setting, Team};
 use super::origin::Origin;
 use super::page;
 use super::race::{Row, blocks, race};
+use super::solves::{self, SolveRow, solves};
 use super::table::Table;
+use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::scenes::Scene;
@@ -19,6 +21,8 @@ pub struct Survey<'a> {
     pub teams: Vec<&'a Team<'a>>,
     /// How much is run.
     pub extent: Extent,
+    /// Contact problems that drystone's ways to sweep are compared on.
+    pub problems: Vec<ContactProblem>,
     /// Folder that everything is written into; made if need be.
     pub out: PathBuf,
 }
@@ -37,6 +41,7 @@ pub struct Progress<'a> {
 /// Races of one survey, ready to be drawn.
 pub struct Report {
     races: Vec<Vec<Row>>,
+    solves: Vec<Vec<SolveRow>>,
 }
 
 impl Survey<'_> {
@@ -51,7 +56,8 @@ impl Survey<'_> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(scenes_path(&self.out))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
-        let total = self.scenes.iter().map(weight).sum();
+        let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
+        let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
         let (mut before, mut races) = (0, Vec::new());
         for scene in &self.scenes {
             let mut contenders = self.contenders(scene)?;
@@ -75,7 +81,22 @@ impl Survey<'_> {
             races.push(rows);
             before += weight(scene);
         }
-        Ok(Report { races })
+        let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
+        let mut all = Vec::new();
+        for problem in &self.problems {
+            progress(&Progress { what: &problem.name, done: before, total });
+            let rows = match solved(table.rows(), &solves::hash(problem), origin) {
+                Some(rows) => rows,
+                None => {
+                    let rows = solves(problem, origin)?;
+                    table.add(rows.clone())?;
+                    rows
+                }
+            };
+            all.push(rows);
+            before += problem_weight(problem);
+        }
+        Ok(Report { races, solves: all })
     }
 
     fn contenders(&self, scene: &Scene) -> Result<Vec<Box<dyn Contender>>> {
@@ -105,6 +126,17 @@ fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) 
     fit.iter().rev().find_map(|row| of_run(&row.run))
 }
 
+/// The rows of the last run on a problem; all solvers of a program are in each.
+fn solved(rows: &[SolveRow], hash: &str, origin: &Origin) -> Option<Vec<SolveRow>> {
+    let fit = |row: &&SolveRow| row.hash == hash && row.build == origin.build && row.machine == origin.machine;
+    let last = rows.iter().rfind(fit)?;
+    Some(rows.iter().filter(|row| row.run == last.run && row.hash == hash).cloned().collect())
+}
+
+fn problems_path(folder: &Path) -> PathBuf {
+    folder.join("problems.csv")
+}
+
 fn scenes_path(folder: &Path) -> PathBuf {
     folder.join("scenes.csv")
 }
@@ -115,18 +147,14 @@ impl Report {
     /// # Errors
     /// There are no rows in it, or they cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let table = Table::<Row>::open(scenes_path(folder))?;
-        let mut races: Vec<Vec<Row>> = Vec::new();
-        for race in table.rows().chunk_by(|a, b| (&a.run, &a.hash) == (&b.run, &b.hash)) {
-            match races.iter_mut().find(|known| known[0].scene == race[0].scene) {
-                Some(known) => *known = race.to_vec(),
-                None => races.push(race.to_vec()),
-            }
-        }
-        if races.is_empty() {
+        let (rows, solved) =
+            (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
+        if rows.rows().is_empty() && solved.rows().is_empty() {
             return Err(Error::input(format!("{}: no rows to draw", scenes_path(folder).display())));
         }
-        Ok(Self { races })
+        let races = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
+        let solves = last_of_each(solved.rows(), |row| (&row.problem, &row.run));
+        Ok(Self { races, solves })
     }
 
     /// Writes `index.html` and `speed-against-error.svg` into the folder, and says where the page is.
@@ -134,10 +162,22 @@ impl Report {
     /// # Errors
     /// A file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
-        let page = page::page(&self.races)?;
+        let page = page::page(&self.races, &self.solves)?;
         let path = folder.join("index.html");
         files::write(&folder.join("speed-against-error.svg"), page.main.as_bytes())?;
         files::write(&path, page.html.as_bytes())?;
         Ok(path)
     }
+}
+
+/// Rows of one run after another, of which the last of each name is kept, where the first was. `key` is name and run.
+fn last_of_each<R: Clone>(rows: &[R], key: impl Fn(&R) -> (&String, &String)) -> Vec<Vec<R>> {
+    let mut kept: Vec<Vec<R>> = Vec::new();
+    for run in rows.chunk_by(|a, b| key(a) == key(b)) {
+        match kept.iter_mut().find(|known| key(&known[0]).0 == key(&run[0]).0) {
+            Some(known) => *known = run.to_vec(),
+            None => kept.push(run.to_vec()),
+        }
+    }
+    kept
 }
