@@ -177,7 +177,9 @@ mod tests {
             let open = || Ok(Box::new(crate::Cpu::new()) as Box<dyn crate::Backend>);
             let setup = Setup { config: Default::default(), open: &open };
             let mut simulation = setup.simulation(world).expect("a simulation");
-            (0..60).for_each(|_| drop(simulation.step(DT).expect("a step")));
+            for _ in 0..60 {
+                simulation.step(DT).expect("a step");
+            }
             asymmetry(simulation.pairs(), 2)
         };
         let (points, even) = measure(world.clone());
