@@ -41,6 +41,7 @@ mod tests {
             method: "plain".into(),
             friction: "disc".into(),
             more: String::new(),
+            clock: "processor".into(),
             ms,
             ms_low: ms,
             ms_high: ms,

@@ -79,13 +79,14 @@ fn head(html: &mut String, races: &[Vec<Row>]) {
         html,
         "<p>{}. Commit {}. {} threads. {}.</p>\n\
          <p>On each scene all engines step in turns, ten steps each, so that whatever slows the machine down meets all of them. Time \
-         is the median over these turns; errors are of the second half of the run, by one measure for all. A point is one setting; \
+         is the median over these turns, of the {} clock; errors are of the second half of the run, by one measure for all. A point is one setting; \
          labels are substeps × sweeps. Filled points and the line are the front: nothing of that engine is both faster and \
          better. A setting under which something falls that should stand is not in the picture. Errors below {} µm count as that.</p>",
         each(|row| row.machine.clone()),
         each(|row| row.commit.clone()),
         each(|row| row.threads.to_string()),
         each(day),
+        each(|row| row.clock.clone()).replace("; ", " clock, on a GPU of the "),
         FLOOR * 1e6
     );
 }

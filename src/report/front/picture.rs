@@ -137,6 +137,8 @@ where
         .label_style(("sans-serif", 12))
         .axis_desc_style(("sans-serif", 13))
         .draw()?;
+    // Where labels stand already.
+    let mut taken: Vec<(i32, i32)> = Vec::new();
     for Series { name, look, points, line } in series {
         let color = COLORS[look % COLORS.len()];
         let stairs = stairs(line, right, frame.share);
@@ -148,7 +150,10 @@ where
             let best = line.contains(&(*px, *py));
             let style = if best { color.filled() } else { color.mix(0.35).stroke_width(1) };
             chart.plotting_area().draw(&(EmptyElement::at((*px, *py)) + marker(*look, (0, 0), style)))?;
-            if best && !label.is_empty() {
+            let (x, y) = chart.backend_coord(&(*px, *py));
+            let free = taken.iter().all(|t| (t.0 - x).abs() > 28 || (t.1 - y).abs() > 12);
+            if best && free && !label.is_empty() {
+                taken.push((x, y));
                 let style = ("sans-serif", 11).into_font().color(&color);
                 chart
                     .plotting_area()
@@ -156,7 +161,9 @@ where
             }
         }
     }
-    let corner = if frame.share { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight };
+    let places = series.iter().flat_map(|s| &s.points).map(|p| chart.backend_coord(&(p.0, p.1)));
+    let corner =
+        if frame.share { SeriesLabelPosition::LowerRight } else { emptiest(frame.size, &places.collect::<Vec<_>>()) };
     chart
         .configure_series_labels()
         .position(corner)
@@ -166,6 +173,22 @@ where
         .draw()?;
     root.present()?;
     Ok(())
+}
+
+/// The corner for the legend in which the fewest of these places are, the upper right before others.
+fn emptiest((width, height): (u32, u32), places: &[(i32, i32)]) -> SeriesLabelPosition {
+    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+    let (right, left) = ((width * 3 / 5) as i32, (width / 2) as i32);
+    let (upper, lower) = ((height * 2 / 5) as i32, (height / 2) as i32);
+    let in_corner = |corner: &SeriesLabelPosition, &&(x, y): &&(i32, i32)| match corner {
+        UpperRight => x > right && y < upper,
+        LowerLeft => x < left && y > lower,
+        LowerRight => x > right && y > lower,
+        _ => x < left && y < upper,
+    };
+    let corners = [UpperRight, LowerLeft, LowerRight, UpperLeft];
+    let count = |corner: &SeriesLabelPosition| places.iter().filter(|place| in_corner(corner, place)).count();
+    corners.into_iter().min_by_key(count).unwrap_or(UpperRight)
 }
 
 /// From corner to corner along the axes: at an error, nothing faster is known. It goes on to the right end.
