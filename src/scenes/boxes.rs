@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn piles_of_every_size_have_all_their_boxes_inside_the_container() {
         for n in [1, 2, 3, 7, 64, 100, 5000] {
-            let scene = pile(n, 0.03, 1);
+            let scene = pile(n, 0.03, 1, 1.0);
             assert_eq!((scene.world.dynamic_count(), scene.escaped(&scene.world)), (n, 0));
         }
     }

@@ -94,7 +94,13 @@ fn unusual(config: &SolverConfig) -> Vec<String> {
     let usual = table(&SolverConfig { relax: config.iterations, ..SolverConfig::default() });
     let said = ["substeps", "iterations", "method", "friction"];
     let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-    table(config).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
+    let text = |(key, value): (String, toml::Value)| match value {
+        toml::Value::String(word) => format!("{key}={word}"),
+        // f32 as it was written, without what f64 sees of its rounding.
+        toml::Value::Float(x) => format!("{key}={}", x as f32),
+        value => format!("{key}={value}"),
+    };
+    table(config).into_iter().filter(differs).map(text).collect()
 }
 
 /// Drystone itself.

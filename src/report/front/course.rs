@@ -81,7 +81,13 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
         }
         points.push(("cpu", point));
     }
-    for rule in ["friction=box", "friction_at=manifold", "contact_frequency=0.25"] {
+    for rule in [
+        "friction=box",
+        "friction_at=manifold",
+        "contact_frequency=0.25",
+        "preload_rate=0",
+        "preload_rate=0 contact_frequency=0.25",
+    ] {
         let some: &[u32] = if few { &[8] } else { &[4, 8, 16] };
         points.extend(some.iter().map(|n| ("cpu", format!("substeps={n} {rule}"))));
     }

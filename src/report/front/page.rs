@@ -1,7 +1,7 @@
 //! The page: pictures and tables of races, one HTML file that needs nothing else.
 
 use std::collections::BTreeSet;
-use std::fmt::{Display, Write as _};
+use std::fmt::Write as _;
 
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least, profile};
 use super::picture::{Frame, Series, svg};
@@ -77,7 +77,7 @@ fn head(html: &mut String, races: &[Vec<Row>]) {
     let day = |row: &Row| row.run.chars().take(10).collect();
     let _ = writeln!(
         html,
-        "<p>{}. Commit {}. {} threads. {}.</p>\n\
+        "<p>{}. Commit {}. Threads of each engine: {}. {}.</p>\n\
          <p>On each scene all engines step in turns, ten steps each, so that whatever slows the machine down meets all of them. Time \
          is the median over these turns, of the {} clock; errors are of the second half of the run, by one measure for all. A point is one setting; \
          labels are substeps × sweeps. Filled points and the line are the front: nothing of that engine is both faster and \
@@ -367,8 +367,8 @@ fn number(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-fn escape(text: impl Display) -> String {
-    text.to_string().replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A picture as part of a page: it needs no name space there.
