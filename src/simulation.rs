@@ -171,6 +171,12 @@ impl Simulation {
         self.sleep.asleep().get(body) == Some(&true)
     }
 
+    /// Wakes a body, if it sleeps, and all that lies still with it: for those who change what the next step cannot see, such as a
+    /// joint to the world.
+    pub fn wake(&mut self, body: usize) {
+        self.sleep.wake(body);
+    }
+
     /// Overlap of the world as it is now, from contacts computed anew.
     pub fn penetration(&mut self) -> Penetration {
         let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
