@@ -75,7 +75,7 @@ impl Simulation {
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
-        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
+        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, &self.detector));
         if self.sleep.is_everything_still() {
             stats.asleep = self.sleep.count();
             return Ok(stats);
@@ -86,7 +86,7 @@ impl Simulation {
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
         timed(&mut stats.times.store, || {
-            self.sleep.after_step(&mut self.world, self.detector.pairs(), dt);
+            self.sleep.after_step(&mut self.world, &self.detector, dt);
         });
         stats.asleep = self.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
@@ -95,7 +95,7 @@ impl Simulation {
 
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
-        self.sleep.before_step(&self.world, self.detector.pairs());
+        self.sleep.before_step(&self.world, &self.detector);
         self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
     }
@@ -126,7 +126,7 @@ impl Simulation {
             let (detector, sleep) = (&mut self.detector, &mut self.sleep);
             let mut found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
             // Who wakes takes part in this step already.
-            while sleep.wake_touched(detector.pairs()) {
+            while sleep.wake_touched(detector) {
                 let reshaped = found.reshaped;
                 found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
                 found.reshaped |= reshaped;
@@ -179,14 +179,14 @@ impl Simulation {
     }
 
     /// Contacts and impulses of the last step.
-    pub fn pairs(&mut self) -> &[Pair] {
+    pub fn pairs(&mut self) -> impl Iterator<Item = &Pair> + Clone {
         self.world_and_pairs().1
     }
 
     /// The bodies, and contacts and impulses of the last step.
-    pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
-        let pairs = self.detector.pairs_mut();
-        pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
+    pub fn world_and_pairs(&mut self) -> (&World, impl Iterator<Item = &Pair> + Clone) {
+        let pairs = self.detector.pairs_mut().flatten();
+        pairs.for_each(|pair| self.prepared.give_back(&self.problem, pair));
         (&self.world, self.detector.pairs())
     }
 

@@ -119,6 +119,11 @@ struct SceneArgs {
 impl SceneArgs {
     /// The scene with its step length, and the settings.
     fn load(&self) -> Result<(Scene, SolverConfig)> {
+        self.load_worlds(1, None)
+    }
+
+    /// The same for some worlds of the scene: [`Scene::find_worlds`].
+    fn load_worlds(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
         let mut config = match &self.config {
             Some(path) => SolverConfig::from_toml_file(path)?,
             None => SolverConfig::default(),
@@ -132,7 +137,7 @@ impl SceneArgs {
             }
         }
         config.check()?;
-        let mut scene = Scene::find(&self.scene, &self.parameter)?;
+        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
         if let Some(dt) = self.dt {
             if !(dt > 0.0 && dt <= 1.0) {
                 return Err(Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));

@@ -25,6 +25,12 @@ pub struct RunArgs {
     /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
     #[arg(long)]
     no_sleep: bool,
+    /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    worlds: usize,
+    /// Let each world have one more of a parameter of the scene than the one before, such as `seed`; else all are the same.
+    #[arg(long, value_name = "KEY", requires = "worlds")]
+    vary: Option<String>,
     /// Write poses and velocities of the bodies that can move, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -36,7 +42,7 @@ pub struct RunArgs {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
         if self.no_sleep {
             config.sleep_after = 0.0;
         } else if config.sleep_after == 0.0 {

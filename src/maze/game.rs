@@ -135,7 +135,7 @@ impl Game {
         let (board, ball) = (&world.bodies[BOARD], &world.bodies[BALL]);
         let up = board.rotation * Vec3::Y;
         let (mut on_floor, mut elsewhere) = (false, false);
-        for (pair, manifold) in pairs.iter().flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
+        for (pair, manifold) in pairs.flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
             let is_floor = [BOARD, GOAL].contains(&(pair.body_a as usize)) && manifold.normal.dot(up) > 0.999;
             let bears = manifold.points().iter().any(|p| p.normal_impulse > 0.0);
             on_floor |= is_floor && bears;

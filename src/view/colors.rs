@@ -49,7 +49,7 @@ impl ColorBy {
 
     /// One number for each body: number of the material, number of the batch, speed [m/s] or impulse [N s]; NaN for bodies
     /// about which there is nothing to say.
-    pub fn values(self, world: &World, pairs: &[Pair]) -> Vec<f32> {
+    pub fn values<'a>(self, world: &World, pairs: impl IntoIterator<Item = &'a Pair>) -> Vec<f32> {
         match self {
             Self::Material => materials(world),
             Self::Speed => world.bodies.iter().map(|b| b.linear_velocity.length()).collect(),
@@ -100,8 +100,10 @@ impl ColorBy {
     }
 }
 
-fn contacts(pairs: &[Pair]) -> impl Iterator<Item = (&Pair, &crate::collide::Manifold)> {
-    pairs.iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
+fn contacts<'a>(
+    pairs: impl IntoIterator<Item = &'a Pair>,
+) -> impl Iterator<Item = (&'a Pair, &'a crate::collide::Manifold)> {
+    pairs.into_iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
 }
 
 /// Number of each dynamic body's material, in the order in which they first occur.

@@ -49,7 +49,7 @@ impl Film {
     }
 
     /// Adds the world as it is; `pairs` are the contacts of the last step.
-    pub fn add(&mut self, time: f64, world: &World, pairs: &[Pair]) {
+    pub fn add<'a>(&mut self, time: f64, world: &World, pairs: impl IntoIterator<Item = &'a Pair>) {
         self.frames.push(Frame { time, poses: poses(world), values: self.color.values(world, pairs) });
     }
 
