@@ -163,16 +163,4 @@ impl Detector {
     pub fn reshaped_in(&self) -> u64 {
         self.reshaped_in
     }
-
-    /// Computes every manifold anew at the poses of `world`: for measuring, where reused ones would be a little off.
-    pub fn detect_anew(
-        &mut self,
-        world: &World,
-        config: &SolverConfig,
-        dt: f32,
-        give_back: &(dyn Fn(&mut Pair) + Sync),
-    ) -> DetectStats {
-        self.pairs_mut().flatten().for_each(Pair::invalidate);
-        self.detect(world, config, dt, &[], give_back)
-    }
 }

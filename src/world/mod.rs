@@ -78,7 +78,7 @@ impl World {
         self.joints.extend(other.joints.iter().map(|j| BallJoint {
             body_a: first + j.body_a,
             body_b: j.body_b.map(|b| first + b),
-            ..j.clone()
+            ..*j
         }));
         Ok(())
     }
