@@ -204,9 +204,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// Changes what runs the steps, from the next one on.
-    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
-        self.backend = backend;
+    /// Changes what runs the steps, from the next one on; returns what ran them so far.
+    pub fn set_backend(&mut self, backend: Box<dyn Backend>) -> Box<dyn Backend> {
+        std::mem::replace(&mut self.backend, backend)
     }
 
     /// The settings.

@@ -1,5 +1,6 @@
 //! The command line: parse, one library call, print.
 
+mod bench;
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
@@ -64,6 +65,8 @@ enum Command {
     /// Draw a scene (in builds with `--features view`).
     #[cfg(not(feature = "view"))]
     Render(NotBuilt),
+    /// Measure what the stages of a step cost on standard scenes.
+    Bench(bench::BenchArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -280,6 +283,7 @@ pub fn main() -> std::process::ExitCode {
         Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
+        Command::Bench(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),

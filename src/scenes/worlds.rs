@@ -39,6 +39,27 @@ impl Scene {
         Ok(all)
     }
 
+    /// Finds a scene by one word, `name:key=value,...`: its parameters, how many `worlds` of it, and what to `vary`, each as in
+    /// [`Scene::find_worlds`].
+    ///
+    /// # Errors
+    /// As there; worlds that are not a number.
+    pub fn find_spec(spec: &str) -> Result<Self> {
+        let (name, parameters) = spec.split_once(':').unwrap_or((spec, ""));
+        let (mut count, mut vary, mut own) = (1, None, Vec::new());
+        for assignment in parameters.split(',').filter(|a| !a.is_empty()) {
+            match assignment.split_once('=') {
+                Some(("worlds", number)) => {
+                    let refusal = |_| Error::input(format!("{spec}: worlds = {number:?}: must be a whole number"));
+                    count = number.parse().map_err(refusal)?;
+                }
+                Some(("vary", key)) => vary = Some(key),
+                _ => own.push(assignment.to_owned()),
+            }
+        }
+        Self::find_worlds(name, &own, count, vary)
+    }
+
     /// Sets the world of another scene beside this one's. What both say holds for both.
     fn beside(&mut self, other: &Self) -> Result<()> {
         let first = self.world.bodies.len();
