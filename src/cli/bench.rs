@@ -9,7 +9,7 @@ use super::{print, print_json, progress};
 use crate::backend::{Backend, BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
-use crate::report::bench::{Bench, BenchRow, Change, QUICK, STANDARD, bench, compare_with};
+use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]
@@ -19,6 +19,9 @@ pub struct BenchArgs {
     /// Smaller scenes and fewer turns, if none is named and --turns is not given.
     #[arg(long)]
     quick: bool,
+    /// Measure how far sweeps of a pile of 15,000 boxes are from what memory and arithmetic can do, instead.
+    #[arg(long, conflicts_with_all = ["scenes", "quick", "set", "baseline", "csv", "backend"])]
+    limits: bool,
     /// How often each scene has its turn of 10 steps.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
@@ -45,6 +48,11 @@ pub struct BenchArgs {
 impl BenchArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads: Vec<_> = self.threads.iter().map(|&t| if t == 0 { cores } else { t.into() }).collect();
+        if self.limits {
+            return self.print_limits(&threads);
+        }
         let mut config = SolverConfig::default();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
         config.check()?;
@@ -54,8 +62,6 @@ impl BenchArgs {
         let specs =
             if self.scenes.is_empty() { usual.iter().map(|&s| s.into()).collect() } else { self.scenes.clone() };
         let turns = self.turns.unwrap_or(if self.quick { 3 } else { 9 });
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let threads: Vec<_> = self.threads.iter().map(|&t| if t == 0 { cores } else { t.into() }).collect();
         let open = || -> Result<Vec<Box<dyn Backend>>> {
             // Nothing but `auto` asks how many bodies there are.
             self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
@@ -79,6 +85,38 @@ impl BenchArgs {
             }
             None => Ok(()),
         }
+    }
+
+    fn print_limits(&self, threads: &[usize]) -> Result<()> {
+        let turns = self.turns.unwrap_or(9);
+        let bar = progress(threads.len() as u32 * u32::from(turns), self.json);
+        let rows = limits(15_000, threads, turns.into(), &mut || bar.inc(1))?;
+        bar.finish_and_clear();
+        let machine = Machine::this();
+        if self.json {
+            return print_json(&serde_json::json!({"machine": machine, "rows": rows}));
+        }
+        print(machine.line())?;
+        let alone = rows.first().map_or(f64::NAN, |r| r.sweeps / r.threads as f64);
+        for row in &rows {
+            print(format_args!(
+                "{} threads: {:.1} million contact points swept a second, {:.2} times one; {:.0} operations each: {:.0} % of {:.1} G/s",
+                row.threads,
+                row.sweeps * 1e-6,
+                row.sweeps / alone,
+                row.operations,
+                100.0 * row.of_peak(),
+                row.peak * 1e-9
+            ))?;
+            for &(size, rate) in &row.triads {
+                let (mib, share) = (size as f64 / f64::from(1 << 20), 100.0 * row.of_triad(rate));
+                print(format_args!(
+                    "    triad over {mib:.2} MiB: {:.1} GB/s, their stream is {share:.0} % of it",
+                    rate * 1e-9
+                ))?;
+            }
+        }
+        Ok(())
     }
 }
 

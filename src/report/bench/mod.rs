@@ -5,9 +5,11 @@
 //! numbers of threads take turns at one simulation, so that they have the same to do.
 
 mod baseline;
+mod limits;
 mod machine;
 
 pub use baseline::{Change, compare_with};
+pub use limits::{LimitRow, limits};
 pub use machine::Machine;
 
 use serde::{Deserialize, Serialize};
@@ -150,7 +152,7 @@ pub fn bench(
 ) -> Result<Bench> {
     let mut courses = Vec::new();
     for spec in specs {
-        courses.push(Course::settled(spec, config, threads, open)?);
+        courses.push(Course::new(spec, config, threads, open)?);
         after_turn();
     }
     for _ in 0..turns {
@@ -163,10 +165,26 @@ pub fn bench(
     Ok(Bench { machine: Machine::this(), rows })
 }
 
+/// A simulation of a scene at rest, the hash of the scene and the length of its steps. What falls into a container does so at
+/// one substep: contacts are found as always, and it lies where it would. Then all is stepped at the settings that are measured,
+/// until preloads and warm starts have come to rest, too.
+fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32)> {
+    let scene = Scene::find_spec(spec)?;
+    let (hash, dt, falls) = (scene.content_hash(), scene.dt, scene.container.is_some());
+    let coarse = SolverConfig { substeps: 1, ..config.clone() };
+    let mut simulation = Simulation::new(scene.world, coarse, Box::new(crate::Cpu::new()))?;
+    for _ in 0..if falls { COARSE } else { 0 } {
+        simulation.step(dt)?;
+    }
+    simulation.set_config(config.clone())?;
+    for _ in 0..FINE {
+        simulation.step(dt)?;
+    }
+    Ok((simulation, hash, dt))
+}
+
 impl Course {
-    /// What falls into a container does so at one substep: contacts are found as always, and it lies where it would. Then all
-    /// is stepped at the settings that are measured, until preloads and warm starts have come to rest, too.
-    fn settled(
+    fn new(
         spec: &str,
         config: &SolverConfig,
         threads: &[usize],
@@ -180,19 +198,7 @@ impl Course {
                 ways.push(Way { backend: Some(backend), pool, turns: Vec::new() });
             }
         }
-        let scene = Scene::find_spec(spec)?;
-        let coarse = SolverConfig { substeps: 1, ..config.clone() };
-        let (hash, dt, falls) = (scene.content_hash(), scene.dt, scene.container.is_some());
-        let mut simulation = Simulation::new(scene.world, coarse, Box::new(crate::Cpu::new()))?;
-        for step in 0..COARSE + FINE {
-            if step < COARSE && !falls {
-                continue;
-            }
-            if step == COARSE {
-                simulation.set_config(config.clone())?;
-            }
-            simulation.step(dt)?;
-        }
+        let (simulation, hash, dt) = settled(spec, config)?;
         Ok(Self { spec: spec.into(), hash, dt, simulation, ways, last: crate::StepStats::default() })
     }
 
