@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Numbers, print, print_json};
+use super::{print, print_json};
+use crate::backend::Numbers;
 use crate::error::Result;
 use crate::hard::{Case, Check, Limit, Setup};
 use crate::preset::Preset;
@@ -64,7 +65,7 @@ impl HardArgs {
         let mut config = self.preset.config();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
         config.check()?;
-        let setup = Setup { config, open: &|| self.backend.open() };
+        let setup = Setup { config, open: &|| self.backend.open(false) };
         let mut all = Vec::new();
         for case in cases {
             let checks = case.run(&setup)?;

@@ -21,14 +21,14 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::backend::Backend;
-use crate::backend::cpu::{Cpu, Reference};
-use crate::backend::gpu::{AdapterChoice, Gpu};
-use crate::config::SolverConfig;
+use crate::config::{Method, SolverConfig};
+use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::load::Load;
 use crate::preset::Preset;
 use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::stats::StepStats;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -90,41 +90,6 @@ impl NotBuilt {
     }
 }
 
-/// What runs sweeps, by the numbers that it computes with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Numbers {
-    /// The reference in double precision.
-    F64,
-    /// The reference, one constraint at a time on one thread, in single precision.
-    Reference,
-    /// Eight constraints at a time, in single precision.
-    Cpu,
-    /// The compute shaders, in single precision.
-    Gpu,
-}
-
-impl Numbers {
-    /// Opens it.
-    ///
-    /// # Errors
-    /// No adapter.
-    pub fn open(self) -> Result<Box<dyn Backend>> {
-        Ok(match self {
-            Self::F64 => Box::new(Reference::<f64>::new()),
-            Self::Reference => Box::new(Reference::<f32>::new()),
-            Self::Cpu => Box::new(Cpu::new()),
-            Self::Gpu => Box::new(Gpu::new(AdapterChoice::Best, false)?),
-        })
-    }
-}
-
-impl Display for Numbers {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
-    }
-}
-
 /// A scene, and how to solve it.
 #[derive(Args)]
 struct SceneArgs {
@@ -155,6 +120,9 @@ struct SceneArgs {
     /// Relax sweeps of a substep.
     #[arg(long)]
     relax: Option<u32>,
+    /// What is done with the sweeps of a substep.
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Any setting of the solver, as key=value; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -189,6 +157,7 @@ impl SceneArgs {
                 config.set(&format!("{name}={value}"))?;
             }
         }
+        config.method = self.method.unwrap_or(config.method);
         config.check()?;
         let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
         if let Some(dt) = self.dt {
@@ -210,6 +179,20 @@ impl SceneArgs {
         // Fails only if it was set before, which nothing does.
         // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+    }
+}
+
+/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
+fn step_with_contacts(
+    simulation: &mut Simulation,
+    scene: &str,
+    dt: f32,
+    number: u32,
+) -> Result<(ContactProblem, StepStats)> {
+    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
+    match problem.contacts.is_empty() {
+        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
+        false => Ok((problem, stats)),
     }
 }
 

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{print, print_json};
+use crate::backend::Numbers;
+use crate::config::Method;
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::report::{CurveRow, SolveReport, SolveSettings};
-use crate::solver::{Method, Order, Precision};
+use crate::solver::Order;
 
 /// Most sweeps where a tolerance says when to end.
 const MOST_SWEEPS: u32 = 40_000;
@@ -25,14 +27,20 @@ pub struct SolveArgs {
     #[arg(long, value_name = "ERROR", conflicts_with = "sweeps")]
     tolerance: Option<f64>,
     /// What is done with the sweeps.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value = "accelerated")]
     method: Method,
     /// In which order they go over the contacts.
     #[arg(long, value_enum, default_value_t)]
     order: Order,
-    /// In which numbers they calculate; errors are always measured in f64.
-    #[arg(long, value_enum, default_value_t)]
-    precision: Precision,
+    /// How often they go over a manifold before the next one; unless told, 2 by manifolds and 1 by contacts.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=16))]
+    passes: Option<u8>,
+    /// What runs them; errors are always measured in f64.
+    #[arg(long, value_enum, default_value = "f64")]
+    backend: Numbers,
+    /// Ask the GPU for the reference's results to the last bit.
+    #[arg(long)]
+    exact: bool,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -48,11 +56,12 @@ impl SolveArgs {
         let settings = SolveSettings {
             method: self.method,
             order: self.order,
-            precision: self.precision,
+            passes: self.passes.unwrap_or(self.order.passes()),
             sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps },
             tolerance: self.tolerance.unwrap_or(0.0),
         };
-        let report = SolveReport::new(&problem, &settings);
+        let backend = (self.backend != Numbers::F64).then(|| self.backend.open(self.exact)).transpose()?;
+        let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;
         } else {
@@ -68,8 +77,8 @@ impl SolveArgs {
 
 fn print_table(r: &SolveReport) -> Result<()> {
     print(format_args!("{}: {} bodies, {} contacts, {} colors", r.problem, r.bodies, r.contacts, r.colors))?;
-    let words = format!("{:?} sweeps by {:?} in {:?}", r.method, r.order, r.precision).to_lowercase();
-    print(format_args!("{words}: {} in {:.3} ms", r.sweeps, r.ms))?;
+    let words = format!("{:?} sweeps by {:?}", r.method, r.order).to_lowercase();
+    print(format_args!("{words}: {} in {:.3} ms on {}: {}", r.sweeps, r.ms, r.backend, r.adapter))?;
     let names = ["e_vel", "e_fclib", "vmax m/s", "contact", "pen m/s", "compl J", "cone N s", "diss J", "eom"];
     print(format_args!(" sweeps         ms{}", names.map(|name| format!(" {name:>8}")).concat()))?;
     for CurveRow { sweeps, ms, residuals: x } in &r.curve {

@@ -203,7 +203,7 @@ impl Case {
         },
         Self {
             name: "H11",
-            summary: "no inertia, hair-thin rods, pairs that nothing can move",
+            summary: "next to no inertia, hair-thin rods, pairs that nothing can move",
             long: false,
             run: bodies::no_inertia,
         },

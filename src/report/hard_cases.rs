@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::cli::Numbers;
+use crate::backend::Numbers;
 use crate::error::Result;
 use crate::hard::{Case, Check, Limit, Setup};
 use crate::preset::Preset;
@@ -42,7 +42,7 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
                 continue;
             }
             progress(&format!("{} {preset} {numbers}", case.name));
-            let checks = case.run(&Setup { config: preset.config(), open: &|| numbers.open() })?;
+            let checks = case.run(&Setup { config: preset.config(), open: &|| numbers.open(false) })?;
             passed[k] += usize::from(checks.iter().all(|c| c.passed));
             columns.push(Some(checks));
         }
@@ -56,7 +56,7 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     }
     let of = |k: usize| cases.iter().filter(|c| is_run(c, COLUMNS[k])).count();
     let totals: Vec<_> = passed.iter().enumerate().map(|(k, passed)| format!("{passed} of {}", of(k))).collect();
-    let gpu = Numbers::Gpu.open()?.adapter();
+    let gpu = Numbers::Gpu.open(false)?.adapter();
     let substeps = |preset: Preset| preset.config().substeps;
     let heads: Vec<_> =
         COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();
