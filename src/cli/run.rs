@@ -26,6 +26,12 @@ pub struct RunArgs {
     exact: bool,
     #[command(flatten)]
     sleep: SleepArgs,
+    /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    worlds: usize,
+    /// Let each world have one more of a parameter of the scene than the one before, such as `seed`; else all are the same.
+    #[arg(long, value_name = "KEY", requires = "worlds")]
+    vary: Option<String>,
     /// Write poses and velocities of the bodies that can move, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -74,7 +80,7 @@ impl SaveProblem {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));

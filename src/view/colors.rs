@@ -61,7 +61,12 @@ impl ColorBy {
     }
 
     /// The same, for bodies that make the contacts `pairs`, and of which some are `asleep`.
-    pub(super) fn values_of(self, world: &World, pairs: &[Pair], asleep: &[bool]) -> Vec<f32> {
+    pub(super) fn values_of<'a>(
+        self,
+        world: &World,
+        pairs: impl IntoIterator<Item = &'a Pair>,
+        asleep: &[bool],
+    ) -> Vec<f32> {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
@@ -114,8 +119,10 @@ impl ColorBy {
     }
 }
 
-fn contacts(pairs: &[Pair]) -> impl Iterator<Item = (&Pair, &crate::collide::Manifold)> {
-    pairs.iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
+fn contacts<'a>(
+    pairs: impl IntoIterator<Item = &'a Pair>,
+) -> impl Iterator<Item = (&'a Pair, &'a crate::collide::Manifold)> {
+    pairs.into_iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
 }
 
 /// Number of each dynamic body's material, in the order in which they first occur.

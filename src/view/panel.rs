@@ -30,9 +30,9 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
 fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let asleep = live.stats.asleep;
     let pairs = live.simulation.pairs();
-    let depth = Penetration::of(pairs);
+    let depth = Penetration::of(pairs.clone());
     // With those of sleepers, which the last step does not count.
-    let contacts = || pairs.iter().flat_map(|p| &p.manifolds);
+    let contacts = || pairs.clone().flat_map(|p| &p.manifolds);
     let (manifolds, points) = (contacts().count(), contacts().map(|m| m.points().len()).sum::<usize>());
     let colors = contacts().filter_map(|m| m.color).max().map_or(0, |c| c + 1);
     let world = &live.simulation.world;
