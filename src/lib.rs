@@ -33,6 +33,7 @@ pub mod contacts;
 pub mod error;
 pub mod files;
 pub mod graph;
+pub mod hard;
 pub mod kernels;
 pub mod load;
 pub mod math;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The modules of each floor, the ground floor first.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["math", "error", "files", "stats"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
@@ -12,6 +12,7 @@ const FLOORS: [&[&str]; 9] = [
     &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
+    &["hard"],
     &["report", "compare", "view", "maze"],
     &["main", "cli"],
 ];

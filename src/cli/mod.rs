@@ -3,6 +3,7 @@
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
+mod hard;
 mod list;
 mod play;
 #[cfg(feature = "view")]
@@ -53,6 +54,8 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
+    /// Run hard cases and say which pass.
+    Hard(hard::HardArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
@@ -216,12 +219,17 @@ fn length(text: &str) -> std::result::Result<f64, String> {
 
 /// A progress bar on a terminal, nothing elsewhere.
 fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
+    progress_of("step", steps.into(), quiet)
+}
+
+/// A progress bar over `count` of what `unit` names.
+fn progress_of(unit: &str, count: u64, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
         return indicatif::ProgressBar::hidden();
     }
-    let style = "{bar:40} step {pos}/{len}  {per_sec}  {eta} left";
-    let style = indicatif::ProgressStyle::with_template(style).expect("a fixed template");
-    indicatif::ProgressBar::new(steps.into()).with_style(style)
+    let style = format!("{{bar:40}} {unit} {{pos}}/{{len}}  {{per_sec}}  {{eta}} left  {{msg}}");
+    let style = indicatif::ProgressStyle::with_template(&style).expect("a fixed template");
+    indicatif::ProgressBar::new(count).with_style(style)
 }
 
 /// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
@@ -247,6 +255,7 @@ pub fn main() -> std::process::ExitCode {
         Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
+        Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),
