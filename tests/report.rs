@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::path::Path;
 
-use drystone::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team};
+use drystone::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
 use drystone::{Error, Result, Scene, SolverConfig};
 
 /// Drystone with 1, 2 and 4 substeps.
@@ -17,8 +17,8 @@ fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
 
 /// Small scenes, run for a moment.
 fn scenes() -> Vec<Scene> {
-    let scene = |word: &str| Scene { steps: 20, ..Scene::named(word).expect("a scene of the catalogue") };
-    ["tower:n=2", "chain:links=2", "pile:n=8"].map(scene).to_vec()
+    let short = |word: &str| Scene { steps: 20, ..scene(word).expect("a scene of the catalogue") };
+    ["tower:n=2", "chain:links=2", "pile:n=8"].map(short).to_vec()
 }
 
 fn survey<'a>(team: &'a Team<'a>, out: &Path) -> Survey<'a> {

@@ -7,9 +7,9 @@ use clap::{Args, Subcommand};
 use super::{print, progress};
 use crate::backend::gpu::adapters;
 use crate::error::{Error, Result};
-use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone};
+use crate::files;
+use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone, scene};
 use crate::report::{RUNS, convergence, problems, rules};
-use crate::scenes::Scene;
 
 /// Arguments of `drystone report`.
 #[derive(Args)]
@@ -84,8 +84,9 @@ impl ReportArgs {
                     bar.inc(1);
                 })?;
                 bar.finish_and_clear();
+                std::fs::create_dir_all(out).map_err(Error::file(out))?;
                 let path = out.join("convergence.md");
-                std::fs::write(&path, page).map_err(Error::file(&path))?;
+                files::write(&path, page.as_bytes())?;
                 print(path.display())
             }
         }
@@ -113,7 +114,7 @@ impl SurveyArgs {
         let extent = if self.quick { Extent::Quick } else { Extent::Full };
         let scenes = match self.scene.is_empty() {
             true => course(extent)?,
-            false => self.scene.iter().map(|word| Scene::named(word)).collect::<Result<_>>()?,
+            false => self.scene.iter().map(|word| scene(word)).collect::<Result<_>>()?,
         };
         let some = self.scene.is_empty() || self.problems.is_some();
         let problems = if some { problems(self.problems.as_deref())? } else { Vec::new() };

@@ -15,6 +15,7 @@ mod masonry;
 mod parts;
 mod random;
 mod stacks;
+mod worlds;
 
 pub use catalogue::{Entry, Parameter};
 pub use entries::CATALOGUE;
@@ -77,18 +78,6 @@ impl Scene {
             Some(entry) => entry.build(parameters),
             None => file::load_or_suggest(name_or_path, parameters),
         }
-    }
-
-    /// Finds a scene by one word: the path of a file, a name of the catalogue, or name:key=value,key=value. That word is its name.
-    ///
-    /// # Errors
-    /// As [`Scene::find`].
-    pub fn named(word: &str) -> Result<Self> {
-        let (name, parameters) = word.split_once(':').unwrap_or((word, ""));
-        let parameters: Vec<_> = parameters.split_terminator(',').map(str::to_owned).collect();
-        let known = CATALOGUE.iter().any(|e| e.name == name);
-        let scene = if known { Self::find(name, &parameters) } else { Self::find(word, &[]) };
-        Ok(Self { name: word.to_owned(), ..scene? })
     }
 
     /// Dynamic bodies whose centre of mass is outside the container.

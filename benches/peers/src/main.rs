@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use drystone::cli::SurveyArgs;
-use drystone::report::front::{Origin, Row, blocks, race};
+use drystone::report::front::{Origin, Row, blocks, race, scene};
 use drystone::{Error, Result, Scene};
 use drystone_peers::{Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -88,7 +88,7 @@ impl Args {
     }
 
     fn scene(&self, text: &str) -> Result<Scene> {
-        let mut scene = Scene::named(text)?;
+        let mut scene = scene(text)?;
         scene.steps = self.steps.unwrap_or(scene.steps);
         Ok(scene)
     }

@@ -84,23 +84,15 @@ impl Setting {
     }
 }
 
-fn table(config: &SolverConfig) -> toml::Table {
-    toml::Table::try_from(config).expect("a config is a table")
-}
-
-/// Settings that are not at their defaults, as `key=value`, those of [`Setting`] left out; as many relax sweeps as biased ones are
-/// what is expected.
+/// What a setting has no place for. As many relax sweeps as biased ones are what is expected.
 fn unusual(config: &SolverConfig) -> Vec<String> {
-    let usual = table(&SolverConfig { relax: config.iterations, ..SolverConfig::default() });
     let said = ["substeps", "iterations", "method", "friction"];
-    let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-    let text = |(key, value): (String, toml::Value)| match value {
-        toml::Value::String(word) => format!("{key}={word}"),
-        // f32 as it was written, without what f64 sees of its rounding.
-        toml::Value::Float(x) => format!("{key}={}", x as f32),
-        value => format!("{key}={value}"),
-    };
-    table(config).into_iter().filter(differs).map(text).collect()
+    let mut more = config.unusual(&said);
+    more.retain(|text| !text.starts_with("relax="));
+    if config.relax != config.iterations {
+        more.push(format!("relax={}", config.relax));
+    }
+    more
 }
 
 /// Drystone itself.

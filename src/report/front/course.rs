@@ -34,12 +34,20 @@ const LARGE_STEPS: u32 = 300;
 /// Never: the catalogue has them.
 pub fn course(extent: Extent) -> Result<Vec<Scene>> {
     let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
-    let scene = |name: &&str| {
-        let scene = Scene::named(name)?;
+    let named = |name: &&str| {
+        let scene = scene(name)?;
         let steps = if is_large(&scene) { scene.steps.min(LARGE_STEPS) } else { scene.steps };
         Ok(Scene { steps, ..scene })
     };
-    names.iter().map(scene).collect()
+    names.iter().map(named).collect()
+}
+
+/// A scene by one word as [`Scene::find_spec`] has it, which is its name then too.
+///
+/// # Errors
+/// As there.
+pub fn scene(word: &str) -> Result<Scene> {
+    Ok(Scene { name: word.to_owned(), ..Scene::find_spec(word)? })
 }
 
 fn is_large(scene: &Scene) -> bool {

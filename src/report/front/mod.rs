@@ -12,7 +12,7 @@ mod survey;
 mod table;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
-pub use course::{course, drystone, substeps};
+pub use course::{course, drystone, scene, substeps};
 pub use origin::Origin;
 pub use race::{Row, blocks, race};
 pub use solves::SolveRow;

@@ -6,6 +6,8 @@ use std::time::SystemTime;
 
 use fnv::FnvHasher;
 
+use crate::report::bench::Machine;
+
 /// The program that runs, and what it runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
@@ -22,10 +24,9 @@ pub struct Origin {
 impl Origin {
     /// Of this program, here. `adapter` is the one that shaders run on.
     pub fn here(adapter: Option<String>) -> Self {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
-        let facts = [processor(), Some(format!("{cores} cores")), adapter, Some(system)];
-        let machine = facts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        let Machine { processor, cores, system, .. } = Machine::this();
+        let facts = [Some(processor), Some(format!("{cores} cores")), Some(system), adapter];
+        let machine = facts.into_iter().flatten().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(", ");
         Self { build: build(), commit: commit(), machine, threads: rayon::current_num_threads() }
     }
 
@@ -46,11 +47,4 @@ fn commit() -> String {
     let git = ["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--exclude=*", "--dirty=+"];
     let said = Command::new("git").args(git).output().ok().filter(|o| o.status.success());
     said.and_then(|o| String::from_utf8(o.stdout).ok()).map_or("unknown".into(), |text| text.trim().to_owned())
-}
-
-/// Its name, where the system tells.
-fn processor() -> Option<String> {
-    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("model name"))?;
-    Some(line.split_once(": ")?.1.trim().to_owned())
 }
