@@ -9,13 +9,16 @@ use glam::{Vec2, Vec3};
 use super::StepProblem;
 use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
-use crate::collide::{Manifold, ManifoldPoint, Motion, Pair};
+use crate::collide::{Detector, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::world::World;
 
 /// Where a contact comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Source {
+    /// World of the pair.
+    pub world: u32,
+    /// Place of the pair among those of its world.
     pub pair: u32,
     /// Which manifold of the pair.
     pub manifold: u32,
@@ -82,7 +85,7 @@ const LARGEST_PRELOAD: f32 = 2.0;
 /// What the rows of contacts are written from.
 pub(super) struct Writer<'a> {
     pub world: &'a World,
-    pub pairs: &'a [Pair],
+    pub detector: &'a Detector,
     pub config: &'a SolverConfig,
     /// Length of a substep [s].
     pub substep: f32,
@@ -116,7 +119,7 @@ impl Writer<'_> {
         // Headers first: they depend on nothing but their manifold, so the waits for memory overlap.
         for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
-            let pair = &self.pairs[source.pair as usize];
+            let pair = self.detector.pair(source.world, source.pair);
             if pair.computed_in > self.seen {
                 self.write_header(row, pair, &pair.manifolds[source.manifold as usize]);
             } else if let (Some(before), Some(from)) = (self.before, source.row_before) {
@@ -127,7 +130,7 @@ impl Writer<'_> {
         let mut next = 0;
         for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
-            let pair = &self.pairs[source.pair as usize];
+            let pair = self.detector.pair(source.world, source.pair);
             let own = next..next + source.points as usize + patch;
             next = own.end;
             let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);

@@ -89,7 +89,7 @@ mod tests {
         let reference = Box::new(Reference::<f32>::new());
         let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
         simulation.step(scene.dt).expect("a step");
-        let points: usize = simulation.pairs().iter().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
+        let points: usize = simulation.pairs().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
         assert!(points > 0);
         let world = simulation.world.clone();
         let mut count = |overlay: Overlay| lines(&mut simulation, overlay, 0.1).len() / 2;
