@@ -189,6 +189,12 @@ impl Simulation {
         self.sleep.asleep().get(body) == Some(&true)
     }
 
+    /// Wakes a body, if it sleeps, and all that lies still with it: for those who change what the next step cannot see, such as a
+    /// joint to the world.
+    pub fn wake(&mut self, body: usize) {
+        self.sleep.wake(body);
+    }
+
     /// Overlap of the world as it is now, from contacts computed anew. The next step is as if nobody had asked: towers of 60
     /// that stand for 20 s fall if their contacts are recomputed now and then, since reused contacts do not creep.
     pub fn penetration(&self) -> Penetration {

@@ -144,10 +144,10 @@ impl Sleep {
         self.count < before
     }
 
-    /// Wakes the island of a body that sleeps.
-    fn wake(&mut self, body: usize) {
+    /// Wakes the island of a body, if it sleeps.
+    pub fn wake(&mut self, body: usize) {
         let mut i = body;
-        while self.asleep[i] {
+        while self.asleep.get(i) == Some(&true) {
             self.asleep[i] = false;
             self.activity[i] = Activity::Awake;
             self.slow_for[i] = 0.0;

@@ -137,6 +137,24 @@ struct SceneArgs {
     json: bool,
 }
 
+/// What is run for its result may sleep; what is run for a comparison may not.
+#[derive(Args)]
+struct SleepArgs {
+    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
+    #[arg(long)]
+    no_sleep: bool,
+}
+
+impl SleepArgs {
+    fn apply(&self, config: &mut SolverConfig) {
+        if self.no_sleep {
+            config.sleep_after = 0.0;
+        } else if config.sleep_after == 0.0 {
+            config.sleep_after = 0.5;
+        }
+    }
+}
+
 impl SceneArgs {
     /// The scene with its step length, and the settings.
     fn load(&self) -> Result<(Scene, SolverConfig)> {

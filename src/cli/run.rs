@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, print, print_json, progress, step_with_contacts};
+use super::{SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
@@ -24,9 +24,8 @@ pub struct RunArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
-    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
-    #[arg(long)]
-    no_sleep: bool,
+    #[command(flatten)]
+    sleep: SleepArgs,
     /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
     #[arg(long, value_name = "N", default_value_t = 1)]
     worlds: usize,
@@ -83,11 +82,7 @@ impl RunArgs {
     pub fn run(&self) -> Result<()> {
         let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
-        if self.no_sleep {
-            config.sleep_after = 0.0;
-        } else if config.sleep_after == 0.0 {
-            config.sleep_after = 0.5;
-        }
+        self.sleep.apply(&mut config);
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;

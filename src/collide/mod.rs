@@ -135,6 +135,7 @@ impl Detector {
             center: b.center_of_mass(),
             v: b.linear_velocity,
             w: b.angular_velocity,
+            kinematic: b.kind == BodyKind::Kinematic,
         };
         world.bodies.par_iter().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
         self.detections += 1;

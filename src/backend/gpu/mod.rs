@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 
 use super::Backend;
 use crate::error::{Error, Result};
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, MomentumRow, PassColors, StepProblem};
 use shader::{BINDINGS, PASS_COLORS, SCRATCH, SCRATCH_ROW, WORKGROUP};
@@ -320,7 +320,7 @@ fn bind(device: &wgpu::Device, buffers: &[Option<wgpu::Buffer>], kernel: &Compil
 fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [u64; SCRATCH] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };
-    let sums = size_of::<f32>() * impulses.div_ceil(CHUNK);
+    let sums = size_of::<StepLength<f32>>() * impulses.div_ceil(CHUNK);
     [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums].map(|bytes| bytes as u64)
 }
 

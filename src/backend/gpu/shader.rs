@@ -27,7 +27,7 @@ pub const BINDINGS: [&str; 17] = [
     "free",
     "velocities_before",
     "impulse_steps",
-    "squares",
+    "lengths",
 ];
 /// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
 /// sweeps leave for each other.
