@@ -264,8 +264,10 @@ impl Pair {
             std::slice::from_ref(one)
         };
 
-        std::mem::swap(&mut self.manifolds, old);
-        self.manifolds.clear();
+        old.clear();
+        old.append(&mut self.manifolds);
+        // Most pairs have one manifold; by itself a vector would begin with room for four, a kilobyte too much.
+        self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
             candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], look)));
