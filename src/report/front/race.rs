@@ -1,9 +1,6 @@
 //! Contenders step one scene in turns, so that whatever slows the machine down meets all of them, and are scored by what
 //! they get wrong.
 
-use std::time::Instant;
-
-use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
@@ -11,6 +8,7 @@ use super::origin::Origin;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::metrics::{Penetration, drift, in_place_count, rms_speed};
+use crate::report::clock::Clock;
 use crate::scenes::Scene;
 use crate::stats::quantile;
 use crate::world::World;
@@ -53,8 +51,8 @@ pub struct Row {
     pub friction: String,
     /// What else is not at its default.
     pub more: String,
-    /// What times are of: `processor` time of the process where one thread does everything, so that what else the machine does
-    /// counts less; `wall` time with several threads and on a GPU.
+    /// What times are of: `processor` time of the process where one thread does everything, `wall` time with several threads and
+    /// on a GPU.
     pub clock: String,
     /// Time of a step, median over the blocks [ms].
     pub ms: f64,
@@ -138,18 +136,16 @@ pub fn race(
 ) -> Result<Vec<Row>> {
     let blocks = blocks(scene.steps);
     let run = Origin::now();
-    let start = Instant::now();
     let mut lanes: Vec<_> = contenders.iter().map(|_| Lane { finite: true, ..Lane::default() }).collect();
     for block in 0..blocks {
         for (contender, lane) in contenders.iter_mut().zip(&mut lanes) {
             if lane.finite {
-                let of = clock(&contender.setting(), origin);
-                let time = || if of == PROCESSOR { ProcessTime::now().as_duration() } else { start.elapsed() };
-                let begin = time();
+                let clock = Clock::of(&contender.setting().backend);
+                let begin = clock.now();
                 for _ in 0..BLOCK {
                     contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
                 }
-                let ms = (time() - begin).as_secs_f64() * 1e3 / f64::from(BLOCK);
+                let ms = (clock.now() - begin).as_secs_f64() * 1e3 / f64::from(BLOCK);
                 let world = contender.world();
                 lane.finite = world.first_non_finite().is_none();
                 if lane.finite && 2 * block >= blocks {
@@ -170,14 +166,6 @@ pub fn race(
         .collect())
 }
 
-/// Name of the clock that only this process moves.
-const PROCESSOR: &str = "processor";
-
-/// What the time of a contender is taken by, see [`Row::clock`].
-fn clock(setting: &Setting, origin: &Origin) -> &'static str {
-    if origin.threads == 1 && setting.backend != "gpu" { PROCESSOR } else { "wall" }
-}
-
 /// Blocks of a run of so many steps.
 pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(2)
@@ -194,7 +182,7 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
     let [ratio_low, ratio, ratio_high] = [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q));
     let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
     let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
-    let clock = clock(&setting, origin).into();
+    let clock = Clock::of(&setting.backend).name().into();
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {
         scene: scene.name.clone(),
