@@ -148,7 +148,7 @@ pub(super) struct Scratch {
 const RECYCLE_TURN: f32 = 2.5e-5;
 
 /// The same where one of them is moved by somebody, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
-/// slipped 2 degrees late, and a ball lost a quarter of its way.
+/// slipped 1.6 degrees late, and a ball lost a quarter of its way.
 const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
 
 /// How a pair was brought up to date.
@@ -264,8 +264,10 @@ impl Pair {
             std::slice::from_ref(one)
         };
 
-        std::mem::swap(&mut self.manifolds, old);
-        self.manifolds.clear();
+        old.clear();
+        old.append(&mut self.manifolds);
+        // Most pairs have one manifold; by itself a vector would begin with room for four, a kilobyte too much.
+        self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
             candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], look)));

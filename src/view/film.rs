@@ -8,11 +8,12 @@ use super::camera::{Bounds, Camera};
 use super::canvas::{Canvas, Picture};
 use super::colors::ColorBy;
 use super::mesh::{Poses, poses};
+use super::overlay::ropes;
 use super::renderer::Shot;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
-use crate::world::{BodyKind, Collider, World};
+use crate::world::{BodyKind, World};
 
 /// A world at one time.
 #[derive(Clone, Debug)]
@@ -142,7 +143,8 @@ impl Film {
         let container = self.scene.container.map(|(low, high)| Bounds { low, high });
         for frame in &self.frames {
             let colors = self.color.paint(world, &frame.values, scale);
-            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &[] };
+            let ropes = ropes(world, &frame.poses);
+            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };
             show(&canvas.draw(&shot)?)?;
         }
         Ok(())
@@ -161,10 +163,12 @@ pub fn bounds(world: &World) -> Bounds {
 }
 
 fn bounds_at(world: &World, poses: &Poses) -> Bounds {
-    let reach = |c: &Collider| c.position.length() + c.shape.bounding_radius();
     let moving = world.bodies.iter().zip(poses).filter(|(b, _)| b.kind != BodyKind::Fixed);
-    let around = moving.map(|(body, &(position, _))| {
-        Bounds::around(position, 1.5 * body.colliders.iter().map(reach).fold(0.0, f32::max))
+    let around = moving.map(|(body, &(position, rotation))| {
+        let bounds = body.colliders.iter().map(|c| c.bounds(position, rotation));
+        let body = bounds.fold(Bounds::EMPTY, |all, (low, high)| all.join(Bounds { low, high }));
+        let room = 0.25 * (body.high - body.low);
+        Bounds { low: body.low - room, high: body.high + room }
     });
     let hung = world.joints.iter().filter(|j| j.body_b.is_none());
     let anchors = hung.map(|j| Bounds::around(j.anchor_b, 0.0));

@@ -32,9 +32,10 @@ fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let pairs = live.simulation.pairs();
     let depth = Penetration::of(pairs.clone());
     // With those of sleepers, which the last step does not count.
-    let contacts = || pairs.clone().flat_map(|p| &p.manifolds);
-    let (manifolds, points) = (contacts().count(), contacts().map(|m| m.points().len()).sum::<usize>());
-    let colors = contacts().filter_map(|m| m.color).max().map_or(0, |c| c + 1);
+    let (manifolds, points, colors) =
+        pairs.flat_map(|p| &p.manifolds).fold((0, 0, 0), |(manifolds, points, colors), m| {
+            (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
+        });
     let world = &live.simulation.world;
     let total: f64 = live.stage_ms.iter().sum();
     egui::Grid::new("numbers").num_columns(2).show(ui, |ui| {
