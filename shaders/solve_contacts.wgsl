@@ -3,12 +3,17 @@
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.
 
+// How often a manifold is swept before the next one.
+override PASSES: u32 = 1u;
+
 fn solve_contact(i: u32) {
     let contact = contacts[i];
     var pair = load_pair(contact.body_a, contact.body_b);
-    if FRICTION != FRICTION_NONE && FRICTION_FIRST { sweep_friction(&pair, contact); }
-    sweep_normals(&pair, contact);
-    if FRICTION != FRICTION_NONE && !FRICTION_FIRST { sweep_friction(&pair, contact); }
+    for (var k = 0u; k < PASSES; k++) {
+        if FRICTION != FRICTION_NONE && FRICTION_FIRST { sweep_friction(&pair, contact); }
+        sweep_normals(&pair, contact);
+        if FRICTION != FRICTION_NONE && !FRICTION_FIRST { sweep_friction(&pair, contact); }
+    }
     store_pair(contact.body_a, contact.body_b, &pair);
 }
 

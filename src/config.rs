@@ -83,6 +83,18 @@ pub enum FrictionSweeps {
     Relax,
 }
 
+/// What is done with the sweeps of a substep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// One after another: projected Gauss-Seidel.
+    #[default]
+    Plain,
+    /// With Nesterov's momentum, and a restart as soon as steps grow. Pays from three sweeps on: the first two are the plain
+    /// ones.
+    Accelerated,
+}
+
 /// Settings of one step of the solver. The defaults hold every standing scene of the catalogue.
 ///
 /// ```
@@ -100,6 +112,10 @@ pub struct SolverConfig {
     pub iterations: u32,
     /// Sweeps without bias a substep, after the positions moved: they take out the velocity that the bias put in.
     pub relax: u32,
+    /// What is done with these sweeps.
+    pub method: Method,
+    /// How often a sweep goes over a manifold before the next one, 1 to 16. Two take fewer sweeps, each a longer one.
+    pub manifold_passes: u8,
     /// What is kept non-negative.
     pub clamping: Clamping,
     /// How overlap is removed.
@@ -166,12 +182,17 @@ pub struct SolverConfig {
     pub max_colors: u32,
 }
 
+/// Colors smaller than this share a workgroup, unless told otherwise.
+pub const FUSE_BELOW: u32 = 256;
+
 impl Default for SolverConfig {
     fn default() -> Self {
         Self {
             substeps: 8,
             iterations: 1,
             relax: 1,
+            method: Method::Plain,
+            manifold_passes: 1,
             clamping: Clamping::Accumulated,
             stabilization: Stabilization::Soft,
             baumgarte: 0.2,
@@ -196,7 +217,7 @@ impl Default for SolverConfig {
             recycle_distance: 0.02,
             sleep_after: 0.0,
             sleep_speed: 1e-2,
-            fuse_colors_below: 256,
+            fuse_colors_below: FUSE_BELOW,
             max_colors: 64,
         }
     }
@@ -261,6 +282,11 @@ impl SolverConfig {
                  set stabilization=baumgarte or none",
             ));
         }
+        if self.clamping == Clamping::PerCorrection && self.method == Method::Accelerated {
+            return Err(Error::input(
+                "clamping = per-correction with method = accelerated: momentum acts on accumulated impulses; set method=plain",
+            ));
+        }
         Ok(())
     }
 
@@ -279,6 +305,9 @@ impl SolverConfig {
         }
         if self.relax > 4096 {
             return refuse("relax", self.relax.into(), "0 to 4096");
+        }
+        if !(1..=16).contains(&self.manifold_passes) {
+            return refuse("manifold_passes", self.manifold_passes.into(), "1 to 16");
         }
         if !(1..=64).contains(&self.max_colors) {
             return refuse("max_colors", self.max_colors.into(), "1 to 64");

@@ -7,8 +7,11 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, SolverConfig};
+use crate::config::{
+    Clamping, FUSE_BELOW, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig,
+};
 use crate::kernels::Rules;
+use crate::kernels::momentum::CHUNK;
 use crate::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
     StepProblem,
@@ -35,6 +38,17 @@ pub enum Kernel {
         /// Whether it is the first.
         first: bool,
     },
+    /// Goes on in the direction of the last sweeps, or, `first`, only remembers where they begin; over bodies, points and joints.
+    Extrapolate {
+        /// Whether no sweep came before.
+        first: bool,
+        /// Whether it is left out where sweeps are no longer needed.
+        measured: bool,
+    },
+    /// How far the last sweep moved the impulses; over points and joints.
+    MeasureStep,
+    /// How far the next extrapolation goes.
+    UpdateMomentum,
     /// One sweep of the joints; over joint colors.
     SolveJoints(Rules),
     /// One sweep of the contacts; over contact colors.
@@ -55,6 +69,9 @@ impl Kernel {
             Self::WarmStartJoints => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
             Self::BeginSweep { .. } => "begin_sweep",
+            Self::Extrapolate { .. } => "extrapolate",
+            Self::MeasureStep => "measure_step",
+            Self::UpdateMomentum => "update_momentum",
             Self::SolveJoints(_) => "solve_joints",
             Self::SolveContacts(_) => "solve_contacts",
             Self::IntegratePositions => "integrate_positions",
@@ -94,6 +111,8 @@ impl fmt::Display for Kernel {
                 (r.friction_first, "first"),
                 (!r.accumulated, "clamped per correction"),
                 (r.round, "round"),
+                (r.driven, "driven"),
+                (r.passes > 1, "repeated"),
                 (r.measured, "measured"),
             ];
             let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
@@ -110,6 +129,16 @@ pub struct Pass {
     pub kernel: Kernel,
     /// The colors that it is done to; empty for a kernel over bodies. More than one are swept by one workgroup.
     pub colors: Range<u32>,
+}
+
+/// Some sweeps: which, how, and over which groups of colors.
+struct Sweeps<'a> {
+    method: Method,
+    range: Range<u32>,
+    /// Whether others may follow the last.
+    go_on: bool,
+    joints: &'a [Range<u32>],
+    contacts: &'a [Range<u32>],
 }
 
 /// The passes of one step.
@@ -137,8 +166,19 @@ impl StepPlan {
             friction_first: config.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.clamping == Clamping::Accumulated,
             round: problem.has_round_shapes(),
+            driven: false,
+            passes: config.manifold_passes,
             measured: config.tolerance > 0.0,
             biased: false,
+        };
+        // Momentum begins with the third sweep.
+        let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
+        let sweeps = |count: u32| Sweeps {
+            method: method(count),
+            range: 0..count,
+            go_on: false,
+            joints: &joints,
+            contacts: &contacts,
         };
         // Friction needs some sweep to happen in.
         let relax_only = config.friction_sweeps == FrictionSweeps::Relax && config.relax > 0;
@@ -164,14 +204,32 @@ impl StepPlan {
             } else {
                 plan.over_bodies(Kernel::ClearImpulses);
             }
-            plan.sweeps(config.iterations, biased, &joints, &contacts);
+            plan.sweeps(sweeps(config.iterations), biased);
             plan.over_bodies(Kernel::IntegratePositions);
-            plan.sweeps(config.relax, shared, &joints, &contacts);
+            plan.sweeps(sweeps(config.relax), shared);
         }
         if problem.has_restitution() {
             let rules = Rules { patch: shared.patch, ..Rules::default() };
             plan.over_colors(Kernel::ApplyRestitution(rules), &contacts);
         }
+        plan
+    }
+
+    /// Sweeps over a problem without time: what is wanted of the velocities stands in its rows, no body moves, and every
+    /// contact is hard. Every manifold is swept `passes` times before the next. `range` begins at 0, or where the sweeps of the run before ended.
+    pub fn of_sweeps(problem: &StepProblem, method: Method, passes: u8, range: Range<u32>) -> Self {
+        let driven = problem.points.iter().any(|p| p.slip_1 != 0.0 || p.slip_2 != 0.0);
+        let rules = Rules {
+            biased: problem.points.iter().any(|p| p.separation < 0.0),
+            friction: if problem.has_friction() { FrictionRule::Disc } else { FrictionRule::None },
+            driven: driven && problem.has_friction(),
+            passes,
+            ..Rules::default()
+        };
+        let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
+        let joints = color_groups(&problem.colors, problem.joint_colors(), FUSE_BELOW);
+        let mut plan = Self::default();
+        plan.sweeps(Sweeps { method, range, go_on: true, joints: &joints, contacts: &contacts }, rules);
         plan
     }
 
@@ -184,13 +242,23 @@ impl StepPlan {
     /// that it leaves in a buffer: nothing is read back. A pile of 500 with up to 16 sweeps a substep and 1e-2 m/s took 0.66
     /// of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch was not taken: each such call
     /// adds a validating dispatch of its own, about the price of the empty one that it saves.
-    fn sweeps(&mut self, count: u32, rules: Rules, joints: &[Range<u32>], contacts: &[Range<u32>]) {
-        for sweep in 0..count {
-            if rules.measured {
-                self.over_bodies(Kernel::BeginSweep { first: sweep == 0 });
+    fn sweeps(&mut self, sweeps: Sweeps, rules: Rules) {
+        let measured = rules.measured;
+        for sweep in sweeps.range.clone() {
+            let first = sweep == 0;
+            if measured {
+                self.over_bodies(Kernel::BeginSweep { first });
             }
-            self.over_colors(Kernel::SolveJoints(rules.of_joints()), joints);
-            self.over_colors(Kernel::SolveContacts(rules), contacts);
+            let accelerated = sweeps.method == Method::Accelerated;
+            if accelerated {
+                self.over_bodies(Kernel::Extrapolate { first, measured });
+            }
+            self.over_colors(Kernel::SolveJoints(rules.of_joints()), sweeps.joints);
+            self.over_colors(Kernel::SolveContacts(rules), sweeps.contacts);
+            if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
+                self.over_bodies(Kernel::MeasureStep);
+                self.over_bodies(Kernel::UpdateMomentum);
+            }
         }
     }
 
@@ -228,6 +296,10 @@ impl Pass {
             }
             Kernel::ClearImpulses => problem.impulses.len() * 2 * IMPULSE,
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
+            // Reads and writes what was before, and writes where the sweep begins.
+            Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
+            Kernel::MeasureStep => 2 * IMPULSE * problem.impulse_count(),
+            Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<f32>(),
             Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {

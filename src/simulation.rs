@@ -75,12 +75,48 @@ impl Simulation {
     /// The backend cannot run the step; the world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
+        if self.begin_step(dt, &mut stats) {
+            self.end_step(dt, &mut stats)?;
+        }
+        Ok(stats)
+    }
+
+    /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
+    /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`], or the world has joints, which a contact problem has not.
+    pub fn step_with_contacts(&mut self, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
+        if !self.world.joints.is_empty() {
+            let joints = self.world.joints.len();
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+        }
+        let mut stats = StepStats::default();
+        if !self.begin_step(dt, &mut stats) {
+            return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
+        }
+        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
+        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.problem.clone();
+        Reference::<f32>::new().run(&mut problem, &first)?;
+        let contacts = ContactProblem::of_step(name.into(), &problem);
+        self.end_step(dt, &mut stats)?;
+        Ok((contacts, stats))
+    }
+
+    /// Assembles a step; false if there is nothing to do in it.
+    fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> bool {
         timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
         if self.sleep.is_everything_still() {
             stats.asleep = self.sleep.count();
-            return Ok(stats);
+            return false;
         }
-        self.assemble(dt, &mut stats);
+        self.assemble(dt, stats);
+        true
+    }
+
+    /// Runs and stores what is assembled.
+    fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
         timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
@@ -90,7 +126,7 @@ impl Simulation {
         });
         stats.asleep = self.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
-        Ok(stats)
+        Ok(())
     }
 
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
@@ -98,24 +134,6 @@ impl Simulation {
         self.sleep.before_step(&self.world, self.detector.pairs());
         self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
-    }
-
-    /// What the first substep of the next step of `dt` seconds asks of the velocities, as a contact problem by itself:
-    /// [`ContactProblem::of_step`]. The world stays as it is.
-    ///
-    /// # Errors
-    /// The world has joints, which a contact problem has not.
-    pub fn next_contacts(&mut self, name: &str, dt: f32) -> Result<ContactProblem> {
-        if !self.world.joints.is_empty() {
-            let joints = self.world.joints.len();
-            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
-        }
-        self.next_problem(dt);
-        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
-        let mut problem = self.problem.clone();
-        Reference::<f32>::new().run(&mut problem, &first)?;
-        Ok(ContactProblem::of_step(name.into(), &problem))
     }
 
     /// Detects, colors, prepares and plans.

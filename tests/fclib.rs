@@ -8,7 +8,8 @@ use std::process::{Command, Output};
 
 use common::contacts::{sweeps_to, tower};
 use drystone::ContactProblem;
-use drystone::solver::{Method, Order};
+use drystone::config::Method;
+use drystone::solver::Order;
 
 fn run(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
@@ -33,7 +34,7 @@ fn an_exported_problem_is_the_same_problem() {
     let read = ContactProblem::read(folder.path().join("tower.hdf5")).expect("read");
     assert_eq!(read.name, problem.name);
     for method in [Method::Plain, Method::Accelerated] {
-        let sweeps = |p| sweeps_to::<f64>(p, (method, Order::Contacts), &[1e-1, 1e-2, 1e-3], 5000);
+        let sweeps = |p| sweeps_to(p, (method, Order::Contacts), None, &[1e-1, 1e-2, 1e-3], 5000);
         let expected = sweeps(&problem);
         assert!(expected.iter().all(Option::is_some));
         assert_eq!(sweeps(&read), expected, "{method:?}");
@@ -49,7 +50,7 @@ fn a_step_of_a_scene_is_exported_and_solved() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let pile = ContactProblem::read(folder.path().join("pile.hdf5")).expect("read");
     assert!(pile.name == "pile, step 60" && pile.bodies.len() == 27 && pile.contacts.len() > 27, "{}", pile.name);
-    let sweeps = sweeps_to::<f64>(&pile, (Method::Accelerated, Order::Manifolds), &[1e-6], 20_000);
+    let sweeps = sweeps_to(&pile, (Method::Accelerated, Order::Manifolds), None, &[1e-6], 20_000);
     assert!(sweeps[0].is_some(), "{} contacts", pile.contacts.len());
 }
 

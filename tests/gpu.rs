@@ -74,7 +74,7 @@ fn mixture() -> Scene {
 }
 
 /// Settings that differ from the defaults in one rule each.
-const RULES: [&[&str]; 14] = [
+const RULES: [&[&str]; 17] = [
     &[],
     &["friction=none"],
     &["friction=slip"],
@@ -86,6 +86,9 @@ const RULES: [&[&str]; 14] = [
     &["relax=0", "stabilization=none", "clamping=per-correction"],
     &["tolerance=0.01", "iterations=4", "relax=4"],
     &["relaxation=1.3"],
+    &["manifold_passes=2"],
+    &["method=accelerated", "iterations=6", "relax=5"],
+    &["method=accelerated", "iterations=8", "relax=0", "friction_at=manifold", "tolerance=0.01"],
     &["warm_start=false"],
     &["max_colors=2"],
     &["substeps=1", "iterations=10", "fuse_colors_below=0"],

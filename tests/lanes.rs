@@ -49,14 +49,17 @@ fn the_portable_lanes_have_the_same_bits() {
 
 #[test]
 fn every_rule_has_the_same_bits() {
-    let rules: [&[&str]; 8] = [
+    let rules: [&[&str]; 11] = [
         &["friction=none"],
         &["friction=slip"],
+        &["manifold_passes=3"],
         &["friction=box"],
         &["friction_at=manifold"],
         &["friction_order=friction-first", "friction_sweeps=all"],
         &["stabilization=baumgarte", "relax=0", "clamping=per-correction"],
         &["tolerance=0.001", "iterations=8"],
+        &["method=accelerated", "iterations=6", "relax=5"],
+        &["method=accelerated", "tolerance=0.001", "iterations=8", "friction_at=manifold"],
         &["relaxation=1.2", "max_colors=2"],
     ];
     for settings in rules {

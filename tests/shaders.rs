@@ -7,7 +7,7 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use common::kernels::{every_kernel, every_rules};
-use drystone::backend::gpu::shader::{BINDINGS, Reflected, UNIFORMS, WORKGROUP, constants, source};
+use drystone::backend::gpu::shader::{BINDINGS, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source};
 use drystone::kernels::Rules;
 use drystone::plan::Kernel;
 
@@ -26,7 +26,7 @@ mod layouts {
     use super::*;
     use drystone::problem::{
         BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-        Params, PassColors, PointRow, Softness,
+        MomentumRow, Params, PassColors, PointRow, Softness,
     };
 
     const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
@@ -50,6 +50,14 @@ mod layouts {
         };
     }
 
+    /// Stays on the device: Rust knows only how long it is.
+    #[repr(C)]
+    struct Step {
+        before: [f32; 4],
+        begin: [f32; 4],
+    }
+    const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
+
     /// The layout of each row, under the name of its twin.
     fn in_rust() -> BTreeMap<String, Layout> {
         layouts! {
@@ -64,11 +72,13 @@ mod layouts {
             Joint = JointRow { r_a body_a r_b body_b gap }
             JointImpulse = JointImpulseRow { linear }
             Convergence = ConvergenceRow { moving done sweeps planned }
+            Step = Step { before begin }
+            Momentum = MomentumRow { t factor square restarts }
             Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
             Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
             Params = Params {
                 substep inverse_substep restitution_threshold inertia_count movable fixed joint
-                body_count point_count slop relaxation tolerance
+                body_count point_count slop relaxation tolerance joint_count
             }
             PassColors = PassColors { first end }
         }

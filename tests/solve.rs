@@ -44,7 +44,7 @@ fn a_solve_reports_on_itself_as_json() {
         (&"tower of 10".into(), &10.into(), &40.into())
     );
     assert_eq!(
-        (&report["method"], &report["order"], &report["precision"]),
+        (&report["method"], &report["order"], &report["backend"]),
         (&"plain".into(), &"contacts".into(), &"f64".into())
     );
     assert_eq!((&report["colors"], &report["sweeps"]), (&8.into(), &100.into()));
@@ -60,8 +60,10 @@ fn a_solve_reports_on_itself_as_json() {
 fn a_tolerance_ends_the_sweeps() {
     let report = json("tower.contacts --tolerance 1e-2 --order contacts");
     assert_eq!((&report["method"], &report["sweeps"]), (&"accelerated".into(), &48.into()));
-    let rounded = json("tower.contacts --tolerance 1e-2 --precision f32");
+    let rounded = json("tower.contacts --tolerance 1e-2 --backend cpu");
     assert!(rounded["sweeps"].as_u64() < Some(60) && rounded["colors"] == 3, "{rounded}");
+    assert_eq!(rounded["backend"], "cpu");
+    assert!(rounded["adapter"].as_str().is_some_and(|name| name.contains("8 lanes")), "{rounded}");
 }
 
 #[test]
@@ -75,6 +77,40 @@ fn a_solve_reports_on_itself_as_rows() {
     let rows: Vec<_> = printed.lines().filter(|line| line.trim().starts_with(char::is_numeric)).collect();
     assert_eq!(rows.len(), 7);
     assert!(rows.iter().all(|row| row.split_whitespace().count() == 11), "{printed}");
+}
+
+#[test]
+fn a_step_of_a_run_is_saved_and_solved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drystone = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        command.args(arguments.split(' ')).current_dir(folder.path()).output().expect("it starts")
+    };
+    let output = drystone("run pile -p n=40 --steps 90 --no-sleep --save-problem 90:pile.contacts --backend cpu");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let output = drystone("solve pile.contacts --tolerance 1e-6 --json");
+    let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!((&report["problem"], &report["bodies"]), (&"pile, step 90".into(), &40.into()));
+    assert!(report["contacts"].as_u64() > Some(100) && report["reached"][3]["sweeps"].is_number(), "{report}");
+    let last = report["curve"].as_array().and_then(|rows| rows.last()).expect("a row");
+    assert!(last["e_vel"].as_f64() < Some(1e-6), "{last}");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "something half-written stays");
+
+    for (arguments, named) in [
+        ("run pile --steps 10 --save-problem 11:x", &["--save-problem 11:x", "1 to 10"][..]),
+        ("run pile --steps 10 --save-problem 0:x", &["1 to 10"]),
+        ("run chain --steps 10 --save-problem 1:x", &["chain", "joints"]),
+        ("run pile --steps 1 --save-problem 1:nowhere/x", &["nowhere/x"]),
+    ] {
+        let output = drystone(arguments);
+        let line = text(&output.stderr).lines().last().expect("a line");
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {line}");
+        assert!(named.iter().all(|part| line.contains(part)), "{arguments}: {line}");
+    }
+    for usage in ["run pile --save-problem 3", "run pile --save-problem x:y", "run pile --save-problem 3:"] {
+        assert_eq!(drystone(usage).status.code(), Some(2), "{usage}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "what was refused left something");
 }
 
 #[test]

@@ -12,7 +12,11 @@
 @group(0) @binding(9) var<storage, read> joints: array<Joint>;
 @group(0) @binding(10) var<storage, read_write> joint_impulses: array<JointImpulse>;
 @group(0) @binding(11) var<storage, read_write> convergence: Convergence;
-// Stays on the device: every step writes it before it reads it.
-@group(0) @binding(12) var<storage, read_write> free: array<Free>;
+@group(0) @binding(12) var<storage, read_write> momentum: Momentum;
+// These stay on the device: every step writes them before it reads them.
+@group(0) @binding(13) var<storage, read_write> free: array<Free>;
+@group(0) @binding(14) var<storage, read_write> velocities_before: array<Free>;
+@group(0) @binding(15) var<storage, read_write> impulse_steps: array<Step>;
+@group(0) @binding(16) var<storage, read_write> squares: array<f32>;
 
 const WORKGROUP: u32 = 64u;

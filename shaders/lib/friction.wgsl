@@ -4,6 +4,7 @@
 override FRICTION: u32 = 3u;
 override PATCH: bool = false;
 override FRICTION_FIRST: bool = false;
+override DRIVEN: bool = false;
 
 const FRICTION_NONE: u32 = 0u;
 const FRICTION_SLIP: u32 = 1u;
@@ -25,8 +26,12 @@ fn allowed_friction(y: vec2f, limit: f32) -> vec2f {
 fn solve_friction(pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
     let u = relative_velocity(pair, point.r_a, point.r_b);
-    let u_1 = dot3(u, contact.tangent);
-    let u_2 = dot3(u, tangent_2);
+    var u_1 = dot3(u, contact.tangent);
+    var u_2 = dot3(u, tangent_2);
+    if DRIVEN {
+        u_1 += point.slip_1;
+        u_2 += point.slip_2;
+    }
     let limit = contact.friction * normal_impulse;
     let mass = params.relaxation * point.tangent_mass;
     var sum: vec2f;

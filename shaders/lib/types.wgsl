@@ -33,6 +33,10 @@ struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
 struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
 
+struct Step { before: vec3f, begin: vec3f }
+
+struct Momentum { t: f32, factor: f32, square: f32, restarts: u32 }
+
 struct Softness { bias_rate: f32, mass_scale: f32, impulse_scale: f32, push_limit: f32 }
 
 struct Params {
@@ -41,7 +45,7 @@ struct Params {
     fixed: Softness,
     joint: Softness,
     body_count: u32, point_count: u32, slop: f32, relaxation: f32,
-    tolerance: f32,
+    tolerance: f32, joint_count: u32,
 }
 
 // The colors that one dispatch sweeps, one after another.

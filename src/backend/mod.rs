@@ -18,7 +18,8 @@ pub trait Backend: Send {
     /// What it runs on, for people.
     fn adapter(&self) -> String;
 
-    /// Runs the passes in order; `bodies` and `impulses` of the problem are what they leave behind.
+    /// Runs the passes in order; `bodies` and `impulses` of the problem are what they leave behind. What accelerated sweeps
+    /// leave for each other is kept: the next run may go on with more sweeps of the same problem.
     ///
     /// # Errors
     /// The problem does not fit the device, or the device is lost.

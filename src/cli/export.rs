@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::print;
+use super::{step_with_contacts, print};
 use crate::backend::cpu::Cpu;
 use crate::config::SolverConfig;
 use crate::contacts::ContactProblem;
@@ -55,15 +55,10 @@ impl ExportArgs {
             return Err(Error::input(format!("{}: which step of the scene? Say --step N", self.source)));
         };
         let scene = Scene::find(&self.source, &self.parameter)?;
-        let name = format!("{}, step {step}", scene.name);
         let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()))?;
         for _ in 1..step {
             simulation.step(scene.dt)?;
         }
-        let problem = simulation.next_contacts(&name, scene.dt)?;
-        match problem.contacts.is_empty() {
-            true => Err(Error::input(format!("{name}: nothing touches"))),
-            false => Ok(problem),
-        }
+        Ok(step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?.0)
     }
 }

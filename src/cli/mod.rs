@@ -19,9 +19,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::config::SolverConfig;
+use crate::config::{Method, SolverConfig};
+use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::stats::StepStats;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -102,6 +105,9 @@ struct SceneArgs {
     /// Relax sweeps of a substep.
     #[arg(long)]
     relax: Option<u32>,
+    /// What is done with the sweeps of a substep.
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Any setting of the solver, as key=value; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -131,6 +137,7 @@ impl SceneArgs {
                 config.set(&format!("{name}={value}"))?;
             }
         }
+        config.method = self.method.unwrap_or(config.method);
         config.check()?;
         let mut scene = Scene::find(&self.scene, &self.parameter)?;
         if let Some(dt) = self.dt {
@@ -149,6 +156,20 @@ impl SceneArgs {
         // Fails only if it was set before, which nothing does.
         // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+    }
+}
+
+/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
+fn step_with_contacts(
+    simulation: &mut Simulation,
+    scene: &str,
+    dt: f32,
+    number: u32,
+) -> Result<(ContactProblem, StepStats)> {
+    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
+    match problem.contacts.is_empty() {
+        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
+        false => Ok((problem, stats)),
     }
 }
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{print, progress};
-use crate::error::Result;
-use crate::report::{RUNS, rules};
+use crate::error::{Error, Result};
+use crate::report::{RUNS, convergence, rules};
 
 /// Arguments of `drystone report`.
 #[derive(Args)]
@@ -17,12 +17,17 @@ pub struct ReportArgs {
     /// Directory that the page and its pictures are written into.
     #[arg(long, default_value = "docs")]
     out: PathBuf,
+    /// Directory of contact problems that are solved besides those of the catalogue; for convergence.
+    #[arg(long, value_name = "DIR")]
+    problems: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Page {
     /// What each rule of the course sheet does.
     Rules,
+    /// How many sweeps contact problems take to which error.
+    Convergence,
 }
 
 impl ReportArgs {
@@ -35,6 +40,17 @@ impl ReportArgs {
                 bar.finish_and_clear();
                 report.write(&self.out)?;
                 print(self.out.join("rules.md").display())
+            }
+            Page::Convergence => {
+                let bar = progress(0, false);
+                let page = convergence(self.problems.as_deref(), |problems| {
+                    bar.set_length(problems as u64);
+                    bar.inc(1);
+                })?;
+                bar.finish_and_clear();
+                let path = self.out.join("convergence.md");
+                std::fs::write(&path, page).map_err(Error::file(&path))?;
+                print(path.display())
             }
         }
     }

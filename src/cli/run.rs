@@ -1,14 +1,16 @@
 //! `drystone run`.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, print, print_json, progress};
+use super::{SceneArgs, step_with_contacts, print, print_json, progress};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
+use crate::scenes::Scene;
 use crate::simulation::Simulation;
 
 /// Arguments of `drystone run`.
@@ -31,12 +33,50 @@ pub struct RunArgs {
     /// Write every K-th step.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
+    /// Write what step STEP (1 is the first) asks of the velocities as a contact problem, for `drystone solve`.
+    #[arg(long, value_name = "STEP:FILE")]
+    save_problem: Option<SaveProblem>,
+}
+
+/// Which step to save as a contact problem, and where.
+#[derive(Clone, Debug)]
+struct SaveProblem {
+    step: u32,
+    file: PathBuf,
+}
+
+impl FromStr for SaveProblem {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+        let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
+        let step = step.parse().map_err(|_| "STEP must be a whole number")?;
+        if file.is_empty() { Err("FILE is missing") } else { Ok(Self { step, file: file.into() }) }
+    }
+}
+
+impl SaveProblem {
+    /// Refuses what could not be saved, before anything runs.
+    fn check(&self, scene: &Scene) -> Result<()> {
+        let (step, file, steps) = (self.step, self.file.display(), scene.steps);
+        if !(1..=steps).contains(&step) {
+            return Err(Error::input(format!("--save-problem {step}:{file}: the run has steps 1 to {steps}")));
+        }
+        if !scene.world.joints.is_empty() {
+            let (name, joints) = (&scene.name, scene.world.joints.len());
+            return Err(Error::input(format!(
+                "--save-problem {step}:{file}: {name} has {joints} joints, which a contact problem has not"
+            )));
+        }
+        Ok(())
+    }
 }
 
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
         let (scene, mut config) = self.scene.load()?;
+        self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         if self.no_sleep {
             config.sleep_after = 0.0;
         } else if config.sleep_after == 0.0 {
@@ -51,7 +91,15 @@ impl RunArgs {
         let bar = progress(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
-                report.add(&simulation.step(scene.dt)?);
+                let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
+                    Some(save) => {
+                        let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
+                        problem.write(&save.file)?;
+                        stats
+                    }
+                    None => simulation.step(scene.dt)?,
+                };
+                report.add(&stats);
                 bar.inc(1);
             }
             if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {

@@ -5,13 +5,29 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{print, print_json};
+use crate::backend::{BackendChoice, choose};
+use crate::config::Method;
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::report::{CurveRow, SolveReport, SolveSettings};
-use crate::solver::{Method, Order, Precision};
+use crate::solver::Order;
 
 /// Most sweeps where a tolerance says when to end.
 const MOST_SWEEPS: u32 = 40_000;
+
+/// What runs the sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum Numbers {
+    /// The reference in double precision.
+    #[default]
+    F64,
+    /// The reference, one manifold at a time on one thread, in single precision.
+    Reference,
+    /// Eight manifolds at a time, in single precision.
+    Cpu,
+    /// The compute shaders, in single precision.
+    Gpu,
+}
 
 /// Arguments of `drystone solve`.
 #[derive(Args)]
@@ -25,14 +41,20 @@ pub struct SolveArgs {
     #[arg(long, value_name = "ERROR", conflicts_with = "sweeps")]
     tolerance: Option<f64>,
     /// What is done with the sweeps.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value = "accelerated")]
     method: Method,
     /// In which order they go over the contacts.
     #[arg(long, value_enum, default_value_t)]
     order: Order,
-    /// In which numbers they calculate; errors are always measured in f64.
+    /// How often they go over a manifold before the next one; unless told, 2 by manifolds and 1 by contacts.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=16))]
+    passes: Option<u8>,
+    /// What runs them; errors are always measured in f64.
     #[arg(long, value_enum, default_value_t)]
-    precision: Precision,
+    backend: Numbers,
+    /// Ask the GPU for the reference's results to the last bit.
+    #[arg(long)]
+    exact: bool,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -48,11 +70,19 @@ impl SolveArgs {
         let settings = SolveSettings {
             method: self.method,
             order: self.order,
-            precision: self.precision,
+            passes: self.passes.unwrap_or(self.order.passes()),
             sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps },
             tolerance: self.tolerance.unwrap_or(0.0),
         };
-        let report = SolveReport::new(&problem, &settings);
+        let choice = match self.backend {
+            Numbers::F64 => None,
+            Numbers::Reference => Some(BackendChoice::Reference),
+            Numbers::Cpu => Some(BackendChoice::Cpu),
+            Numbers::Gpu => Some(BackendChoice::Gpu),
+        };
+        let backend =
+            choice.map(|c| choose(c, problem.bodies.len(), self.exact)).transpose()?.map(|(backend, _)| backend);
+        let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;
         } else {
@@ -68,8 +98,8 @@ impl SolveArgs {
 
 fn print_table(r: &SolveReport) -> Result<()> {
     print(format_args!("{}: {} bodies, {} contacts, {} colors", r.problem, r.bodies, r.contacts, r.colors))?;
-    let words = format!("{:?} sweeps by {:?} in {:?}", r.method, r.order, r.precision).to_lowercase();
-    print(format_args!("{words}: {} in {:.3} ms", r.sweeps, r.ms))?;
+    let words = format!("{:?} sweeps by {:?}", r.method, r.order).to_lowercase();
+    print(format_args!("{words}: {} in {:.3} ms on {}: {}", r.sweeps, r.ms, r.backend, r.adapter))?;
     let names = ["e_vel", "e_fclib", "vmax m/s", "contact", "pen m/s", "compl J", "cone N s", "diss J", "eom"];
     print(format_args!(" sweeps         ms{}", names.map(|name| format!(" {name:>8}")).concat()))?;
     for CurveRow { sweeps, ms, residuals: x } in &r.curve {

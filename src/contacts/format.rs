@@ -56,7 +56,7 @@ impl ContactProblem {
         Ok(problem)
     }
 
-    /// Into a file.
+    /// Into a file: whole or not at all.
     ///
     /// # Errors
     /// It cannot be written.

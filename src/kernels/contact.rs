@@ -121,16 +121,18 @@ pub fn solve_contact<L: Lane>(
     impulses: &mut [Impulse<L>],
 ) {
     let has_friction = rules.friction != FrictionRule::None;
-    if has_friction && rules.friction_first {
-        sweep_friction(rules, params, pair, contact, points, impulses);
-    }
     let softness = pair_softness(params, pair);
     let contact_points = rules.contact_points(points.len());
-    for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
-        solve_normal(rules, params, &softness, pair, contact, point, impulse);
-    }
-    if has_friction && !rules.friction_first {
-        sweep_friction(rules, params, pair, contact, points, impulses);
+    for _ in 0..rules.passes {
+        if has_friction && rules.friction_first {
+            sweep_friction(rules, params, pair, contact, points, impulses);
+        }
+        for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
+            solve_normal(rules, params, &softness, pair, contact, point, impulse);
+        }
+        if has_friction && !rules.friction_first {
+            sweep_friction(rules, params, pair, contact, points, impulses);
+        }
     }
 }
 

@@ -40,8 +40,12 @@ pub fn solve_friction<L: Lane>(
 ) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
     let u = relative_velocity(pair, point.r_a, point.r_b);
-    let u_1 = dot3(u, contact.tangent);
-    let u_2 = dot3(u, tangent_2);
+    let mut u_1 = dot3(u, contact.tangent);
+    let mut u_2 = dot3(u, tangent_2);
+    if rules.driven {
+        u_1 = u_1 + point.slip_1;
+        u_2 = u_2 + point.slip_2;
+    }
     let limit = contact.friction * normal_impulse;
     let mass = params.relaxation * point.tangent_mass;
     let sum = if rules.friction == FrictionRule::Slip {

@@ -1,17 +1,22 @@
 //! The Rust doubles of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
 //!
 //! `pair`, `contact`, `friction` and `joint` are the doubles of the parts of that name in `shaders/lib` and of the kernels
-//! that sweep constraints, `integrate` of those that go over bodies. Branches on data are `select`s; branches on rules are
+//! that sweep constraints, `integrate` of those that go over bodies, `momentum` of those between accelerated sweeps. Branches on data are `select`s; branches on rules are
 //! plain `if`s, as overrides are in WGSL.
 
 pub mod contact;
 pub mod friction;
 pub mod integrate;
 pub mod joint;
+pub mod momentum;
 pub mod pair;
 mod rows;
+mod state;
 
-pub use rows::{Body, Contact, Free, Impulse, Inertia, Joint, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+pub use rows::{
+    Body, Contact, Free, Impulse, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, Step, StepParams, Sym3,
+};
+pub use state::Rows;
 
 use crate::config::FrictionRule;
 
@@ -30,6 +35,11 @@ pub struct Rules {
     pub accumulated: bool,
     /// Whether any surface is round.
     pub round: bool,
+    /// How often a manifold is swept before the next one, 1 or more.
+    pub passes: u8,
+    /// Whether surfaces slip by themselves, as a belt does: friction at points is then against `slip_1` and `slip_2`, a
+    /// velocity added to that of the bodies [m/s]. With box or disc friction only.
+    pub driven: bool,
     /// Whether corrections are held against the tolerance.
     pub measured: bool,
 }
@@ -44,6 +54,8 @@ impl Default for Rules {
             friction_first: false,
             accumulated: true,
             round: false,
+            driven: false,
+            passes: 1,
             measured: false,
         }
     }

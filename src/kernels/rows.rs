@@ -1,7 +1,9 @@
 //! The rows of a problem as the kernels see them: over a lane, without padding.
 
 use crate::math::{Lane, Quat, Scalar, Vec3, dot3, vec3};
-use crate::problem::{BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, Params, PointRow, Softness};
+use crate::problem::{
+    BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness,
+};
 
 /// Double of the WGSL struct `Body`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -130,6 +132,28 @@ pub struct Impulse<L> {
     pub peak: L,
 }
 
+/// Double of the WGSL struct `Step`: one impulse between two accelerated sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step<L> {
+    /// After the sweep before.
+    pub before: Vec3<L>,
+    /// Where the sweep begins.
+    pub begin: Vec3<L>,
+}
+
+/// Double of the WGSL struct `Momentum`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Momentum<L> {
+    /// t_k.
+    pub t: L,
+    /// (t_k-1 - 1)/t_k.
+    pub factor: L,
+    /// f_k².
+    pub square: L,
+    /// How often momentum ended so far.
+    pub restarts: u32,
+}
+
 /// Double of the WGSL struct `Softness`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SoftnessOf<L> {
@@ -205,6 +229,19 @@ impl<S: Scalar> Mass<S> {
     }
 }
 
+impl<S: Scalar> Mass<S> {
+    /// To storage.
+    pub fn store(&self) -> MassRow {
+        MassRow {
+            inv_inertia_x: self.inv_inertia.x.store(),
+            inv_mass: self.inv_mass.to_f32(),
+            inv_inertia_yz: self.inv_inertia.yz.store(),
+            acceleration: self.acceleration.store(),
+            ..MassRow::default()
+        }
+    }
+}
+
 impl<S: Scalar> Inertia<S> {
     /// From storage.
     pub fn load(r: &InertiaRow) -> Self {
@@ -224,6 +261,14 @@ impl<S: Scalar> Contact<S> {
         let (normal, tangent) = (Vec3::load(r.normal), Vec3::load(r.tangent));
         Self { normal, tangent, friction, restitution, radius_a, radius_b }
     }
+
+    /// To storage, indices left out.
+    pub fn store(&self) -> ContactRow {
+        let [friction, restitution, radius_a, radius_b] =
+            [self.friction, self.restitution, self.radius_a, self.radius_b].map(S::to_f32);
+        let (normal, tangent) = (self.normal.store(), self.tangent.store());
+        ContactRow { normal, friction, tangent, restitution, radius_a, radius_b, ..ContactRow::default() }
+    }
 }
 
 impl<S: Scalar> Point<S> {
@@ -233,6 +278,15 @@ impl<S: Scalar> Point<S> {
             [r.separation, r.normal_mass, r.tangent_mass, r.approach_velocity, r.slip_1, r.slip_2].map(S::from_f32);
         let (r_a, r_b) = (Vec3::load(r.r_a), Vec3::load(r.r_b));
         Self { r_a, r_b, separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 }
+    }
+
+    /// To storage.
+    pub fn store(&self) -> PointRow {
+        let [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2] =
+            [self.separation, self.normal_mass, self.tangent_mass, self.approach_velocity, self.slip_1, self.slip_2]
+                .map(S::to_f32);
+        let (r_a, r_b) = (self.r_a.store(), self.r_b.store());
+        PointRow { r_a, r_b, separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 }
     }
 }
 
@@ -255,6 +309,20 @@ impl<S: Scalar> Impulse<S> {
         let [normal, tangent_1, tangent_2, peak] =
             [self.normal, self.tangent_1, self.tangent_2, self.peak].map(S::to_f32);
         ImpulseRow { normal, tangent_1, tangent_2, peak }
+    }
+}
+
+impl<S: Scalar> Momentum<S> {
+    /// From storage.
+    pub fn load(r: &MomentumRow) -> Self {
+        let [t, factor, square] = [r.t, r.factor, r.square].map(S::from_f32);
+        Self { t, factor, square, restarts: r.restarts }
+    }
+
+    /// To storage.
+    pub fn store(&self) -> MomentumRow {
+        let [t, factor, square] = [self.t, self.factor, self.square].map(S::to_f32);
+        MomentumRow { t, factor, square, restarts: self.restarts }
     }
 }
 

@@ -190,6 +190,20 @@ pub struct ConvergenceRow {
     pub planned: u32,
 }
 
+/// How far accelerated sweeps extrapolate, 16 B. Written between them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MomentumRow {
+    /// 1 without momentum, and more with every sweep that does not end it.
+    pub t: f32,
+    /// How far the next sweep is extrapolated, as a share of the last step; 0 after a restart.
+    pub factor: f32,
+    /// Norm of the last sweep's change of all impulses, squared [N² s²].
+    pub square: f32,
+    /// Steps that grew and ended the momentum, over the whole step.
+    pub restarts: u32,
+}
+
 /// The impulses of one point, accumulated over the substeps' sweeps, 16 B [N s].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -258,8 +272,10 @@ pub struct Params {
     pub relaxation: f32,
     /// Corrections that change a relative velocity by less count as none [m/s].
     pub tolerance: f32,
+    /// Number of joints.
+    pub joint_count: u32,
     #[doc(hidden)]
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 /// The colors that one dispatch sweeps, one after another.

@@ -8,15 +8,15 @@ pub mod softness;
 mod store;
 
 pub use layout::{
-    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
-    PassColors, PointRow, Softness,
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+    MomentumRow, Params, PassColors, PointRow, Softness,
 };
 pub use prepare::Prepared;
 
 use std::ops::Range;
 
 /// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
-/// `joint_impulses`, `convergence`).
+/// `joint_impulses`, `convergence`, `momentum`).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepProblem {
     /// The same for all.
@@ -43,6 +43,8 @@ pub struct StepProblem {
     pub joint_impulses: Vec<JointImpulseRow>,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
+    /// How far the sweeps extrapolate.
+    pub momentum: MomentumRow,
 }
 
 impl StepProblem {
@@ -74,6 +76,11 @@ impl StepProblem {
         let begins = |contact: usize| self.contacts.get(contact).map_or(self.points.len(), |c| c.first_point as usize);
         let patches = if self.has_patches() { contacts.len() } else { 0 };
         begins(contacts.end) - begins(contacts.start) - patches
+    }
+
+    /// Number of impulses, those of patches and joints included.
+    pub fn impulse_count(&self) -> usize {
+        self.impulses.len() + self.joint_impulses.len()
     }
 
     /// Whether any contact has friction.

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::contacts::{Chunk, ContactRows, Source, Writer};
 use super::layout::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
-    Softness,
+    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
+    Params, PointRow, Softness,
 };
 use super::softness::softness;
 use crate::collide::Detector;
@@ -131,12 +131,14 @@ impl Prepared {
             ..Params::default()
         };
         problem.convergence = ConvergenceRow::default();
+        problem.momentum = MomentumRow::default();
         problem.colors.clone_from(&self.coloring.offsets);
         problem.first_joint_color = problem.colors.len() as u32;
         self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
         self.prepare_joints(world, asleep, problem);
         self.prepare_contacts(world, detector, config, dt, problem);
         problem.params.point_count = problem.points.len() as u32;
+        problem.params.joint_count = problem.joints.len() as u32;
     }
 
     fn prepare_joints(&mut self, world: &World, asleep: &[bool], problem: &mut StepProblem) {

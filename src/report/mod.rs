@@ -1,5 +1,6 @@
 //! What runs came to: one run for people and programs, its motion, and pages made from many runs.
 
+mod convergence;
 pub mod front;
 mod plot;
 mod rules;
@@ -7,6 +8,7 @@ mod run;
 mod solve;
 mod trajectory;
 
+pub use convergence::convergence;
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{RunReport, StageRow, Standing};
 pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};

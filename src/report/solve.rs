@@ -4,10 +4,12 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::backend::Backend;
+use crate::config::Method;
 use crate::contacts::ContactProblem;
-use crate::math::Scalar;
+use crate::error::Result;
 use crate::residuals::{Measure, Residuals};
-use crate::solver::{Method, Order, Precision, Solver};
+use crate::solver::{Order, Solver};
 
 /// Errors `e_vel` whose sweeps are reported.
 const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
@@ -19,8 +21,8 @@ pub struct SolveSettings {
     pub method: Method,
     /// In which order they go.
     pub order: Order,
-    /// In which numbers.
-    pub precision: Precision,
+    /// How often a manifold is swept before the next one.
+    pub passes: u8,
     /// Most sweeps.
     pub sweeps: u32,
     /// Error `e_vel` below which no more are done; 0 does them all.
@@ -40,13 +42,17 @@ pub struct SolveReport {
     pub method: Method,
     /// Their order.
     pub order: Order,
-    /// Their numbers.
-    pub precision: Precision,
+    /// How often a manifold was swept before the next one.
+    pub passes: u8,
+    /// `f64`, or `reference`, `cpu` or `gpu`, which are in f32.
+    pub backend: String,
+    /// What it ran on.
+    pub adapter: String,
     /// Colors of that order.
     pub colors: usize,
     /// Sweeps that were done; they end early where the numbers are not finite.
     pub sweeps: u32,
-    /// Time of the sweeps on one core, without measuring [ms].
+    /// Time of the sweeps one by one, without measuring [ms].
     pub ms: f64,
     /// When the error first fell below 1e-1 to 1e-4.
     pub reached: Vec<Reached>,
@@ -78,30 +84,29 @@ pub struct CurveRow {
 }
 
 impl SolveReport {
-    /// Solves a problem.
-    pub fn new(problem: &ContactProblem, settings: &SolveSettings) -> Self {
-        match settings.precision {
-            Precision::F64 => Self::in_numbers::<f64>(problem, settings),
-            Precision::F32 => Self::in_numbers::<f32>(problem, settings),
-        }
-    }
-
     /// Whether any number of the end is not finite.
     pub fn is_spoiled(&self) -> bool {
         self.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan())
     }
 
-    fn in_numbers<S: Scalar>(problem: &ContactProblem, settings: &SolveSettings) -> Self {
-        let &SolveSettings { method, order, precision, sweeps, tolerance } = settings;
+    /// Solves a problem in f64, or in f32 on a backend.
+    ///
+    /// # Errors
+    /// A contact that no kernel takes ([`Solver::new`]), or a backend that cannot run.
+    pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
+        let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;
         let measure = Measure::new(problem);
-        let mut solver = Solver::<S>::new(problem, method, order);
+        let name = backend.as_ref().map_or("f64", |b| b.name());
+        let mut solver = Solver::new(problem, method, order, backend)?.with_passes(passes);
         let mut report = Self {
             problem: problem.name.clone(),
             bodies: problem.bodies.len(),
             contacts: problem.contacts.len(),
             method,
             order,
-            precision,
+            passes,
+            backend: name.into(),
+            adapter: solver.adapter(),
             colors: solver.colors(),
             sweeps: 0,
             ms: 0.0,
@@ -111,7 +116,7 @@ impl SolveReport {
         let mut time = Duration::ZERO;
         for sweep in 1..=sweeps {
             let begin = Instant::now();
-            solver.advance();
+            solver.advance(1)?;
             time += begin.elapsed();
             let ms = time.as_secs_f64() * 1e3;
             let residuals = measure.of(&solver.impulses(), &solver.velocities());
@@ -128,6 +133,6 @@ impl SolveReport {
                 break;
             }
         }
-        report
+        Ok(report)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::contacts::ContactProblem;
+use crate::contacts::{ContactProblem, PointContact};
 use crate::graph::{ConstraintGraph, Edge, IMMOVABLE};
 
 /// In which order a sweep goes over contacts. It is a part of the method: another order takes other numbers of sweeps.
@@ -11,19 +11,30 @@ use crate::graph::{ConstraintGraph, Edge, IMMOVABLE};
 pub enum Order {
     /// Every contact by itself: in the order of the file each takes the first color that is free on both of its bodies.
     Contacts,
-    /// All contacts of the same two bodies one after another, as in a step: manifolds are colored, those with something
-    /// fixed come last.
+    /// Contacts of the same two bodies with one frame together, up to four, as in a step: manifolds are colored, those with
+    /// something fixed come last.
     #[default]
     Manifolds,
+}
+
+impl Order {
+    /// How often a manifold is swept before the next one: twice, since its points depend on each other most (numbers in
+    /// docs/convergence.md). Single contacts are swept once.
+    pub fn passes(self) -> u8 {
+        match self {
+            Self::Contacts => 1,
+            Self::Manifolds => 2,
+        }
+    }
 }
 
 /// Contacts in the order of a sweep.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sequence {
-    /// Indices of the contacts.
-    pub contacts: Vec<u32>,
-    /// Colors that they form.
-    pub colors: usize,
+    /// Indices of the contacts of each manifold, 1 to 4, color by color.
+    pub manifolds: Vec<Vec<u32>>,
+    /// Where each color begins among them, and where the last ends.
+    pub offsets: Vec<u32>,
 }
 
 impl Sequence {
@@ -53,23 +64,42 @@ fn by_contact(problem: &ContactProblem) -> Sequence {
             used[body][color] = true;
         }
     }
-    Sequence { colors: colors.len(), contacts: colors.concat() }
+    let mut offsets = vec![0];
+    for color in &colors {
+        offsets.push(offsets[offsets.len() - 1] + color.len() as u32);
+    }
+    Sequence { manifolds: colors.into_iter().flatten().map(|i| vec![i]).collect(), offsets }
 }
 
 fn by_manifold(problem: &ContactProblem) -> Sequence {
-    let mut places = BTreeMap::new();
+    let mut open: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
     let mut manifolds: Vec<Vec<u32>> = Vec::new();
     let mut edges = Vec::new();
     for (i, contact) in (0..).zip(&problem.contacts) {
         let [a, b] = [contact.a, contact.b].map(|body| body.unwrap_or(IMMOVABLE));
-        let place = *places.entry([a.min(b), a.max(b)]).or_insert(manifolds.len());
-        if place == manifolds.len() {
-            manifolds.push(Vec::new());
+        let of_pair = open.entry([a, b]).or_default();
+        let fits = |&&m: &&usize| {
+            let first = &problem.contacts[manifolds[m][0] as usize];
+            manifolds[m].len() < 4 && is_same_surface(first, contact)
+        };
+        if let Some(&place) = of_pair.iter().find(fits) {
+            manifolds[place].push(i);
+        } else {
+            of_pair.push(manifolds.len());
+            manifolds.push(vec![i]);
             edges.push(Edge { a, b, color: None });
         }
-        manifolds[place].push(i);
     }
     let coloring = ConstraintGraph::default().color(problem.bodies.len(), &mut edges, 64);
-    let contacts = coloring.order.iter().flat_map(|&m| &manifolds[m as usize]).copied().collect();
-    Sequence { contacts, colors: coloring.color_count() }
+    let manifolds = coloring.order.iter().map(|&m| std::mem::take(&mut manifolds[m as usize])).collect();
+    Sequence { manifolds, offsets: coloring.offsets }
 }
+
+/// Whether two contacts of a pair can be points of one manifold.
+fn is_same_surface(a: &PointContact, b: &PointContact) -> bool {
+    let apart = |k: usize| a.frame[k].distance(b.frame[k]);
+    a.friction == b.friction && apart(0) <= SAME_FRAME && apart(1) <= SAME_FRAME
+}
+
+/// Frames nearer than this are one frame: rounding of whoever wrote them.
+const SAME_FRAME: f64 = 1e-12;

@@ -1,10 +1,10 @@
 //! Contact problems whose solution is known, and how long a solver takes to find it.
 
-use drystone::ContactProblem;
+use drystone::config::Method;
 use drystone::contacts::{FreeBody, PointContact, Velocity};
-use drystone::math::Scalar;
 use drystone::residuals::Measure;
-use drystone::solver::{Method, Order, Solver};
+use drystone::solver::{Order, Solver};
+use drystone::{Backend, ContactProblem};
 use glam::{DMat3, DVec3};
 
 /// Step length of the problems [s].
@@ -42,18 +42,35 @@ pub fn bearing(masses: &[f64]) -> Vec<DVec3> {
     (0..masses.len()).flat_map(|i| [DVec3::X * above(i); 4]).collect()
 }
 
-/// Sweeps until e_vel is less than each of `errors`; none if `most` sweeps do not do it.
-pub fn sweeps_to<S: Scalar>(
+/// e_vel after each of `sweeps` sweeps, in f64 or in f32 on a backend.
+pub fn curve(
     problem: &ContactProblem,
     (method, order): (Method, Order),
+    backend: Option<Box<dyn Backend>>,
+    sweeps: u32,
+) -> Vec<f64> {
+    let measure = Measure::new(problem);
+    let mut solver = Solver::new(problem, method, order, backend).expect("good frames");
+    let after_one = |_| {
+        solver.advance(1).expect("it runs");
+        measure.of(&solver.impulses(), &solver.velocities()).e_vel
+    };
+    (0..sweeps).map(after_one).collect()
+}
+
+/// Sweeps until e_vel is less than each of `errors`; none if `most` sweeps do not do it.
+pub fn sweeps_to(
+    problem: &ContactProblem,
+    (method, order): (Method, Order),
+    backend: Option<Box<dyn Backend>>,
     errors: &[f64],
     most: u32,
 ) -> Vec<Option<u32>> {
     let measure = Measure::new(problem);
-    let mut solver = Solver::<S>::new(problem, method, order);
+    let mut solver = Solver::new(problem, method, order, backend).expect("good frames");
     let mut found = vec![None; errors.len()];
     for sweep in 1..=most {
-        solver.advance();
+        solver.advance(1).expect("it runs");
         let reached = measure.of(&solver.impulses(), &solver.velocities()).e_vel;
         for (found, _) in found.iter_mut().zip(errors).filter(|(found, error)| found.is_none() && reached < **error) {
             *found = Some(sweep);

@@ -5,13 +5,15 @@ use drystone::StepProblem;
 /// Everything that a backend gives back, as numbers.
 fn numbers(problem: &StepProblem) -> Vec<f32> {
     let c = &problem.convergence;
+    let m = &problem.momentum;
     let rows: [&[f32]; 3] = [
         bytemuck::cast_slice(&problem.bodies),
         bytemuck::cast_slice(&problem.impulses),
         bytemuck::cast_slice(&problem.joint_impulses),
     ];
     let counts = [c.moving, c.done, c.sweeps, c.planned].map(|n| n as f32);
-    [&rows.concat()[..], &counts].concat()
+    let momentum = [m.t, m.factor, m.square, m.restarts as f32];
+    [&rows.concat()[..], &counts, &momentum].concat()
 }
 
 /// The numbers of `a` with those of `b`.

@@ -12,7 +12,7 @@ use drystone::plan::{Kernel, Pass};
 pub fn every_rules() -> Vec<Rules> {
     let mut all = Vec::new();
     for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
-        for bits in 0..64 {
+        for bits in 0..128 {
             let has = |bit: u32| bits >> bit & 1 == 1;
             let rules = Rules {
                 biased: has(0),
@@ -22,9 +22,15 @@ pub fn every_rules() -> Vec<Rules> {
                 accumulated: has(3),
                 round: has(4),
                 measured: has(5),
+                driven: has(6),
+                passes: 1 + u8::from(has(6)),
             };
-            // Without friction it does not matter when it acts.
-            if friction != FrictionRule::None || !rules.friction_first {
+            // Without friction it does not matter when it acts. Belts drive points only; with them, and with repeated passes,
+            // the rest of the rules is not tried again.
+            let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
+                && rules.accumulated
+                && !(rules.patch || rules.round || rules.measured);
+            if (friction != FrictionRule::None || !rules.friction_first) && (drivable || !rules.driven) {
                 all.push(rules);
             }
         }
@@ -42,8 +48,13 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::ClearImpulses,
         Kernel::BeginSweep { first: true },
         Kernel::BeginSweep { first: false },
+        Kernel::MeasureStep,
+        Kernel::UpdateMomentum,
         Kernel::WarmStartJoints,
     ];
+    for (first, measured) in [(true, true), (true, false), (false, true), (false, false)] {
+        all.push(Kernel::Extrapolate { first, measured });
+    }
     for rules in every_rules() {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
@@ -77,6 +88,16 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
 /// `kernel` over all of `problem` in one pass.
 pub fn in_one_pass(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
     vec![Pass { kernel, colors: colors_of(kernel, problem) }]
+}
+
+/// Sweeps of the points and the joints of a problem that end with what comes between accelerated ones, several times.
+pub fn accelerated_sweeps(problem: &StepProblem, measured: bool) -> Vec<Pass> {
+    let between = [Kernel::MeasureStep, Kernel::UpdateMomentum];
+    let sweep = |first| {
+        let own = [Kernel::Extrapolate { first, measured }, Kernel::SolveJoints(Rules::default()), sweep()];
+        own.into_iter().chain(between).flat_map(|kernel| in_one_pass(kernel, problem))
+    };
+    [true, false, false, false, false].into_iter().flat_map(sweep).collect()
 }
 
 /// `kernel` over all of `problem`, one color a pass.

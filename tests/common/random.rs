@@ -124,6 +124,7 @@ fn params(problem: &StepProblem) -> Params {
     params.joint = softness(2.0, 1.0, substep, 0.5);
     params.body_count = problem.bodies.len() as u32;
     params.point_count = problem.points.len() as u32;
+    params.joint_count = problem.joints.len() as u32;
     params.slop = 0.02;
     params.relaxation = 0.9;
     params.tolerance = 0.5;

@@ -3,8 +3,11 @@
 #![allow(unsafe_code)]
 
 use super::crew::Crew;
-use super::lane8::Row8;
+use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
+use crate::kernels::Step;
+use crate::kernels::momentum::{extrapolate, squared_step};
+use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
 /// Eight contacts of one color with as many points each.
@@ -31,6 +34,8 @@ pub(super) struct Groups {
     pub colors: Vec<u32>,
     pub points: Vec<[Row8; 12]>,
     pub impulses: Vec<[Row8; 4]>,
+    /// What accelerated sweeps leave for each other, kept from one run to the next.
+    steps: Vec<Step<Portable>>,
 }
 
 impl Groups {
@@ -65,6 +70,40 @@ impl Groups {
                         let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
                         // SAFETY: a contact is in one lane of one group, and its impulses are its own.
                         unsafe { impulses.write(to + k, ImpulseRow { normal, tangent_1, tangent_2, peak }) };
+                    }
+                }
+            }
+        });
+    }
+
+    /// Goes on with all impulses.
+    pub fn extrapolate(&mut self, first: bool, factor: f32, crew: &Crew) {
+        let len = self.impulses.len();
+        self.steps.resize(len, Step::default());
+        let factor = Portable::constant(factor.into());
+        let (impulses, steps) = (Shared::new(&mut self.impulses), Shared::new(&mut self.steps));
+        crew.spread(0..len, &|range| {
+            // SAFETY: tasks have different impulses.
+            let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
+            for (impulse, step) in impulses.iter_mut().zip(steps) {
+                let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
+                [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+            }
+        });
+    }
+
+    /// How far the last sweep moved the impulse of each point of the problem, squared.
+    pub fn squared_steps(&self, problem: &StepProblem, squares: &mut [f32], crew: &Crew) {
+        let squares = Shared::new(squares);
+        crew.spread(0..self.all.len(), &|range| {
+            for group in &self.all[range] {
+                for k in 0..group.points as usize {
+                    let at = group.first_point as usize + k;
+                    let square = squared_step(components(&self.impulses[at]), &self.steps[at]).store();
+                    for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                        let to = problem.contacts[row as usize].first_point as usize + k;
+                        // SAFETY: a contact is in one lane of one group, and its points are its own.
+                        unsafe { squares.write(to, square.0[lane]) };
                     }
                 }
             }
@@ -124,6 +163,12 @@ impl Group {
             }
         }
     }
+}
+
+/// The normal and the tangents of eight impulses.
+fn components(impulse: &[Row8; 4]) -> Vec3<Portable> {
+    let [normal, tangent_1, tangent_2, _] = impulse.each_ref().map(Portable::load);
+    vec3(normal, tangent_1, tangent_2)
 }
 
 /// Writes one lane of some rows.

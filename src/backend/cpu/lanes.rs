@@ -13,11 +13,12 @@ use super::crew::Crew;
 use super::groups::Groups;
 use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, load_mass, velocity_row};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_velocities, load_mass, velocity_row};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::{Free, Inertia, Joint, Pair, StepParams};
+use crate::kernels::momentum::{chunked_sum, extrapolate, squared_step};
+use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
 use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -35,6 +36,11 @@ pub struct Cpu {
     inertias: Vec<Inertia<f32>>,
     joints: Vec<Joint<f32>>,
     joint_impulses: Vec<Vec3<f32>>,
+    momentum: Momentum<f32>,
+    /// What accelerated sweeps leave for each other: velocities of the sweep before, and what the joints' impulses were.
+    velocities_before: Vec<Row8>,
+    joint_steps: Vec<Step<f32>>,
+    squares: Vec<f32>,
 }
 
 impl Default for Cpu {
@@ -66,6 +72,10 @@ impl Cpu {
             inertias: Vec::new(),
             joints: Vec::new(),
             joint_impulses: Vec::new(),
+            momentum: Momentum::default(),
+            velocities_before: Vec::new(),
+            joint_steps: Vec::new(),
+            squares: Vec::new(),
         }
     }
 
@@ -99,6 +109,7 @@ impl Cpu {
         self.joint_impulses.clear();
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
+        self.momentum = Momentum::load(&problem.momentum);
         self.groups.load(problem, crew);
     }
 
@@ -109,6 +120,7 @@ impl Cpu {
             row.linear = impulse.store();
         }
         problem.convergence = self.convergence;
+        problem.momentum = self.momentum.store();
     }
 
     fn store_bodies(&self, problem: &mut StepProblem) {
@@ -170,6 +182,20 @@ impl Cpu {
                     self.masses[i] = Row8([x.x, x.y, x.z, mass.inv_mass, yz.x, yz.y, yz.z, 0.0]);
                 }
             }
+            Kernel::Extrapolate { first, measured } => {
+                if !(measured && self.convergence.done != 0) {
+                    self.extrapolate(first, crew);
+                }
+            }
+            Kernel::MeasureStep => {
+                self.squares.resize(problem.impulse_count(), 0.0);
+                self.groups.squared_steps(problem, &mut self.squares, crew);
+                let joints = self.joint_impulses.iter().zip(&self.joint_steps);
+                for (square, (now, step)) in self.squares[problem.impulses.len()..].iter_mut().zip(joints) {
+                    *square = squared_step(*now, step);
+                }
+            }
+            Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.squares)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),
@@ -180,6 +206,22 @@ impl Cpu {
                     });
                 }
             }
+        }
+    }
+
+    fn extrapolate(&mut self, first: bool, crew: &Crew) {
+        if first {
+            self.momentum.begin();
+        }
+        let factor = self.momentum.factor;
+        let len = self.bodies.len();
+        self.velocities_before.resize(len, Row8::default());
+        let (bodies, before) = (Shared::new(&mut self.bodies), Shared::new(&mut self.velocities_before));
+        crew.spread(0..len, &|range| extrapolate_velocities(first, factor, &bodies, &before, range));
+        self.groups.extrapolate(first, factor, crew);
+        self.joint_steps.resize(self.joint_impulses.len(), Step::default());
+        for (impulse, step) in self.joint_impulses.iter_mut().zip(&mut self.joint_steps) {
+            *impulse = extrapolate(first, factor, *impulse, step);
         }
     }
 

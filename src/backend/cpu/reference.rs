@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::{Body, Contact, Free, Impulse, Inertia, Joint, Mass, Pair, Point, Rules, StepParams};
+use crate::kernels::momentum::{chunked_sum, extrapolate, extrapolated, squared_step};
+use crate::kernels::{Contact, Free, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -14,17 +15,15 @@ use crate::problem::{ConvergenceRow, StepProblem};
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 #[derive(Debug, Default)]
 pub struct Reference<S> {
-    params: StepParams<S>,
-    bodies: Vec<Body<S>>,
-    masses: Vec<Mass<S>>,
+    rows: Rows<S>,
     free: Vec<Free<S>>,
-    inertias: Vec<Inertia<S>>,
-    contacts: Vec<Contact<S>>,
-    points: Vec<Point<S>>,
-    impulses: Vec<Impulse<S>>,
-    joints: Vec<Joint<S>>,
-    joint_impulses: Vec<Vec3<S>>,
     convergence: ConvergenceRow,
+    /// What accelerated sweeps leave for each other: velocities of the sweep before, impulses of points and joints, and how
+    /// far a sweep moved them.
+    velocities_before: Vec<[Vec3<S>; 2]>,
+    point_steps: Vec<Step<S>>,
+    joint_steps: Vec<Step<S>>,
+    squares: Vec<S>,
 }
 
 impl<S: Scalar> Reference<S> {
@@ -33,59 +32,64 @@ impl<S: Scalar> Reference<S> {
         Self::default()
     }
 
-    fn load(&mut self, problem: &StepProblem) {
-        fn refill<R, T>(rows: &[R], kept: &mut Vec<T>, load: impl Fn(&R) -> T) {
-            kept.clear();
-            kept.extend(rows.iter().map(load));
-        }
-        self.params = StepParams::load(&problem.params);
-        refill(&problem.bodies, &mut self.bodies, Body::load);
-        refill(&problem.masses, &mut self.masses, Mass::load);
-        self.free.resize(problem.bodies.len(), Free::default());
-        refill(&problem.inertias, &mut self.inertias, Inertia::load);
-        refill(&problem.contacts, &mut self.contacts, Contact::load);
-        refill(&problem.points, &mut self.points, Point::load);
-        refill(&problem.impulses, &mut self.impulses, Impulse::load);
-        refill(&problem.joints, &mut self.joints, Joint::load);
-        refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
-        self.convergence = problem.convergence;
+    /// A reference with these rows loaded, for [`Reference::advance`].
+    pub fn holding(rows: Rows<S>) -> Self {
+        Self { rows, ..Self::default() }
     }
 
-    fn store(&self, problem: &mut StepProblem) {
-        for (row, body) in problem.bodies.iter_mut().zip(&self.bodies) {
-            *row = body.store();
+    /// The rows as the last passes left them.
+    pub fn rows(&self) -> &Rows<S> {
+        &self.rows
+    }
+
+    /// The rows, to change before the next passes.
+    pub fn rows_mut(&mut self) -> &mut Rows<S> {
+        &mut self.rows
+    }
+
+    /// Runs passes over the rows that are loaded, in all the digits of `S`; `problem` says which row belongs to which.
+    pub fn advance(&mut self, problem: &StepProblem, passes: &[Pass]) {
+        for pass in passes {
+            self.run_pass(problem, pass);
         }
-        for (row, impulse) in problem.impulses.iter_mut().zip(&self.impulses) {
-            *row = impulse.store();
-        }
-        for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
-            row.linear = impulse.store();
-        }
-        problem.convergence = self.convergence;
     }
 
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
-        let params = &self.params;
+        let params = &self.rows.params;
         match pass.kernel {
             Kernel::IntegrateVelocities { carry } => {
-                for ((body, free), mass) in self.bodies.iter_mut().zip(&mut self.free).zip(&self.masses) {
+                self.free.resize(self.rows.bodies.len(), Free::default());
+                let free = &mut self.free;
+                for ((body, free), mass) in self.rows.bodies.iter_mut().zip(free).zip(&self.rows.masses) {
                     integrate_velocities(carry, params, mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {
-                for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
+                for (row, inertia) in problem.inertias.iter().zip(&self.rows.inertias) {
                     let i = row.body as usize;
-                    let (body, free) = (&mut self.bodies[i], &mut self.free[i]);
-                    integrate_gyroscopic(params, inertia, body, free, &mut self.masses[i]);
+                    let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
+                    integrate_gyroscopic(params, inertia, body, free, &mut self.rows.masses[i]);
                 }
             }
             Kernel::IntegratePositions => {
-                for body in &mut self.bodies {
+                for body in &mut self.rows.bodies {
                     integrate_positions(params, body);
                 }
             }
-            Kernel::ClearImpulses => self.impulses.iter_mut().for_each(clear_impulse),
+            Kernel::ClearImpulses => self.rows.impulses.iter_mut().for_each(clear_impulse),
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
+            Kernel::Extrapolate { first, measured } => {
+                if !(measured && self.convergence.done != 0) {
+                    self.extrapolate(first);
+                }
+            }
+            Kernel::MeasureStep => {
+                let points = self.rows.impulses.iter().map(Impulse::components).zip(&self.point_steps);
+                let joints = self.rows.joint_impulses.iter().copied().zip(&self.joint_steps);
+                self.squares.clear();
+                self.squares.extend(points.chain(joints).map(|(now, step)| squared_step(now, step)));
+            }
+            Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.squares)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),
@@ -116,6 +120,29 @@ impl<S: Scalar> Reference<S> {
         }
     }
 
+    fn extrapolate(&mut self, first: bool) {
+        if first {
+            self.rows.momentum.begin();
+        }
+        self.velocities_before.resize(self.rows.bodies.len(), Default::default());
+        self.point_steps.resize(self.rows.impulses.len(), Step::default());
+        self.joint_steps.resize(self.rows.joint_impulses.len(), Step::default());
+        let factor = self.rows.momentum.factor;
+        for (body, before) in self.rows.bodies.iter_mut().zip(&mut self.velocities_before) {
+            let now = [body.v, body.w];
+            if !first {
+                (body.v, body.w) = (extrapolated(now[0], before[0], factor), extrapolated(now[1], before[1], factor));
+            }
+            *before = now;
+        }
+        for (impulse, step) in self.rows.impulses.iter_mut().zip(&mut self.point_steps) {
+            impulse.set_components(extrapolate(first, factor, impulse.components(), step));
+        }
+        for (impulse, step) in self.rows.joint_impulses.iter_mut().zip(&mut self.joint_steps) {
+            *impulse = extrapolate(first, factor, *impulse, step);
+        }
+    }
+
     /// One manifold after another.
     fn over_contacts(
         &mut self,
@@ -130,8 +157,8 @@ impl<S: Scalar> Reference<S> {
             let mut pair = self.load_pair(bodies);
             let first = row.first_point as usize;
             let rows = first..first + row.point_count as usize + usize::from(rules.patch);
-            let (points, impulses) = (&self.points[rows.clone()], &mut self.impulses[rows]);
-            kernel(&self.params, &mut pair, &self.contacts[i], points, impulses);
+            let (points, impulses) = (&self.rows.points[rows.clone()], &mut self.rows.impulses[rows]);
+            kernel(&self.rows.params, &mut pair, &self.rows.contacts[i], points, impulses);
             self.store_pair(bodies, &pair);
         }
     }
@@ -147,24 +174,24 @@ impl<S: Scalar> Reference<S> {
             let row = &problem.joints[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);
-            kernel(&self.params, &mut pair, &self.joints[i], &mut self.joint_impulses[i]);
+            kernel(&self.rows.params, &mut pair, &self.rows.joints[i], &mut self.rows.joint_impulses[i]);
             self.store_pair(bodies, &pair);
         }
     }
 
     fn load_pair(&self, [a, b]: [usize; 2]) -> Pair<S> {
-        let (mass_a, mass_b) = (self.masses[a], self.masses[b]);
-        Pair { a: self.bodies[a], b: self.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
+        let (mass_a, mass_b) = (self.rows.masses[a], self.rows.masses[b]);
+        Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
     }
 
     /// A body that cannot move is never written.
     fn store_pair(&mut self, [a, b]: [usize; 2], pair: &Pair<S>) {
         let zero = S::constant(0.0);
         if pair.mass_a.inv_mass > zero {
-            (self.bodies[a].v, self.bodies[a].w) = (pair.a.v, pair.a.w);
+            (self.rows.bodies[a].v, self.rows.bodies[a].w) = (pair.a.v, pair.a.w);
         }
         if pair.mass_b.inv_mass > zero {
-            (self.bodies[b].v, self.bodies[b].w) = (pair.b.v, pair.b.w);
+            (self.rows.bodies[b].v, self.rows.bodies[b].w) = (pair.b.v, pair.b.w);
         }
         if pair.moving > zero {
             self.convergence.moving = 1;
@@ -186,11 +213,11 @@ impl<S: Scalar> Backend for Reference<S> {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        self.load(problem);
-        for pass in passes {
-            self.run_pass(problem, pass);
-        }
-        self.store(problem);
+        self.rows.load(problem);
+        self.convergence = problem.convergence;
+        self.advance(problem, passes);
+        self.rows.store(problem);
+        problem.convergence = self.convergence;
         Ok(())
     }
 }

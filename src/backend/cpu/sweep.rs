@@ -10,6 +10,7 @@ use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
+use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
@@ -185,6 +186,27 @@ impl BodyWork<'_> {
                 unsafe { self.bodies.write(i, state) };
             }
         }
+    }
+}
+
+/// Goes on with the velocities of some bodies, and remembers where they were; no other task has the same.
+pub(super) fn extrapolate_velocities(
+    first: bool,
+    factor: f32,
+    bodies: &Shared<State>,
+    before: &Shared<Row8>,
+    range: Range<usize>,
+) {
+    // SAFETY: tasks have different bodies.
+    let (bodies, before) = unsafe { (bodies.slice(range.clone()), before.slice(range)) };
+    for (body, before) in bodies.iter_mut().zip(before) {
+        let now = body.velocity;
+        if !first {
+            for (x, before) in body.velocity.0.iter_mut().zip(&before.0) {
+                *x = extrapolated(*x, *before, factor);
+            }
+        }
+        *before = now;
     }
 }
 

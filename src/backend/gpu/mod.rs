@@ -14,9 +14,10 @@ use std::sync::{Arc, Mutex};
 
 use super::Backend;
 use crate::error::{Error, Result};
+use crate::kernels::momentum::CHUNK;
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, FreeRow, PassColors, StepProblem};
-use shader::{BINDINGS, PASS_COLORS, WORKGROUP};
+use crate::problem::{ConvergenceRow, MomentumRow, PassColors, StepProblem};
+use shader::{BINDINGS, PASS_COLORS, SCRATCH, SCRATCH_ROW, WORKGROUP};
 
 /// Opens the adapter that `choice` finds, for drawing.
 ///
@@ -96,9 +97,9 @@ impl Gpu {
     }
 
     /// Sends the rows; buffers grow where they must.
-    fn upload(&mut self, problem: &StepProblem, pass_colors: &[u8]) -> Result<()> {
+    fn upload(&mut self, problem: &StepProblem, pass_colors: &[u8], accelerated: bool) -> Result<()> {
         let limit = self.device.limits().max_storage_buffer_binding_size;
-        let rows: [&[u8]; BINDINGS.len()] = [
+        let rows: [&[u8]; BINDINGS.len() - SCRATCH] = [
             bytemuck::bytes_of(&problem.params),
             pass_colors,
             bytemuck::cast_slice(&problem.bodies),
@@ -111,8 +112,7 @@ impl Gpu {
             bytemuck::cast_slice(&problem.joints),
             bytemuck::cast_slice(&problem.joint_impulses),
             bytemuck::bytes_of(&problem.convergence),
-            // Not sent: written before it is read.
-            &[],
+            bytemuck::bytes_of(&problem.momentum),
         ];
         // Refused before anything is sent.
         for (name, bytes) in BINDINGS.iter().zip(rows) {
@@ -123,13 +123,15 @@ impl Gpu {
                 )));
             }
         }
+        for (binding, size) in (rows.len()..).zip(scratch_sizes(problem, accelerated)) {
+            self.reserve(binding, size, limit);
+        }
         for (binding, bytes) in rows.into_iter().enumerate() {
             self.reserve(binding, bytes.len() as u64, limit);
             if let (Some(buffer), false) = (&self.buffers[binding], bytes.is_empty()) {
                 self.queue.write_buffer(buffer, 0, bytes);
             }
         }
-        self.reserve(shader::FREE as usize, (size_of::<FreeRow>() * problem.bodies.len()) as u64, limit);
         Ok(())
     }
 
@@ -211,11 +213,12 @@ impl Gpu {
 
     /// Copies what the plan changed back and waits for it.
     fn finish(&mut self, problem: &mut StepProblem, mut encoder: wgpu::CommandEncoder) -> Result<()> {
-        let mut changed: [(u32, &mut [u8]); 4] = [
+        let mut changed: [(u32, &mut [u8]); 5] = [
             (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
             (shader::IMPULSES, bytemuck::cast_slice_mut(&mut problem.impulses)),
             (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
             (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
+            (shader::MOMENTUM, bytemuck::bytes_of_mut(&mut problem.momentum)),
         ];
         let size = changed.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
         if self.read_back.as_ref().is_none_or(|b| b.size() < size) {
@@ -276,7 +279,8 @@ impl Backend for Gpu {
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
         let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
         let (pass_colors, offsets) = color_ranges(passes, stride);
-        self.upload(problem, &pass_colors)?;
+        let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
+        self.upload(problem, &pass_colors, accelerated)?;
         for pass in passes {
             self.compile(pass.kernel)?;
         }
@@ -288,7 +292,8 @@ impl Backend for Gpu {
         let down = size_of_val(&problem.bodies[..])
             + size_of_val(&problem.impulses[..])
             + size_of_val(&problem.joint_impulses[..])
-            + size_of::<ConvergenceRow>();
+            + size_of::<ConvergenceRow>()
+            + size_of::<MomentumRow>();
         let up = down
             + size_of_val(&problem.masses[..])
             + size_of_val(&problem.inertias[..])
@@ -309,6 +314,14 @@ fn bind(device: &wgpu::Device, buffers: &[Option<wgpu::Buffer>], kernel: &Compil
     };
     let entries: Vec<_> = kernel.bindings.iter().map(entry).collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &kernel.layout, entries: &entries })
+}
+
+/// Bytes of the buffers that stay on the device: all but the first are for accelerated sweeps.
+fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [u64; SCRATCH] {
+    let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
+    let before = if accelerated { bodies } else { 0 };
+    let sums = size_of::<f32>() * impulses.div_ceil(CHUNK);
+    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums].map(|bytes| bytes as u64)
 }
 
 /// The distinct color ranges of the passes, `stride` bytes apart, and where each pass finds its own.
@@ -335,7 +348,10 @@ fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
         Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
         Kernel::ClearImpulses => problem.impulses.len(),
-        Kernel::BeginSweep { .. } => 1,
+        Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
+        // A workgroup a chunk.
+        Kernel::MeasureStep => problem.impulse_count().div_ceil(CHUNK) * WORKGROUP as usize,
+        Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     };

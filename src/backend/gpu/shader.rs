@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::kernels::Rules;
 use crate::plan::Kernel;
 
-/// Name of each binding, which is also a field of `StepProblem` but for the last; the place in this list is its number.
-pub const BINDINGS: [&str; 13] = [
+/// Name of each binding; the place in this list is its number. All but the last [`SCRATCH`] are fields of `StepProblem`.
+pub const BINDINGS: [&str; 17] = [
     "params",
     "pass_colors",
     "bodies",
@@ -23,8 +23,17 @@ pub const BINDINGS: [&str; 13] = [
     "joints",
     "joint_impulses",
     "convergence",
+    "momentum",
     "free",
+    "velocities_before",
+    "impulse_steps",
+    "squares",
 ];
+/// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
+/// sweeps leave for each other.
+pub const SCRATCH: usize = 4;
+/// Size of a row of all of these but the last: two vectors [B].
+pub const SCRATCH_ROW: usize = 32;
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;
 /// The colors of a pass, at an offset of their own for each.
@@ -37,8 +46,8 @@ pub const IMPULSES: u32 = 7;
 pub const JOINT_IMPULSES: u32 = 10;
 /// Whether the sweeps still move anything, read back.
 pub const CONVERGENCE: u32 = 11;
-/// Velocities without the impulses of the substep, which stay on the device.
-pub const FREE: u32 = 12;
+/// How far the sweeps extrapolate, read back.
+pub const MOMENTUM: u32 = 12;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
@@ -57,6 +66,9 @@ pub fn source(kernel: Kernel) -> String {
         Kernel::IntegratePositions => &[part!("integrate_positions")],
         Kernel::ClearImpulses => &[part!("clear_impulses")],
         Kernel::BeginSweep { .. } => &[part!("begin_sweep")],
+        Kernel::Extrapolate { .. } => &[part!("extrapolate")],
+        Kernel::MeasureStep => &[part!("lib/sum"), part!("measure_step")],
+        Kernel::UpdateMomentum => &[part!("lib/sum"), part!("update_momentum")],
         Kernel::WarmStartJoints => &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")],
         Kernel::SolveJoints(_) => &[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")],
         Kernel::WarmStart(_) => &[part!("lib/pair"), part!("lib/friction"), part!("warm_start")],
@@ -84,16 +96,22 @@ pub fn constants(kernel: Kernel) -> Vec<(&'static str, f64)> {
             FrictionRule::Box => 2.0,
             FrictionRule::Disc => 3.0,
         };
-        vec![("FRICTION", rule), ("PATCH", yes(r.patch)), ("FRICTION_FIRST", yes(r.friction_first))]
+        vec![
+            ("FRICTION", rule),
+            ("PATCH", yes(r.patch)),
+            ("FRICTION_FIRST", yes(r.friction_first)),
+            ("DRIVEN", yes(r.driven)),
+        ]
     };
     let contact = |r: Rules| vec![("ACCUMULATED", yes(r.accumulated)), ("ROUND", yes(r.round))];
     match kernel {
         Kernel::IntegrateVelocities { carry } => vec![("CARRY", yes(carry))],
         Kernel::BeginSweep { first } => vec![("FIRST", yes(first))],
+        Kernel::Extrapolate { first, measured } => vec![("FIRST", yes(first)), ("MEASURED", yes(measured))],
         Kernel::WarmStartJoints => pair(Rules::default()),
         Kernel::SolveJoints(r) | Kernel::ApplyRestitution(r) => pair(r),
         Kernel::WarmStart(r) => [pair(r), friction(r)].concat(),
-        Kernel::SolveContacts(r) => [pair(r), contact(r), friction(r)].concat(),
+        Kernel::SolveContacts(r) => [pair(r), contact(r), friction(r), vec![("PASSES", r.passes.into())]].concat(),
         _ => Vec::new(),
     }
 }

@@ -1,0 +1,19 @@
+// Sums over a workgroup. Double: workgroup_sum in src/kernels/momentum.rs.
+
+// Numbers that one workgroup sums.
+const CHUNK: u32 = 1024u;
+
+var<workgroup> sums: array<f32, WORKGROUP>;
+
+// The sum of what each thread has of its own: halves are added. Every thread of the workgroup calls it.
+fn workgroup_sum(thread: u32, own: f32) -> f32 {
+    sums[thread] = own;
+    for (var half = WORKGROUP / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if thread < half { sums[thread] += sums[thread + half]; }
+    }
+    workgroupBarrier();
+    let sum = sums[0];
+    workgroupBarrier();
+    return sum;
+}

@@ -1,0 +1,30 @@
+// measure_step: one workgroup adds up how far a sweep moved the impulses of CHUNK points or joints, squared.
+// Reads impulses, joint_impulses, impulse_steps. Writes squares; one workgroup a number.
+// Double: src/kernels/momentum.rs.
+
+fn squared_step(i: u32) -> f32 {
+    var now: vec3f;
+    if i < params.point_count {
+        let impulse = impulses[i];
+        now = vec3f(impulse.normal, impulse.tangent_1, impulse.tangent_2);
+    } else {
+        now = joint_impulses[i - params.point_count].linear;
+    }
+    let d = now - impulse_steps[i].begin;
+    return dot3(d, d);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn measure_step(
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let count = params.point_count + params.joint_count;
+    for (var first = group.x * CHUNK; first < count; first += groups.x * CHUNK) {
+        var own = 0.0;
+        for (var i = first + thread; i < min(first + CHUNK, count); i += WORKGROUP) { own += squared_step(i); }
+        let sum = workgroup_sum(thread, own);
+        if thread == 0u { squares[first / CHUNK] = sum; }
+    }
+}

@@ -1,0 +1,64 @@
+//! A whole problem as the kernels see it.
+
+use super::rows::{Body, Contact, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
+use crate::math::{Scalar, Vec3};
+use crate::problem::StepProblem;
+
+/// The rows of a problem over one kind of numbers, indices left out.
+#[derive(Clone, Debug, Default)]
+pub struct Rows<S> {
+    /// The same for all.
+    pub params: StepParams<S>,
+    /// State of the bodies.
+    pub bodies: Vec<Body<S>>,
+    /// Their masses.
+    pub masses: Vec<Mass<S>>,
+    /// Principal inertia of those whose moments differ.
+    pub inertias: Vec<Inertia<S>>,
+    /// Manifolds.
+    pub contacts: Vec<Contact<S>>,
+    /// Their points.
+    pub points: Vec<Point<S>>,
+    /// Impulses of the points.
+    pub impulses: Vec<Impulse<S>>,
+    /// Joints.
+    pub joints: Vec<Joint<S>>,
+    /// Impulses of the joints.
+    pub joint_impulses: Vec<Vec3<S>>,
+    /// How far the sweeps extrapolate.
+    pub momentum: Momentum<S>,
+}
+
+impl<S: Scalar> Rows<S> {
+    /// From storage.
+    pub fn load(&mut self, problem: &StepProblem) {
+        fn refill<R, T>(rows: &[R], kept: &mut Vec<T>, load: impl Fn(&R) -> T) {
+            kept.clear();
+            kept.extend(rows.iter().map(load));
+        }
+        self.params = StepParams::load(&problem.params);
+        refill(&problem.bodies, &mut self.bodies, Body::load);
+        refill(&problem.masses, &mut self.masses, Mass::load);
+        refill(&problem.inertias, &mut self.inertias, Inertia::load);
+        refill(&problem.contacts, &mut self.contacts, Contact::load);
+        refill(&problem.points, &mut self.points, Point::load);
+        refill(&problem.impulses, &mut self.impulses, Impulse::load);
+        refill(&problem.joints, &mut self.joints, Joint::load);
+        refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
+        self.momentum = Momentum::load(&problem.momentum);
+    }
+
+    /// What passes change, to storage.
+    pub fn store(&self, problem: &mut StepProblem) {
+        for (row, body) in problem.bodies.iter_mut().zip(&self.bodies) {
+            *row = body.store();
+        }
+        for (row, impulse) in problem.impulses.iter_mut().zip(&self.impulses) {
+            *row = impulse.store();
+        }
+        for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
+            row.linear = impulse.store();
+        }
+        problem.momentum = self.momentum.store();
+    }
+}

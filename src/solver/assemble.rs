@@ -1,0 +1,135 @@
+//! From a contact problem to the rows that the kernels sweep, in f64 and rounded.
+
+use glam::{DMat3, DVec3};
+
+use super::{Order, Sequence};
+use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
+use crate::error::{Error, Result};
+use crate::kernels::{Body, Contact, Impulse, Mass, Point, Rows, StepParams, Sym3};
+use crate::math::{Vec3, vec3};
+use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem};
+
+/// A contact problem as a step without time.
+pub(super) struct Assembled {
+    /// Rounded, with all indices.
+    pub problem: StepProblem,
+    /// The same in all digits.
+    pub rows: Rows<f64>,
+    /// Which point, and so which impulse, belongs to each contact.
+    pub points: Vec<u32>,
+    /// 1, or -1 for a contact whose second tangent is the opposite of the one that the kernels form.
+    pub hands: Vec<f64>,
+}
+
+/// A substep of one second in which nothing moves: offsets are separations then, each wanted to close exactly in it.
+const HARD: Softness = Softness { bias_rate: 1.0, mass_scale: 1.0, impulse_scale: 0.0, push_limit: f32::MAX };
+
+impl Assembled {
+    /// Lays a problem out in an order.
+    ///
+    /// # Errors
+    /// A contact whose second tangent is not, up to its sign, the normal times the first.
+    pub fn new(contacts: &ContactProblem, order: Order) -> Result<Self> {
+        let operator = Operator::new(contacts);
+        let sequence = Sequence::new(order, contacts);
+        let hands = contacts.contacts.iter().enumerate().map(|(i, c)| hand(i, c)).collect::<Result<Vec<_>>>()?;
+        let (mut problem, mut rows) = (StepProblem::default(), Rows::default());
+        problem.params = Params {
+            substep: 1.0,
+            inverse_substep: 1.0,
+            movable: HARD,
+            fixed: HARD,
+            relaxation: 1.0,
+            body_count: contacts.bodies.len() as u32 + 1,
+            point_count: contacts.contacts.len() as u32,
+            ..Params::default()
+        };
+        rows.params = StepParams::load(&problem.params);
+
+        // Bodies, and what is fixed as one more that nothing moves.
+        rows.bodies = contacts.bodies.iter().map(|b| body(b.free)).chain([body(Velocity::default())]).collect();
+        rows.masses = (0..contacts.bodies.len()).map(|i| mass(&operator, i)).chain([Mass::default()]).collect();
+        let row_of = |body: Option<u32>| body.unwrap_or(contacts.bodies.len() as u32);
+
+        // Manifolds in the order of the sweep, one after another.
+        let mut points = vec![0; contacts.contacts.len()];
+        for manifold in &sequence.manifolds {
+            let first = &contacts.contacts[manifold[0] as usize];
+            let contact = Contact {
+                normal: wide(first.frame[0]),
+                tangent: wide(first.frame[1]),
+                friction: first.friction,
+                ..Contact::default()
+            };
+            problem.contacts.push(ContactRow {
+                body_a: row_of(first.a),
+                body_b: row_of(first.b),
+                first_point: rows.points.len() as u32,
+                point_count: manifold.len() as u32,
+                ..contact.store()
+            });
+            rows.contacts.push(contact);
+            for &i in manifold {
+                points[i as usize] = rows.points.len() as u32;
+                rows.points.push(point(&operator, i as usize, hands[i as usize]));
+            }
+        }
+        rows.impulses = vec![Impulse::default(); points.len()];
+
+        problem.bodies = rows.bodies.iter().map(Body::store).collect();
+        problem.masses = rows.masses.iter().map(Mass::store).collect();
+        problem.points = rows.points.iter().map(Point::store).collect();
+        problem.impulses = vec![ImpulseRow::default(); points.len()];
+        problem.first_joint_color = sequence.offsets.len() as u32;
+        problem.colors = sequence.offsets;
+        Ok(Self { problem, rows, points, hands })
+    }
+}
+
+/// Whether the frame of a contact is right-handed, as those of the kernels are.
+fn hand(index: usize, contact: &PointContact) -> Result<f64> {
+    let [n, t_1, t_2] = contact.frame;
+    let formed = n.cross(t_1);
+    if formed.distance(t_2) <= 1e-6 {
+        Ok(1.0)
+    } else if formed.distance(-t_2) <= 1e-6 {
+        Ok(-1.0)
+    } else {
+        let t_2 = t_2.to_array();
+        Err(Error::input(format!("contact {index}: second tangent {t_2:?} is not the normal times the first")))
+    }
+}
+
+fn point(operator: &Operator, index: usize, hand: f64) -> Point<f64> {
+    let contact = &operator.problem().contacts[index];
+    let w = operator.block(index);
+    let (w_11, w_22, w_12) = (w.y_axis.y, w.z_axis.z, w.y_axis.z);
+    let largest = 0.5 * (w_11 + w_22 + ((w_11 - w_22).powi(2) + 4.0 * w_12 * w_12).sqrt());
+    Point {
+        r_a: wide(contact.r_a),
+        r_b: wide(contact.r_b),
+        separation: contact.offset.x,
+        normal_mass: 1.0 / w.x_axis.x,
+        tangent_mass: 1.0 / largest,
+        approach_velocity: 0.0,
+        slip_1: contact.offset.y,
+        slip_2: contact.offset.z * hand,
+    }
+}
+
+fn mass(operator: &Operator, body: usize) -> Mass<f64> {
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = operator.inverse_inertia(body);
+    Mass {
+        inv_inertia: Sym3 { x: wide(x), yz: vec3(y.y, y.z, z.z) },
+        inv_mass: 1.0 / operator.problem().bodies[body].mass,
+        acceleration: Vec3::default(),
+    }
+}
+
+pub(super) fn body(velocity: Velocity) -> Body<f64> {
+    Body { v: wide(velocity.linear), w: wide(velocity.angular), ..Body::load(&BodyRow::AT_REST) }
+}
+
+fn wide(x: DVec3) -> Vec3<f64> {
+    vec3(x.x, x.y, x.z)
+}
