@@ -67,6 +67,7 @@ mod layouts {
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {
                 normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+                preload
             }
             Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
             Joint = JointRow { r_a body_a r_b body_b gap }

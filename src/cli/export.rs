@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{step_with_contacts, print};
+use super::{print, step_with_contacts};
 use crate::backend::cpu::Cpu;
 use crate::config::SolverConfig;
 use crate::contacts::ContactProblem;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, step_with_contacts, print, print_json, progress};
+use super::{SceneArgs, print, print_json, progress, step_with_contacts};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};

@@ -62,6 +62,7 @@ pub struct Detector {
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
     detections: u64,
+    computed_in: u64,
     reshaped_in: u64,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
@@ -103,6 +104,7 @@ impl Detector {
             slots: HashMap::default(),
             found: Vec::new(),
             detections: 0,
+            computed_in: 0,
             reshaped_in: 0,
             jointed: world
                 .joints
@@ -154,6 +156,9 @@ impl Detector {
         let parted = self.broad_phase(margins, activity);
         let mut stats = self.narrow_phase(margins, activity, give_back);
         stats.reshaped |= parted;
+        if stats.computed > 0 {
+            self.computed_in = self.detections;
+        }
         if stats.reshaped {
             self.reshaped_in = self.detections;
         }
@@ -163,6 +168,11 @@ impl Detector {
     /// The last detection, counted from 1.
     pub fn detections(&self) -> u64 {
         self.detections
+    }
+
+    /// The last detection that computed any manifold.
+    pub fn computed_in(&self) -> u64 {
+        self.computed_in
     }
 
     /// The last detection after which another set of manifolds touched, or with other numbers of points.
@@ -321,6 +331,7 @@ impl Detector {
             let changes = pair.rests == takes_part;
             if changes && !takes_part {
                 give_back(pair);
+                pair.manifolds.iter_mut().for_each(Manifold::forget_rows);
             }
             let mut update = Update::Reused;
             if both != [Activity::Still; 2] {

@@ -56,8 +56,10 @@ pub struct RunReport {
     pub dispatches: usize,
     /// Bytes that the kernels of the last step read and wrote.
     pub bytes_moved: u64,
-    /// Bytes that the last step sent to the device and read back.
-    pub bytes_transferred: u64,
+    /// Bytes that the last step sent to the device.
+    pub bytes_up: u64,
+    /// Bytes that the last step read back.
+    pub bytes_down: u64,
     /// Deepest overlap at the end [m].
     pub penetration_max: f64,
     /// Overlap at the end that 95 % of the contacts do not exceed [m].
@@ -139,7 +141,8 @@ impl RunReport {
             reused: 0.0,
             dispatches: 0,
             bytes_moved: 0,
-            bytes_transferred: 0,
+            bytes_up: 0,
+            bytes_down: 0,
             penetration_max: 0.0,
             penetration_p95: 0.0,
             penetration_mean: 0.0,
@@ -177,7 +180,8 @@ impl RunReport {
         self.reused = 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64;
         self.dispatches = stats.dispatches;
         self.bytes_moved = stats.bytes_moved;
-        self.bytes_transferred = stats.bytes_transferred;
+        self.bytes_up = stats.traffic.up;
+        self.bytes_down = stats.traffic.down;
     }
 
     /// Measures how the run ended.

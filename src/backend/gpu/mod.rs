@@ -2,12 +2,25 @@
 //!
 //! Stays inside the limits that every WebGPU implementation offers (at most 8 storage buffers a kernel, 64 threads a
 //! workgroup, no optional features), except for the size of buffers, which are asked for as large as the adapter has them.
+//!
+//! [`Backend::run`] takes a problem as a value: everything is sent, and everything that the plan changes comes back.
+//! [`Backend::step`] goes on from the rows that the step before left on the device ([`carry`]): what changed is sent, poses and
+//! velocities come back, and the impulses stay until somebody asks.
+//!
+//! A step is one submission and one read-back, and is waited for: detection, with which the next step begins, asks for the
+//! poses of all bodies, so that nothing is left to be done meanwhile.
 
 mod adapter;
+mod buffers;
+mod carry;
 mod exact;
+mod programs;
+mod read_back;
 pub mod shader;
+mod timer;
 
 pub use adapter::{AdapterChoice, AdapterSummary, adapters};
+pub use carry::CarryParams;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -16,8 +29,15 @@ use super::Backend;
 use crate::error::{Error, Result};
 use crate::kernels::momentum::CHUNK;
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, MomentumRow, PassColors, StepProblem};
-use shader::{BINDINGS, PASS_COLORS, SCRATCH, SCRATCH_ROW, WORKGROUP};
+use crate::problem::carry::Carry;
+use crate::problem::{BodyRow, PassColors, StepProblem};
+use crate::stats::{KernelTime, Traffic};
+use buffers::Buffers;
+use carry::Rows;
+use programs::Programs;
+use read_back::ReadBack;
+use shader::{BINDINGS, Program, SCRATCH, SCRATCH_ROW, WORKGROUP};
+use timer::Timer;
 
 /// Opens the adapter that `choice` finds, for drawing.
 ///
@@ -36,24 +56,35 @@ pub(crate) use adapter::open_for_surface;
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
-    queue: wgpu::Queue,
     summary: AdapterSummary,
     exact: bool,
-    kernels: HashMap<Kernel, CompiledKernel>,
-    /// One buffer a binding, grown when a problem needs it.
-    buffers: Vec<Option<wgpu::Buffer>>,
-    read_back: Option<wgpu::Buffer>,
+    programs: Programs,
+    buffers: Buffers,
+    read_back: ReadBack,
+    timer: Option<Timer>,
+    times: Vec<KernelTime>,
+    traffic: Traffic,
+    /// What the last step left, if the next can go on from it.
+    rows: Option<Rows>,
+    /// Memory that is used again.
+    separations: Vec<f32>,
+    states: Vec<BodyRow>,
     /// First error that the device reported outside a call.
     device_error: Arc<Mutex<Option<String>>>,
 }
 
-struct CompiledKernel {
-    pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    /// Bindings that it uses, ascending.
-    bindings: Vec<u32>,
-    /// Valid until a buffer grows.
-    bind_group: Option<wgpu::BindGroup>,
+/// A program, how many workgroups run it, and where the colors stand that it goes over.
+struct Dispatch {
+    program: Program,
+    workgroups: u32,
+    colors: u32,
+}
+
+impl Dispatch {
+    /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes several.
+    fn over(program: Program, rows: usize) -> Self {
+        Self { program, workgroups: (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535), colors: 0 }
+    }
 }
 
 impl Gpu {
@@ -75,13 +106,18 @@ impl Gpu {
             first_error.lock().expect("no panic holds it").get_or_insert(error.to_string());
         }));
         Ok(Self {
+            programs: Programs::new(device.clone(), exact),
+            buffers: Buffers::new(device.clone(), queue.clone(), summary.name.clone()),
+            timer: Timer::new(&device, &queue),
+            read_back: ReadBack::new(device.clone(), queue),
             device,
-            queue,
             summary,
             exact,
-            kernels: HashMap::new(),
-            buffers: (0..BINDINGS.len()).map(|_| None).collect(),
-            read_back: None,
+            times: Vec::new(),
+            traffic: Traffic::default(),
+            rows: None,
+            separations: Vec::new(),
+            states: Vec::new(),
             device_error,
         })
     }
@@ -96,174 +132,113 @@ impl Gpu {
         self.exact
     }
 
-    /// Sends the rows; buffers grow where they must.
-    fn upload(&mut self, problem: &StepProblem, pass_colors: &[u8], accelerated: bool) -> Result<()> {
-        let limit = self.device.limits().max_storage_buffer_binding_size;
-        let rows: [&[u8]; BINDINGS.len() - SCRATCH] = [
-            bytemuck::bytes_of(&problem.params),
-            pass_colors,
-            bytemuck::cast_slice(&problem.bodies),
-            bytemuck::cast_slice(&problem.masses),
-            bytemuck::cast_slice(&problem.inertias),
-            bytemuck::cast_slice(&problem.contacts),
-            bytemuck::cast_slice(&problem.points),
-            bytemuck::cast_slice(&problem.impulses),
-            bytemuck::cast_slice(&problem.colors),
-            bytemuck::cast_slice(&problem.joints),
-            bytemuck::cast_slice(&problem.joint_impulses),
-            bytemuck::bytes_of(&problem.convergence),
-            bytemuck::bytes_of(&problem.momentum),
-        ];
-        // Refused before anything is sent.
-        for (name, bytes) in BINDINGS.iter().zip(rows) {
-            if bytes.len() as u64 > limit {
-                let (mib, limit, adapter) = (bytes.len() >> 20, limit >> 20, &self.summary.name);
-                return Err(Error::TooLarge(format!(
-                    "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
-                )));
-            }
+    /// Sends every row, whatever the device has.
+    fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
+        self.check(problem, passes)?;
+        for (binding, bytes) in small_rows_of(problem) {
+            self.buffers.note(binding, &[]);
+            self.buffers.update(binding, bytes);
         }
-        for (binding, size) in (rows.len()..).zip(scratch_sizes(problem, accelerated)) {
-            self.reserve(binding, size, limit);
-        }
-        for (binding, bytes) in rows.into_iter().enumerate() {
-            self.reserve(binding, bytes.len() as u64, limit);
-            if let (Some(buffer), false) = (&self.buffers[binding], bytes.is_empty()) {
-                self.queue.write_buffer(buffer, 0, bytes);
-            }
+        for (binding, bytes) in contact_rows_of(problem) {
+            self.buffers.send(binding, bytes);
         }
         Ok(())
     }
 
-    fn reserve(&mut self, binding: usize, size: u64, limit: u64) {
-        if self.buffers[binding].as_ref().is_some_and(|b| b.size() >= size.max(16)) {
-            return;
+    /// Refuses a problem that is too large, before anything of it is sent.
+    fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
+        for (binding, bytes) in small_rows_of(problem).into_iter().chain(contact_rows_of(problem)) {
+            self.buffers.check(binding, bytes.len())?;
         }
-        let kind = if binding < shader::UNIFORMS { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(BINDINGS[binding]),
-            // Half as much again, so that a growing pile does not mean a new buffer every step.
-            size: (size + size / 2).clamp(size.max(256), limit.max(256)).next_multiple_of(16),
-            usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        self.buffers[binding] = Some(buffer);
-        self.kernels.values_mut().for_each(|k| k.bind_group = None);
-    }
-
-    fn compile(&mut self, kernel: Kernel) -> Result<()> {
-        if let Some(compiled) = self.kernels.get_mut(&kernel) {
-            if compiled.bind_group.is_none() {
-                compiled.bind_group = Some(bind(&self.device, &self.buffers, compiled));
-            }
-            return Ok(());
+        let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
+        for (binding, size) in ((BINDINGS.len() - SCRATCH) as u32..).zip(scratch_sizes(problem, accelerated)) {
+            self.buffers.check(binding, size)?;
+            self.buffers.reserve(binding, size);
         }
-        let source = shader::source(kernel);
-        let constants = shader::constants(kernel);
-        let reflected = shader::Reflected::new(&source, kernel.name(), &constants)?;
-        let layout = shader::layout(&self.device, &reflected);
-        let module = if self.exact {
-            exact::shader_module(&self.device, &reflected)?
-        } else {
-            self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(kernel.name()),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            })
-        };
-        let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(kernel.name()),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.name()),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(kernel.name()),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                // In exact mode they are part of the SPIR-V already.
-                constants: if self.exact { &[] } else { &constants },
-                ..Default::default()
-            },
-            cache: None,
-        });
-        let mut compiled = CompiledKernel { pipeline, layout, bindings: reflected.bindings, bind_group: None };
-        compiled.bind_group = Some(bind(&self.device, &self.buffers, &compiled));
-        self.kernels.insert(kernel, compiled);
         Ok(())
     }
 
-    fn encode(&self, problem: &StepProblem, passes: &[Pass], offsets: &[u32]) -> wgpu::CommandEncoder {
+    /// Some programs and then the passes, ready to be submitted.
+    fn encoded(
+        &mut self,
+        problem: &StepProblem,
+        first: Vec<Dispatch>,
+        passes: &[Pass],
+    ) -> Result<wgpu::CommandEncoder> {
+        let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
+        let (pass_colors, offsets) = color_ranges(passes, stride);
+        self.buffers.update(shader::PASS_COLORS, &pass_colors);
+        let of_pass = |(pass, &colors): (&Pass, &u32)| Dispatch { colors, ..dispatch_of(problem, pass) };
+        let all: Vec<_> = first.into_iter().chain(passes.iter().zip(&offsets).map(of_pass)).collect();
+        for dispatch in &all {
+            self.programs.prepare(dispatch.program, &self.buffers)?;
+        }
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        let mut last = None;
-        for (pass, &offset) in passes.iter().zip(offsets) {
-            let kernel = &self.kernels[&pass.kernel];
-            if last != Some(pass.kernel) {
-                compute.set_pipeline(&kernel.pipeline);
-                last = Some(pass.kernel);
-            }
-            let dynamic: &[u32] = if kernel.bindings.contains(&PASS_COLORS) { &[offset] } else { &[] };
-            compute.set_bind_group(0, kernel.bind_group.as_ref(), dynamic);
-            compute.dispatch_workgroups(workgroups(problem, pass), 1, 1);
-        }
-        drop(compute);
-        encoder
+        self.encode(&mut encoder, &all);
+        Ok(encoder)
     }
 
-    /// Copies what the plan changed back and waits for it.
-    fn finish(&mut self, problem: &mut StepProblem, mut encoder: wgpu::CommandEncoder) -> Result<()> {
-        let mut changed: [(u32, &mut [u8]); 5] = [
-            (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
-            (shader::IMPULSES, bytemuck::cast_slice_mut(&mut problem.impulses)),
-            (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
-            (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
-            (shader::MOMENTUM, bytemuck::bytes_of_mut(&mut problem.momentum)),
-        ];
-        let size = changed.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
-        if self.read_back.as_ref().is_none_or(|b| b.size() < size) {
-            self.read_back = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("read back"),
-                size: (size + size / 2).next_multiple_of(16),
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }));
-        }
-        let read_back = self.read_back.as_ref().expect("made above");
-        let mut at = 0;
-        for (binding, rows) in &changed {
-            let bytes = rows.len() as u64;
-            if let (Some(buffer), true) = (&self.buffers[*binding as usize], bytes > 0) {
-                encoder.copy_buffer_to_buffer(buffer, 0, read_back, at, bytes);
-                at += bytes;
+    fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, all: &[Dispatch]) {
+        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        self.timer.iter_mut().for_each(Timer::begin);
+        for run in all.chunk_by(|a, b| a.program == b.program) {
+            if let Some(timer) = &mut self.timer {
+                timer.before(&mut compute, run[0].program);
+            }
+            let compiled = self.programs.get(run[0].program);
+            compute.set_pipeline(&compiled.pipeline);
+            for dispatch in run {
+                let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };
+                compute.set_bind_group(0, &compiled.bind_group, offsets);
+                compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
             }
         }
-        self.queue.submit([encoder.finish()]);
-        let slice = read_back.slice(..size);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
-        let lost = |e: &dyn std::fmt::Display| Error::Adapter(format!("the device was lost: {e}"));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-        self.check_device()?;
-        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
-        {
-            let mapped = slice.get_mapped_range().map_err(|e| lost(&e))?;
-            let mut rest = &mapped[..];
-            for (_, rows) in &mut changed {
-                let (own, others) = rest.split_at(rows.len());
-                rows.copy_from_slice(own);
-                rest = others;
-            }
+        if let Some(timer) = &mut self.timer {
+            timer.end(&mut compute);
         }
-        read_back.unmap();
+    }
+
+    /// Submits, brings the `wanted` rows back, and waits for it.
+    fn finish(&mut self, mut encoder: wgpu::CommandEncoder, wanted: &mut [(u32, &mut [u8])]) -> Result<()> {
+        let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
+        let read = self.read_back.submit(encoder, &self.buffers, wanted, times);
+        if let Some(message) = self.device_error.lock().expect("no panic holds it").take() {
+            return Err(Error::Adapter(format!("{}: {message}", self.summary.name)));
+        }
+        let ticks = read.map_err(|e| Error::Adapter(format!("the device was lost: {e}")))?;
+        self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
+        let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
+        self.traffic = Traffic { up: self.buffers.take_sent(), down };
         Ok(())
     }
 
-    fn check_device(&self) -> Result<()> {
-        match self.device_error.lock().expect("no panic holds it").take() {
-            Some(message) => Err(Error::Adapter(format!("{}: {message}", self.summary.name))),
-            None => Ok(()),
+    /// Runs a step whose rows stay on the device, and brings back what moved.
+    fn follow(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+        let first = match self.rows.take().filter(|_| carry.on_device) {
+            Some(before) => {
+                self.check(problem, passes)?;
+                self.carry_over(problem, carry, before)?
+            }
+            None => {
+                self.send_all(problem, passes)?;
+                Vec::new()
+            }
+        };
+        let encoder = self.encoded(problem, first, passes)?;
+        self.finish(encoder, &mut moved_rows_of(problem))?;
+        for (binding, bytes) in moved_rows_of(problem) {
+            self.buffers.note(binding, bytes);
         }
+        // The next step begins with begin_bodies.
+        self.states.clear();
+        self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
+        self.buffers.note(shader::BODIES, bytemuck::cast_slice(&self.states));
+        // The gyroscopic pass turns them.
+        if !problem.inertias.is_empty() {
+            self.buffers.note(shader::MASSES, &[]);
+        }
+        self.rows = Some(Rows::of(problem, carry));
+        Ok(())
     }
 }
 
@@ -277,51 +252,82 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let (pass_colors, offsets) = color_ranges(passes, stride);
-        let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
-        self.upload(problem, &pass_colors, accelerated)?;
-        for pass in passes {
-            self.compile(pass.kernel)?;
-        }
-        let encoder = self.encode(problem, passes, &offsets);
-        self.finish(problem, encoder)
+        self.rows = None;
+        self.send_all(problem, passes)?;
+        let encoder = self.encoded(problem, Vec::new(), passes)?;
+        let mut impulses = std::mem::take(&mut problem.impulses);
+        let mut wanted = moved_rows_of(problem);
+        wanted.push((shader::IMPULSES, bytemuck::cast_slice_mut(&mut impulses)));
+        let finished = self.finish(encoder, &mut wanted);
+        problem.impulses = impulses;
+        finished
     }
 
-    fn bytes_transferred(&self, problem: &StepProblem) -> u64 {
-        let down = size_of_val(&problem.bodies[..])
-            + size_of_val(&problem.impulses[..])
-            + size_of_val(&problem.joint_impulses[..])
-            + size_of::<ConvergenceRow>()
-            + size_of::<MomentumRow>();
-        let up = down
-            + size_of_val(&problem.masses[..])
-            + size_of_val(&problem.inertias[..])
-            + size_of_val(&problem.contacts[..])
-            + size_of_val(&problem.points[..])
-            + size_of_val(&problem.joints[..])
-            + size_of_val(&problem.colors[..]);
-        (up + down) as u64
+    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+        self.follow(problem, passes, carry)
+    }
+
+    fn keeps_rows(&self) -> bool {
+        self.rows.is_some()
+    }
+
+    fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
+        if let Some(rows) = self.rows.filter(|rows| !rows.fetched) {
+            self.fetch_rows(problem, rows)?;
+            self.rows = Some(Rows { fetched: true, ..rows });
+        }
+        Ok(())
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    fn kernel_times(&self) -> &[KernelTime] {
+        &self.times
     }
 }
 
-fn bind(device: &wgpu::Device, buffers: &[Option<wgpu::Buffer>], kernel: &CompiledKernel) -> wgpu::BindGroup {
-    let entry = |&binding: &u32| {
-        let buffer = buffers[binding as usize].as_ref().expect("every buffer is made before a kernel is bound");
-        let size = (binding == PASS_COLORS).then(|| wgpu::BufferSize::new(size_of::<PassColors>() as u64)).flatten();
-        let resource = wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size });
-        wgpu::BindGroupEntry { binding, resource }
-    };
-    let entries: Vec<_> = kernel.bindings.iter().map(entry).collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &kernel.layout, entries: &entries })
+/// Rows of which a step changes little.
+fn small_rows_of(problem: &StepProblem) -> [(u32, &[u8]); 9] {
+    [
+        (shader::PARAMS, bytemuck::bytes_of(&problem.params)),
+        (shader::BODIES, bytemuck::cast_slice(&problem.bodies)),
+        (shader::MASSES, bytemuck::cast_slice(&problem.masses)),
+        (shader::INERTIAS, bytemuck::cast_slice(&problem.inertias)),
+        (shader::COLORS, bytemuck::cast_slice(&problem.colors)),
+        (shader::JOINTS, bytemuck::cast_slice(&problem.joints)),
+        (shader::JOINT_IMPULSES, bytemuck::cast_slice(&problem.joint_impulses)),
+        (shader::CONVERGENCE, bytemuck::bytes_of(&problem.convergence)),
+        (shader::MOMENTUM, bytemuck::bytes_of(&problem.momentum)),
+    ]
+}
+
+/// Rows that follow the contacts: most of a problem.
+fn contact_rows_of(problem: &StepProblem) -> [(u32, &[u8]); 3] {
+    [
+        (shader::CONTACTS, bytemuck::cast_slice(&problem.contacts)),
+        (shader::POINTS, bytemuck::cast_slice(&problem.points)),
+        (shader::IMPULSES, bytemuck::cast_slice(&problem.impulses)),
+    ]
+}
+
+/// Rows that the processor asks for after every step.
+fn moved_rows_of(problem: &mut StepProblem) -> Vec<(u32, &mut [u8])> {
+    vec![
+        (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
+        (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
+        (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
+        (shader::MOMENTUM, bytemuck::bytes_of_mut(&mut problem.momentum)),
+    ]
 }
 
 /// Bytes of the buffers that stay on the device: all but the first are for accelerated sweeps.
-fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [u64; SCRATCH] {
+fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [usize; SCRATCH] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };
     let sums = size_of::<f32>() * impulses.div_ceil(CHUNK);
-    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums].map(|bytes| bytes as u64)
+    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums]
 }
 
 /// The distinct color ranges of the passes, `stride` bytes apart, and where each pass finds its own.
@@ -341,9 +347,8 @@ fn color_ranges(passes: &[Pass], stride: usize) -> (Vec<u8>, Vec<u32>) {
     (bytes, offsets)
 }
 
-/// Workgroups of a pass: one for several colors, which it sweeps in turn; else enough for every row, up to the limit of a
-/// dispatch, beyond which each thread takes several.
-fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
+/// One workgroup sweeps several colors, one after another; else there are enough for every row.
+fn dispatch_of(problem: &StepProblem, pass: &Pass) -> Dispatch {
     let rows = match pass.kernel {
         Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
@@ -355,5 +360,5 @@ fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     };
-    (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535)
+    Dispatch::over(Program::Pass(pass.kernel), rows)
 }
