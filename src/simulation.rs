@@ -254,6 +254,7 @@ impl Simulation {
         config.check()?;
         self.leave_device();
         self.config = config;
+        self.plan = StepPlan::default();
         Ok(())
     }
 

@@ -100,7 +100,7 @@ fn a_step_of_a_run_is_saved_and_solved() {
         ("run pile --steps 10 --save-problem 11:x", &["--save-problem 11:x", "1 to 10"][..]),
         ("run pile --steps 10 --save-problem 0:x", &["1 to 10"]),
         ("run chain --steps 10 --save-problem 1:x", &["chain", "joints"]),
-        ("run pile --steps 1 --save-problem 1:nowhere/x", &["nowhere/x"]),
+        ("run tower --steps 1 --save-problem 1:nowhere/x", &["nowhere/x"]),
     ] {
         let output = drystone(arguments);
         let line = text(&output.stderr).lines().last().expect("a line");

@@ -14,12 +14,12 @@ fn turned_impulse(before: Contact, now: Contact, impulse: Impulse, has_friction:
 fn carry_contact(i: u32) {
     let place = places[i];
     var contact = contacts_before[place.contact];
-    let from = contact.first_point;
+    let first = contact.first_point;
     let count = contact.point_count + carry.patches;
     contact.first_point = place.first_point;
     for (var k = 0u; k < count; k++) {
-        if carry.has_points == 0u { points[place.first_point + k] = points_before[from + k]; }
-        impulses[place.first_point + k] = impulses_before[from + k];
+        if carry.has_points == 0u { points[place.first_point + k] = points_before[first + k]; }
+        impulses[place.first_point + k] = impulses_before[first + k];
     }
     // Computed since: what has an origin has its impulse from there.
     if place.contact >= carry.contacts_before {
@@ -34,8 +34,8 @@ fn carry_contact(i: u32) {
                 }
             }
             if carry.patches == 1u {
-                let patch = impulses_before[before.first_point + before.point_count];
-                impulses[place.first_point + contact.point_count] = turned_impulse(before, contact, patch, true);
+                let whole = impulses_before[before.first_point + before.point_count];
+                impulses[place.first_point + contact.point_count] = turned_impulse(before, contact, whole, true);
             }
         }
     }

@@ -16,7 +16,7 @@ pub(super) struct Rows {
     contacts: usize,
     points: usize,
     /// Whether the preloads are on the device only, and the separations of the problem are without them.
-    pub preloads: bool,
+    preloads: bool,
     /// Whether the problem has everything by now.
     pub fetched: bool,
 }
@@ -139,6 +139,7 @@ impl Gpu {
                 problem.points[own].iter_mut().for_each(|point| point.separation -= contact.preload);
             }
         }
+        self.rows = Some(Rows { fetched: true, ..rows });
         Ok(())
     }
 }

@@ -272,11 +272,10 @@ impl Backend for Gpu {
     }
 
     fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
-        if let Some(rows) = self.rows.filter(|rows| !rows.fetched) {
-            self.fetch_rows(problem, rows)?;
-            self.rows = Some(Rows { fetched: true, ..rows });
+        match self.rows {
+            Some(rows) if !rows.fetched => self.fetch_rows(problem, rows),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn traffic(&self) -> Traffic {
