@@ -32,6 +32,8 @@ pub struct RunReport {
     pub step_ms: Vec<f64>,
     /// Wall time of each stage, median and least over the steps [ms].
     pub stage_ms: Vec<StageRow>,
+    /// Time of each kernel by the clock of the device, where it has one, median and least over the steps [ms].
+    pub kernel_ms: Vec<KernelRow>,
     /// Manifolds of the last step.
     pub manifolds: usize,
     /// Contact points of the last step.
@@ -89,6 +91,8 @@ pub struct RunReport {
     #[serde(skip)]
     stage_times: Vec<[f64; 5]>,
     #[serde(skip)]
+    kernel_times: Vec<(&'static str, Vec<f64>)>,
+    #[serde(skip)]
     energy_before: f64,
     #[serde(skip)]
     stands: bool,
@@ -103,6 +107,17 @@ pub struct Standing {
     pub bodies: usize,
     /// Those of them that are in place.
     pub in_place: usize,
+}
+
+/// Time of one kernel over a run [ms].
+#[derive(Clone, Debug, Serialize)]
+pub struct KernelRow {
+    /// Name of the kernel.
+    pub kernel: &'static str,
+    /// Median over the steps that it was in.
+    pub median: f64,
+    /// Least over them.
+    pub min: f64,
 }
 
 /// Time of one stage over a run [ms].
@@ -129,6 +144,7 @@ impl RunReport {
             config: simulation.config().clone(),
             step_ms: Vec::new(),
             stage_ms: Vec::new(),
+            kernel_ms: Vec::new(),
             manifolds: 0,
             points: 0,
             asleep: 0,
@@ -157,6 +173,7 @@ impl RunReport {
             non_finite: 0,
             first_non_finite: None,
             stage_times: Vec::new(),
+            kernel_times: Vec::new(),
             energy_before: energy(&scene.world),
             stands: scene.stands,
         }
@@ -168,6 +185,12 @@ impl RunReport {
         self.steps += 1;
         self.step_ms.push(ms(stats.times.total()));
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
+        for kernel in &stats.kernels {
+            match self.kernel_times.iter_mut().find(|known| known.0 == kernel.kernel) {
+                Some(known) => known.1.push(ms(kernel.time)),
+                None => self.kernel_times.push((kernel.kernel, vec![ms(kernel.time)])),
+            }
+        }
         self.manifolds = stats.manifolds;
         self.points = stats.points;
         self.asleep = stats.asleep;
@@ -186,15 +209,16 @@ impl RunReport {
 
     /// Measures how the run ended.
     pub fn measure(&mut self, scene: &Scene, simulation: &mut Simulation) {
+        let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
         let names = StepStats::default().times.stages().map(|s| s.0);
-        self.stage_ms = (0..names.len())
-            .map(|i| {
-                let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
-                let min = times.iter().copied().fold(f64::INFINITY, f64::min);
-                StageRow { stage: names[i], median: median(&times), min }
-            })
-            .filter(|row| row.min.is_finite())
-            .collect();
+        let stage = |(i, stage): (usize, &'static str)| {
+            let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
+            StageRow { stage, median: median(&times), min: least(&times) }
+        };
+        self.stage_ms = names.into_iter().enumerate().map(stage).filter(|row| row.min.is_finite()).collect();
+        let kernel =
+            |(kernel, times): &(&'static str, Vec<f64>)| KernelRow { kernel, median: median(times), min: least(times) };
+        self.kernel_ms = self.kernel_times.iter().map(kernel).collect();
         let penetration = simulation.penetration();
         let world = &simulation.world;
         let (speed, body) = fastest(world);
@@ -262,6 +286,13 @@ impl RunReport {
         }
         for stage in &self.stage_ms {
             row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
+        }
+        for kernel in &self.kernel_ms {
+            row(&format!("    {}", kernel.kernel), format!("{:.3} median, {:.3} least", kernel.median, kernel.min));
+        }
+        if self.bytes_up > 0 {
+            let kb = |bytes: u64| bytes as f64 / 1e3;
+            row("last step", format!("{:.1} kB to the device, {:.1} kB back", kb(self.bytes_up), kb(self.bytes_down)));
         }
         row(
             "penetration",
