@@ -24,6 +24,9 @@ pub struct RunArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
+    /// Take the time of each kernel by the clock of the GPU; a software adapter is slower with it.
+    #[arg(long)]
+    kernel_times: bool,
     /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
     #[arg(long)]
     no_sleep: bool,
@@ -83,9 +86,12 @@ impl RunArgs {
             config.sleep_after = 0.5;
         }
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
-        let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
+        let (mut backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         eprintln!("{why}");
+        if self.kernel_times {
+            backend.time_kernels();
+        }
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
         let bar = progress(scene.steps, self.scene.json);

@@ -56,6 +56,7 @@ pub(crate) use adapter::open_for_surface;
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
+    queue: wgpu::Queue,
     summary: AdapterSummary,
     exact: bool,
     programs: Programs,
@@ -108,9 +109,10 @@ impl Gpu {
         Ok(Self {
             programs: Programs::new(device.clone(), exact),
             buffers: Buffers::new(device.clone(), queue.clone(), summary.name.clone()),
-            timer: Timer::new(&device, &queue),
-            read_back: ReadBack::new(device.clone(), queue),
+            timer: None,
+            read_back: ReadBack::new(device.clone(), queue.clone()),
             device,
+            queue,
             summary,
             exact,
             times: Vec::new(),
@@ -280,6 +282,10 @@ impl Backend for Gpu {
 
     fn traffic(&self) -> Traffic {
         self.traffic
+    }
+
+    fn time_kernels(&mut self) {
+        self.timer = Timer::new(&self.device, &self.queue);
     }
 
     fn kernel_times(&self) -> &[KernelTime] {

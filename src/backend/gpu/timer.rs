@@ -1,4 +1,7 @@
 //! How long each program takes, by the device's own clock, where it has one that can be asked inside a pass.
+//!
+//! Only when asked for: the software adapter ends what it is doing at every timestamp, and a step of a tower of ten took 2.6
+//! times as long with them.
 
 use std::time::Duration;
 
