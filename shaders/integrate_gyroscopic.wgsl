@@ -1,5 +1,5 @@
-// integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint,
-// and turns its inverse inertia along. Reads inertias. Writes bodies, free and masses; one thread a body.
+// integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint.
+// Reads inertias. Writes bodies and free; one thread a body.
 // Double: src/kernels/integrate.rs.
 
 // Solves rows x = g by Cramer's rule.
@@ -42,16 +42,5 @@ fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_w
         let turn = x * change.x + y * change.y + z * change.z;
         free[inertia.body].w = w + turn;
         bodies[inertia.body].w += turn;
-
-        // The inverse inertia in world axes.
-        let kx = x * k.x;
-        let ky = y * k.y;
-        let kz = z * k.z;
-        masses[inertia.body].inv_inertia_x = x * kx.x + y * ky.x + z * kz.x;
-        masses[inertia.body].inv_inertia_yz = vec3f(
-            x.y * kx.y + y.y * ky.y + z.y * kz.y,
-            x.z * kx.y + y.z * ky.y + z.z * kz.y,
-            x.z * kx.z + y.z * ky.z + z.z * kz.z,
-        );
     }
 }

@@ -1,6 +1,7 @@
 //! What a run got wrong: penetration, speed and what fell, in f64.
 
-use crate::collide::Pair;
+use crate::collide::{Detector, Pair};
+use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, World};
 
 /// Overlap over all touching pairs.
@@ -15,6 +16,13 @@ pub struct Penetration {
 }
 
 impl Penetration {
+    /// Of a world as it is, from contacts computed anew; `config` says how near counts as contact.
+    pub fn of_world(world: &World, config: &SolverConfig) -> Self {
+        let mut detector = Detector::new(world);
+        detector.detect(world, config, 0.0, &[], &|_| ());
+        Self::of(detector.pairs())
+    }
+
     /// Of the manifolds of `pairs`; a manifold that is apart counts as zero.
     pub fn of(pairs: &[Pair]) -> Self {
         let deepest = |m: &crate::collide::Manifold| {

@@ -292,7 +292,7 @@ impl Pass {
             }
             Kernel::IntegratePositions => problem.bodies.len() * (BODY + BODY / 2),
             Kernel::IntegrateGyroscopic => {
-                problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY + MASS)
+                problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
             }
             Kernel::ClearImpulses => problem.impulses.len() * 2 * IMPULSE,
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),

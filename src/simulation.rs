@@ -221,11 +221,10 @@ impl Simulation {
         self.sleep.asleep().get(body) == Some(&true)
     }
 
-    /// Overlap of the world as it is now, from contacts computed anew.
-    pub fn penetration(&mut self) -> Penetration {
-        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
-        self.detector.detect_anew(&self.world, &self.config, 0.0, &give_back);
-        Penetration::of(self.detector.pairs())
+    /// Overlap of the world as it is now, from contacts computed anew. The next step is as if nobody had asked: towers of 60
+    /// that stand for 20 s fall if their contacts are recomputed now and then, since reused contacts do not creep.
+    pub fn penetration(&self) -> Penetration {
+        Penetration::of_world(&self.world, &self.config)
     }
 
     /// Contacts and impulses of the last step.

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The modules of each floor, the ground floor first.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["math", "error", "files", "stats"],
-    &["world", "config"],
+    &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
+    &["hard"],
     &["report", "compare", "view", "maze"],
     &["main", "cli"],
 ];

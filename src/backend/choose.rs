@@ -19,6 +19,41 @@ pub enum BackendChoice {
     Reference,
 }
 
+/// What runs sweeps, by the numbers that it computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Numbers {
+    /// The reference in double precision.
+    F64,
+    /// The reference, one constraint at a time on one thread, in single precision.
+    Reference,
+    /// Eight constraints at a time, in single precision.
+    Cpu,
+    /// The compute shaders, in single precision.
+    Gpu,
+}
+
+impl Numbers {
+    /// Opens it. `exact` asks a GPU for the reference's bits.
+    ///
+    /// # Errors
+    /// No adapter, or one that cannot do what is asked.
+    pub fn open(self, exact: bool) -> Result<Box<dyn Backend>> {
+        Ok(match self {
+            Self::F64 => Box::new(Reference::<f64>::new()),
+            Self::Reference => Box::new(Reference::<f32>::new()),
+            Self::Cpu => Box::new(Cpu::new()),
+            Self::Gpu => Box::new(Gpu::new(AdapterChoice::Best, exact)?),
+        })
+    }
+}
+
+impl std::fmt::Display for Numbers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
+    }
+}
+
 /// Dynamic bodies from which `auto` takes a GPU. Below it the dispatches of a step cost more than its sweeps do on a
 /// processor: a colored step is some 200 dispatches of 5 to 10 us each.
 pub const AUTO_GPU_BODIES: usize = 5_000;

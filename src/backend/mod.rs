@@ -4,7 +4,7 @@ mod choose;
 pub mod cpu;
 pub mod gpu;
 
-pub use choose::{AUTO_GPU_BODIES, BackendChoice, choose};
+pub use choose::{AUTO_GPU_BODIES, BackendChoice, Numbers, choose};
 
 use crate::error::Result;
 use crate::plan::Pass;

@@ -3,6 +3,7 @@
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
+mod hard;
 mod list;
 mod play;
 #[cfg(feature = "view")]
@@ -22,6 +23,8 @@ use clap::{Args, Parser, Subcommand};
 use crate::config::{Method, SolverConfig};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
+use crate::load::Load;
+use crate::preset::Preset;
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::stats::StepStats;
@@ -51,6 +54,8 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
+    /// Run hard cases and say which pass.
+    Hard(hard::HardArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
@@ -96,6 +101,13 @@ struct SceneArgs {
     /// Length of a step in seconds; the scene says if this does not.
     #[arg(long, value_name = "SECONDS")]
     dt: Option<f32>,
+    /// Settings by name, before --set and the others.
+    #[arg(long, value_enum, conflicts_with = "config", default_value_t)]
+    preset: Preset,
+    /// Choose the substeps so that what stands overlaps no deeper at rest, as 1mm or 0.001 (meters); a heavy load
+    /// that comes on at once swings up to twice as deep.
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "substeps")]
+    max_penetration: Option<f64>,
     /// Substeps of a step.
     #[arg(long)]
     substeps: Option<u32>,
@@ -127,7 +139,7 @@ impl SceneArgs {
     fn load(&self) -> Result<(Scene, SolverConfig)> {
         let mut config = match &self.config {
             Some(path) => SolverConfig::from_toml_file(path)?,
-            None => SolverConfig::default(),
+            None => self.preset.config(),
         };
         for assignment in &self.set {
             config.set(assignment)?;
@@ -147,6 +159,9 @@ impl SceneArgs {
             scene.dt = dt;
         }
         scene.steps = self.steps.unwrap_or(scene.steps);
+        if let Some(most) = self.max_penetration {
+            choose_substeps(&mut config, &scene, most)?;
+        }
         Ok((scene, config))
     }
 
@@ -173,14 +188,48 @@ fn step_with_contacts(
     }
 }
 
+/// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
+fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
+    let Some(load) = Load::heaviest(&scene.world, config) else {
+        eprintln!("substeps {}: no body of {} bears another", config.substeps, scene.name);
+        return Ok(());
+    };
+    config.substeps = load.substeps(most, scene.dt, config)?;
+    let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
+    let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
+    eprintln!(
+        "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"
+    );
+    Ok(())
+}
+
+/// A length as `1mm`, `0.1cm` or `0.001m`; a bare number is in meters.
+fn length(text: &str) -> std::result::Result<f64, String> {
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_alphabetic() && c != 'e').unwrap_or(text.len()));
+    let unit = match unit {
+        "" | "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" => 1e-3,
+        "um" => 1e-6,
+        _ => return Err("write it as 1mm, 0.1cm or 0.001m".into()),
+    };
+    let meters = number.trim().parse::<f64>().map_err(|_| "write it as 1mm, 0.1cm or 0.001m")? * unit;
+    if meters > 0.0 && meters.is_finite() { Ok(meters) } else { Err("must be more than 0".into()) }
+}
+
 /// A progress bar on a terminal, nothing elsewhere.
 fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
+    progress_of("step", steps.into(), quiet)
+}
+
+/// A progress bar over `count` of what `unit` names.
+fn progress_of(unit: &str, count: u64, quiet: bool) -> indicatif::ProgressBar {
     if quiet {
         return indicatif::ProgressBar::hidden();
     }
-    let style = "{bar:40} step {pos}/{len}  {per_sec}  {eta} left";
-    let style = indicatif::ProgressStyle::with_template(style).expect("a fixed template");
-    indicatif::ProgressBar::new(steps.into()).with_style(style)
+    let style = format!("{{bar:40}} {unit} {{pos}}/{{len}}  {{per_sec}}  {{eta}} left  {{msg}}");
+    let style = indicatif::ProgressStyle::with_template(&style).expect("a fixed template");
+    indicatif::ProgressBar::new(count).with_style(style)
 }
 
 /// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
@@ -206,6 +255,7 @@ pub fn main() -> std::process::ExitCode {
         Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
+        Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Report(args) => args.run(),

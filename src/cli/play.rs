@@ -94,11 +94,11 @@ impl MazeArgs {
         use crate::maze::SAMPLES;
         use crate::view::{Canvas, Output, draw_game, poses};
         // What cannot be drawn or written is refused before the game.
-        let (map, world) = (game.map.clone(), game.simulation.world.clone());
+        let (map, world) = (game.map.clone(), game.world().clone());
         let mut canvas = Canvas::new(&world, self.size)?;
         let mut output = Output::open(out, self.size, SAMPLES)?;
         let mut frames = Vec::new();
-        let played = play(game, script, |game| frames.push(poses(&game.simulation.world)))?;
+        let played = play(game, script, |game| frames.push(poses(game.world())))?;
         if out.extension().is_some_and(|e| e == "png") {
             frames = vec![frames.swap_remove(frames.len() / 2)];
         }
@@ -128,7 +128,7 @@ impl MazeArgs {
             Outcome::Time => "not decided when the script ended",
         };
         let slip = played.slip;
-        print(format_args!("{} on {}: {how} after {:.2} s", played.board, played.backend, played.time))?;
+        print(format_args!("{} on {}: {how} after {:.2} s", played.board, played.engine, played.time))?;
         print(format_args!("  slip while rolling {:.3} mm/s rms, {:.3} mm/s at most", slip.rms * 1e3, slip.max * 1e3))?;
         print(format_args!("  penetration {:.4} mm deepest", f64::from(played.penetration) * 1e3))
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{print, print_json};
-use crate::backend::{BackendChoice, choose};
+use crate::backend::Numbers;
 use crate::config::Method;
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
@@ -14,20 +14,6 @@ use crate::solver::Order;
 
 /// Most sweeps where a tolerance says when to end.
 const MOST_SWEEPS: u32 = 40_000;
-
-/// What runs the sweeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-enum Numbers {
-    /// The reference in double precision.
-    #[default]
-    F64,
-    /// The reference, one manifold at a time on one thread, in single precision.
-    Reference,
-    /// Eight manifolds at a time, in single precision.
-    Cpu,
-    /// The compute shaders, in single precision.
-    Gpu,
-}
 
 /// Arguments of `drystone solve`.
 #[derive(Args)]
@@ -50,7 +36,7 @@ pub struct SolveArgs {
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
     /// What runs them; errors are always measured in f64.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value = "f64")]
     backend: Numbers,
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
@@ -74,14 +60,7 @@ impl SolveArgs {
             sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps },
             tolerance: self.tolerance.unwrap_or(0.0),
         };
-        let choice = match self.backend {
-            Numbers::F64 => None,
-            Numbers::Reference => Some(BackendChoice::Reference),
-            Numbers::Cpu => Some(BackendChoice::Cpu),
-            Numbers::Gpu => Some(BackendChoice::Gpu),
-        };
-        let backend =
-            choice.map(|c| choose(c, problem.bodies.len(), self.exact)).transpose()?.map(|(backend, _)| backend);
+        let backend = (self.backend != Numbers::F64).then(|| self.backend.open(self.exact)).transpose()?;
         let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;

@@ -180,18 +180,6 @@ impl Detector {
         self.reshaped_in
     }
 
-    /// Computes every manifold anew at the poses of `world`: for measuring, where reused ones would be a little off.
-    pub fn detect_anew(
-        &mut self,
-        world: &World,
-        config: &SolverConfig,
-        dt: f32,
-        give_back: &(dyn Fn(&mut Pair) + Sync),
-    ) -> DetectStats {
-        self.pairs.iter_mut().for_each(Pair::invalidate);
-        self.detect(world, config, dt, &[], give_back)
-    }
-
     /// Finds new pairs and ends parted ones; returns whether it ended any.
     fn broad_phase(&mut self, margins: Margins, activity: &[Activity]) -> bool {
         let mut parted = false;

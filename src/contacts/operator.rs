@@ -47,22 +47,6 @@ impl<'a> Operator<'a> {
         velocities
     }
 
-    /// How far the velocity [m/s] and the angular velocity [rad/s] of each body move at most if every impulse [N s] changes by
-    /// a share of itself.
-    pub fn moved_at_most(&self, impulses: &[DVec3], share: f64) -> Vec<[f64; 2]> {
-        let mut moved = vec![[0.0; 2]; self.problem.bodies.len()];
-        for (contact, &r) in self.problem.contacts.iter().zip(impulses) {
-            let p = contact.impulse(r) * share;
-            for (body, arm) in [(contact.a, contact.r_a), (contact.b, contact.r_b)] {
-                if let Some(body) = body.map(|i| i as usize) {
-                    moved[body][0] += p.length() / self.problem.bodies[body].mass;
-                    moved[body][1] += (self.inverse_inertia[body] * arm.cross(p)).length();
-                }
-            }
-        }
-        moved
-    }
-
     /// The relative velocity u at a contact, offset included, in its coordinates [m/s].
     pub fn relative_velocity(&self, contact: usize, velocities: &[Velocity]) -> DVec3 {
         let contact = &self.problem.contacts[contact];

@@ -1,7 +1,7 @@
 //! What happens to one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic` and
 //! `integrate_positions`.
 
-use super::rows::{Body, Free, Inertia, Mass, StepParams, Sym3};
+use super::rows::{Body, Free, Inertia, Mass, StepParams};
 use crate::math::{Lane, Vec3, cross3, dot3, exp_rotation, quat_mul, reciprocal, renormalized, turned, vec3};
 
 /// Adds gravity and force; with `carry` also the impulses that the substep before ended with.
@@ -44,14 +44,13 @@ fn solve_3x3<L: Lane>(row_0: Vec3<L>, row_1: Vec3<L>, row_2: Vec3<L>, g: Vec3<L>
 
 /// Turns the spin of a body with unequal moments of inertia, by implicit midpoint: I (x - w) + h m x I m = 0 with m
 /// midway, which keeps energy and momentum (to 1e-9 over 20 s in f64, where explicit Euler gains eightfold and implicit
-/// Euler loses most of it). Two Newton steps. Its inverse inertia turns along.
+/// Euler loses most of it). Two Newton steps.
 #[inline(always)]
 pub fn integrate_gyroscopic<L: Lane>(
     params: &StepParams<L>,
     inertia: &Inertia<L>,
     body: &mut Body<L>,
     free: &mut Free<L>,
-    mass: &mut Mass<L>,
 ) {
     let (zero, one, half) = (L::constant(0.0), L::constant(1.0), L::constant(0.5));
     let (p, k) = (inertia.principal, inertia.inv_principal);
@@ -81,15 +80,4 @@ pub fn integrate_gyroscopic<L: Lane>(
     let turn = x * change.x + y * change.y + z * change.z;
     free.w += turn;
     body.w += turn;
-
-    // The inverse inertia in world axes.
-    let (kx, ky, kz) = (x * k.x, y * k.y, z * k.z);
-    mass.inv_inertia = Sym3 {
-        x: x * kx.x + y * ky.x + z * kz.x,
-        yz: vec3(
-            x.y * kx.y + y.y * ky.y + z.y * kz.y,
-            x.z * kx.y + y.z * ky.y + z.z * kz.y,
-            x.z * kx.z + y.z * ky.z + z.z * kz.z,
-        ),
-    };
 }

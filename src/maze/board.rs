@@ -72,6 +72,36 @@ fn corners(map: &Map, row: isize, column: isize) -> [Vec3; 4] {
     [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(r, c)| corner(map, (row + r) as f32, (column + c) as f32))
 }
 
+/// How far the ball is from what it can touch [m]; negative when it overlaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gap {
+    /// From the floor; none over a hole.
+    pub floor: Option<f32>,
+    /// From the nearest wall; infinite if none is in one of the cells around.
+    pub wall: f32,
+}
+
+/// Distances of a ball whose middle is at `ball`, on the board.
+pub(super) fn gap(map: &Map, ball: Vec3) -> Gap {
+    let origin = corner(map, 0.0, 0.0);
+    let (row, column) = (((ball.z - origin.z) / CELL).floor(), ((ball.x - origin.x) / CELL).floor());
+    let mut gap = Gap { floor: Some(ball.y - RADIUS), wall: f32::INFINITY };
+    for (down, right) in (-1..=1).flat_map(|down| (-1..=1).map(move |right| (down, right))) {
+        let (row, column) = (row as isize + down, column as isize + right);
+        let low = corner(map, row as f32, column as f32);
+        let aside = |from: Vec3| Vec2::new(ball.x - from.x, ball.z - from.z).length();
+        match map.at(row, column) {
+            Cell::Wall => {
+                let nearest = ball.clamp(low, low + Vec3::new(CELL, HEIGHT, CELL));
+                gap.wall = gap.wall.min(aside(nearest) - RADIUS);
+            }
+            Cell::Hole if aside(low + 0.5 * Vec3::new(CELL, 0.0, CELL)) < HOLE => gap.floor = None,
+            _ => {}
+        }
+    }
+    gap
+}
+
 /// Cells with the rim of walls around them.
 fn places(map: &Map) -> impl Iterator<Item = (isize, isize)> {
     let (rows, columns) = (map.rows as isize, map.columns as isize);
@@ -209,6 +239,17 @@ mod tests {
             let board = board - CELL * CELL;
             assert!((seen + holes * hole - board).abs() < 1e-4 * board, "{name}: {seen} m² and {holes} holes");
         }
+    }
+
+    #[test]
+    fn gaps_are_those_to_floor_wall_and_hole() {
+        let map = Map::parse("m", "S.O\n..G\n").expect("a map");
+        let at = |x: f32, y: f32, z: f32| gap(&map, corner(&map, 0.0, 0.0) + Vec3::new(x, y, z));
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-6;
+        let free = at(1.5 * CELL, RADIUS + 0.001, CELL);
+        assert!(near(free.floor.expect("floor"), 0.001) && near(free.wall, CELL - RADIUS), "{free:?}");
+        assert!(near(at(RADIUS - 0.002, RADIUS, CELL).wall, -0.002));
+        assert_eq!(at(2.5 * CELL, 0.0, 0.5 * CELL).floor, None);
     }
 
     #[test]

@@ -3,18 +3,22 @@
 use glam::{Quat, Vec3};
 use serde::Serialize;
 
-use super::board::{BALL, BOARD, CELL, GOAL, RADIUS, center_of, scene};
+use super::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
 use super::map::Map;
 use super::script::{Script, TILT_LIMIT};
 use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::Result;
+use crate::scenes::Scene;
 use crate::simulation::Simulation;
+use crate::world::World;
 
 /// How fast the board tilts [degrees/s].
 const TILT_RATE: f32 = 60.0;
 /// Steps after which a ball on the floor rolls: a tenth of a second.
 const SETTLED: u32 = 12;
+/// The ball touches what is nearer than this [m].
+const ON_FLOOR: f32 = 2e-5;
 /// The ball has arrived when its middle is this near to the goal's [m].
 const ARRIVED: f32 = 0.4 * CELL;
 
@@ -42,12 +46,44 @@ pub struct Slip {
     pub steps: u32,
 }
 
+/// What moves the bodies of a game: drystone's [`Simulation`], or another engine that is compared with it.
+pub trait Engine {
+    /// What it is called.
+    fn name(&self) -> String;
+    /// The bodies as they are.
+    fn world(&self) -> &World;
+    /// The same, to write the velocities of the kinematic ones.
+    fn world_mut(&mut self) -> &mut World;
+    /// Moves them by `dt` seconds.
+    ///
+    /// # Errors
+    /// It cannot.
+    fn step(&mut self, dt: f32) -> Result<()>;
+}
+
+impl Engine for Simulation {
+    fn name(&self) -> String {
+        self.backend().name().into()
+    }
+
+    fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    fn step(&mut self, dt: f32) -> Result<()> {
+        self.step(dt).map(|_| ())
+    }
+}
+
 /// A game that is played.
 pub struct Game {
     /// The board.
     pub map: Map,
-    /// Its world; the board is body [`BOARD`], the ball [`BALL`].
-    pub simulation: Simulation,
+    engine: Box<dyn Engine>,
     /// How it ended, if it did.
     pub outcome: Option<Outcome>,
     /// Tilts of the board now, to the right and to the front [degrees].
@@ -66,19 +102,31 @@ impl Game {
     /// # Errors
     /// A setting is out of range.
     pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
+        Self::with(map, |scene| Ok(Box::new(Simulation::new(scene.world, config, backend)?)))
+    }
+
+    /// A game that has not begun, moved by the engine that `build` makes for its scene.
+    ///
+    /// # Errors
+    /// What `build` returns.
+    pub fn with(map: Map, build: impl FnOnce(Scene) -> Result<Box<dyn Engine>>) -> Result<Self> {
         let scene = scene(&map)?;
-        let simulation = Simulation::new(scene.world, config, backend)?;
         Ok(Self {
             map,
-            simulation,
             outcome: None,
             tilt: [0.0; 2],
             steps: 0,
             dt: scene.dt,
+            engine: build(scene)?,
             rolled: 0,
             slips: (0.0, 0.0, 0),
             deepest: 0.0,
         })
+    }
+
+    /// Board and ball: bodies [`BOARD`] and [`BALL`], and what else is seen.
+    pub fn world(&self) -> &World {
+        self.engine.world()
     }
 
     /// Seconds since the start.
@@ -93,7 +141,7 @@ impl Game {
 
     /// Where the ball is, on the board [m].
     pub fn ball(&self) -> Vec3 {
-        let bodies = &self.simulation.world.bodies;
+        let bodies = &self.world().bodies;
         bodies[BOARD].rotation.inverse() * bodies[BALL].position
     }
 
@@ -111,10 +159,10 @@ impl Game {
         }
         let [right, front] = self.tilt.map(f32::to_radians);
         let rotation = Quat::from_rotation_x(front) * Quat::from_rotation_z(-right);
-        for body in &mut self.simulation.world.bodies[..BALL] {
+        for body in &mut self.engine.world_mut().bodies[..BALL] {
             body.move_to(Vec3::ZERO, rotation, self.dt);
         }
-        self.simulation.step(self.dt)?;
+        self.engine.step(self.dt)?;
         self.steps += 1;
         self.measure();
 
@@ -129,23 +177,17 @@ impl Game {
         Ok(())
     }
 
-    /// Slip while the floor is all that the ball touches, and overlap.
+    /// Overlap, and slip while the floor is all that the ball touches: from poses and velocities alone, so that engines can be
+    /// compared.
     fn measure(&mut self) {
-        let (world, pairs) = self.simulation.world_and_pairs();
-        let (board, ball) = (&world.bodies[BOARD], &world.bodies[BALL]);
-        let up = board.rotation * Vec3::Y;
-        let (mut on_floor, mut elsewhere) = (false, false);
-        for (pair, manifold) in pairs.iter().flat_map(|p| p.manifolds.iter().map(move |m| (p, m))) {
-            let is_floor = [BOARD, GOAL].contains(&(pair.body_a as usize)) && manifold.normal.dot(up) > 0.999;
-            let bears = manifold.points().iter().any(|p| p.normal_impulse > 0.0);
-            on_floor |= is_floor && bears;
-            elsewhere |= !is_floor && bears;
-            let depth = manifold.points().iter().map(|p| -p.separation).fold(0.0, f32::max);
-            self.deepest = self.deepest.max(depth);
-        }
-        self.rolled = if on_floor && !elsewhere { self.rolled + 1 } else { 0 };
+        let gap = gap(&self.map, self.ball());
+        self.deepest = self.deepest.max(-gap.floor.unwrap_or(0.0)).max(-gap.wall);
+        let rolls = gap.floor.is_some_and(|floor| floor < ON_FLOOR) && gap.wall > ON_FLOOR;
+        self.rolled = if rolls { self.rolled + 1 } else { 0 };
         if self.rolled > SETTLED {
-            let at = ball.position - RADIUS * up;
+            let bodies = &self.world().bodies;
+            let (board, ball) = (&bodies[BOARD], &bodies[BALL]);
+            let at = ball.position - RADIUS * (board.rotation * Vec3::Y);
             let slip = f64::from((ball.velocity_at(at) - board.velocity_at(at)).length());
             let (squares, max, steps) = &mut self.slips;
             *squares += slip * slip;
@@ -160,7 +202,7 @@ impl Game {
         Slip { rms: (squares / f64::from(steps.max(1))).sqrt(), max, steps }
     }
 
-    /// Deepest overlap at the beginning of any step so far [m].
+    /// Deepest overlap with floor or walls at the end of any step so far [m].
     pub fn penetration(&self) -> f32 {
         self.deepest
     }
@@ -180,8 +222,8 @@ pub struct Sample {
 pub struct Played {
     /// Name of the board.
     pub board: String,
-    /// What ran the sweeps.
-    pub backend: String,
+    /// What moved the bodies.
+    pub engine: String,
     /// How it ended.
     pub outcome: Outcome,
     /// When it ended [s].
@@ -224,7 +266,7 @@ pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Re
         steps: game.steps,
         penetration: game.penetration(),
         slip: game.slip(),
-        backend: game.simulation.backend().name().into(),
+        engine: game.engine.name(),
         board: game.map.name,
         track,
     })

@@ -15,7 +15,7 @@ mod pilot;
 mod script;
 
 pub use board::{BALL, BOARD, CELL, GOAL, RADIUS, scene};
-pub use game::{Game, Outcome, Played, SAMPLES, Sample, Slip, play};
+pub use game::{Engine, Game, Outcome, Played, SAMPLES, Sample, Slip, play};
 pub use map::{BOARDS, Cell, Map};
 pub use pilot::pilot;
 pub use script::{Script, TILT_LIMIT};

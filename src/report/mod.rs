@@ -2,6 +2,7 @@
 
 mod convergence;
 pub mod front;
+pub mod hard_cases;
 mod plot;
 mod rules;
 mod run;

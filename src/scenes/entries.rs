@@ -177,8 +177,30 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("storeys", 3, (1.0, 100.0), "number of storeys"),
             Parameter::real("angle", 20.0, (5.0, 45.0), "lean of the cards from the vertical [degrees]"),
             MU,
+            Parameter::real("length", 1.0, (0.01, 10.0), "length of a card [m]"),
+            Parameter::real("thickness", 0.04, (1e-4, 0.1), "thickness of a card [m]; at most a fifth of the length"),
         ],
-        build: |v| Ok(masonry::card_house(v[0] as usize, v[1], v[2] as f32)),
+        build: |v| {
+            if v[4] > 0.2 * v[3] {
+                return Err(Error::input(format!(
+                    "thickness = {}: must be at most a fifth of length = {}",
+                    v[4], v[3]
+                )));
+            }
+            Ok(masonry::card_house(v[0] as usize, v[1], v[2] as f32, v[3], v[4]))
+        },
+    },
+    Entry {
+        name: "aqueduct",
+        summary: "arches of wedges side by side on piers of loose blocks, slabs on their crowns, no mortar: it stands",
+        parameters: &[Parameter::whole("arches", 4, (1.0, 1000.0), "number of arches")],
+        build: |v| masonry::aqueduct(v[0] as usize),
+    },
+    Entry {
+        name: "kapla",
+        summary: "a tower of equal planks, in each storey nine on end and six across: it stands",
+        parameters: &[Parameter::whole("storeys", 7, (1.0, 1000.0), "number of storeys")],
+        build: |v| Ok(masonry::kapla(v[0] as usize)),
     },
     Entry {
         name: "dominoes",

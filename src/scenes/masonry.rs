@@ -1,4 +1,4 @@
-//! What stands without mortar, or falls in turn: arch, house of cards, dominoes, pyramid under a heavy box.
+//! What stands without mortar, or falls in turn: arch, aqueduct, house of cards, planks, dominoes, pyramid under a heavy box.
 
 use std::f64::consts::PI;
 
@@ -7,57 +7,165 @@ use glam::{Quat, Vec3};
 use super::Scene;
 use super::parts::{centered, floor, unit_box};
 use crate::error::Result;
-use crate::world::{Body, Shape};
+use crate::world::{Body, Shape, World};
+
+/// Distance between neighboring stones at the start [m]: of hulls that touch exactly, nothing says which way they touch.
+const GAP: f64 = 1e-4;
+/// Friction of stones.
+const STONE: f32 = 0.6;
+
+/// Wedges that make a semicircle about the z axis.
+struct Ring {
+    /// Mean radius [m].
+    radius: f64,
+    /// Relative to the mean radius.
+    thickness: f64,
+    /// Along z [m].
+    depth: f32,
+    voussoirs: usize,
+}
+
+impl Ring {
+    /// Half of the angle of a wedge [rad].
+    fn half(&self) -> f64 {
+        PI / self.voussoirs as f64 / 2.0
+    }
+
+    fn outer(&self) -> f64 {
+        self.radius * (1.0 + self.thickness / 2.0)
+    }
+
+    /// Top of the middle wedge over the center, if their number is odd [m].
+    fn crown(&self) -> f64 {
+        self.outer() * self.half().cos() + GAP / 2.0
+    }
+
+    /// Adds the wedges, the springing at height `y` around `x`.
+    fn add_to(&self, world: &mut World, x: f64, y: f64) -> Result<()> {
+        let (inner, outer) = (2.0 * self.radius - self.outer(), self.outer());
+        // In the frame of a wedge x points out of the arch and y along it.
+        let corner = |r: f64, angle: f64, z: f32| {
+            Vec3::new((r * angle.cos() - self.radius) as f32, (r * angle.sin()) as f32, z * self.depth)
+        };
+        // Both faces of a wedge are half of the gap further in.
+        let slit = |r: f64| self.half() - GAP / 2.0 / r;
+        let sides = [(inner, -slit(inner)), (inner, slit(inner)), (outer, -slit(outer)), (outer, slit(outer))];
+        let corners: Vec<Vec3> = sides.iter().flat_map(|&(r, a)| [-0.5, 0.5].map(|z| corner(r, a, z))).collect();
+        let wedge = Body::dynamic().shape(Shape::convex_hull(&corners)?).friction(STONE);
+        for k in 0..self.voussoirs {
+            let angle = (2 * k + 1) as f64 * self.half();
+            let (dx, dy) = (self.radius * angle.cos(), GAP / 2.0 + self.radius * angle.sin());
+            let place = wedge.clone().position((x + dx) as f32, (y + dy) as f32, 0.0);
+            world.add(place.rotation(Quat::from_rotation_z(angle as f32)));
+        }
+        Ok(())
+    }
+}
 
 /// A semicircular arch of mean radius 5 m: `voussoirs` wedges, `thickness` of the radius thick and 1 m deep, on two fixed
 /// springers, mu 0.6. Statics ask for a thickness of at least 0.1075 (Milankovitch, 1907) where nothing slides.
 pub(super) fn arch(voussoirs: usize, thickness: f64) -> Result<Scene> {
-    const RADIUS: f64 = 5.0;
-    const MU: f32 = 0.6;
-    /// Distance between neighbors at the start [m]: of hulls that touch exactly, nothing says which way they touch.
-    const GAP: f64 = 1e-4;
-    let half = PI / voussoirs as f64 / 2.0;
-    let (inner, outer) = (RADIUS * (1.0 - thickness / 2.0), RADIUS * (1.0 + thickness / 2.0));
-    // In the frame of a wedge x points out of the arch and y along it.
-    let corner = |r: f64, angle: f64, z: f32| Vec3::new((r * angle.cos() - RADIUS) as f32, (r * angle.sin()) as f32, z);
-    // Both faces of a wedge are half of the gap further in.
-    let slit = |r: f64| half - GAP / 2.0 / r;
-    let sides = [(inner, -slit(inner)), (inner, slit(inner)), (outer, -slit(outer)), (outer, slit(outer))];
-    let corners: Vec<Vec3> = sides.iter().flat_map(|&(r, a)| [-0.5, 0.5].map(|z| corner(r, a, z))).collect();
-    let wedge = Body::dynamic().shape(Shape::convex_hull(&corners)?).friction(MU);
-
+    let ring = Ring { radius: 5.0, thickness, depth: 1.0, voussoirs };
     let mut world = floor(20.0, 10.0);
-    let springer = Body::fixed().named("springer").shape(Shape::cuboid((thickness * RADIUS) as f32, 0.5, 1.0));
-    for x in [RADIUS as f32, -RADIUS as f32] {
-        world.add(springer.clone().friction(MU).position(x, 0.5, 0.0));
+    let springer = Body::fixed().named("springer").shape(Shape::cuboid((thickness * ring.radius) as f32, 0.5, 1.0));
+    for x in [5.0, -5.0] {
+        world.add(springer.clone().friction(STONE).position(x, 0.5, 0.0));
     }
-    for k in 0..voussoirs {
-        let angle = (2 * k + 1) as f64 * half;
-        let (x, y) = ((RADIUS * angle.cos()) as f32, (1.0 + GAP / 2.0 + RADIUS * angle.sin()) as f32);
-        world.add(wedge.clone().position(x, y, 0.0).rotation(Quat::from_rotation_z(angle as f32)));
-    }
+    ring.add_to(&mut world, 0.0, 1.0)?;
     Ok(Scene::new("arch", world, 600).standing())
 }
 
-/// A house of `storeys` of cards of 1 x 0.8 x 0.04 m: pairs that lean at each other by `degrees` from the vertical, one
-/// pair fewer in each storey, and a plate across the pairs of each storey but the last.
-pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32) -> Scene {
-    const LENGTH: f64 = 1.0;
-    const THICKNESS: f64 = 0.04;
-    const HALF_WIDTH: f32 = 0.4;
+/// `arches` semicircles of mean radius 2 m side by side on piers of three loose blocks, 11 wedges each; slabs lie from crown to
+/// crown. Neighbors push against each other over their pier; the outermost piers are fixed.
+pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
+    const BLOCK: f64 = 1.0;
+    const BLOCKS: usize = 3;
+    let ring = Ring { radius: 2.0, thickness: 0.25, depth: 1.0, voussoirs: 11 };
+    // Between neighbors over a pier is half a gap to each side.
+    let pitch = 2.0 * ring.outer() + GAP;
+    let pier_half = ring.outer() - ring.radius + ring.thickness * ring.radius / 2.0;
+    let springing = BLOCKS as f64 * (BLOCK + GAP) + GAP;
+    let mut world = floor((arches as f64 * pitch) as f32 + 10.0, 10.0);
+    world.bodies[0].material.friction = STONE;
+    for pier in 0..=arches {
+        let x = centered(pier, arches + 1) * pitch;
+        let block =
+            |body: Body, half_y: f64| body.shape(Shape::cuboid(pier_half as f32, half_y as f32, 0.5)).friction(STONE);
+        if pier == 0 || pier == arches {
+            // Tall enough to hold the outermost arch's foot.
+            let half = springing / 2.0;
+            world.add(block(Body::fixed().named("abutment"), half).position(x as f32, half as f32, 0.0));
+            continue;
+        }
+        for k in 0..BLOCKS {
+            let y = GAP + (BLOCK + GAP) * k as f64 + BLOCK / 2.0;
+            world.add(block(Body::dynamic().named("pier"), BLOCK / 2.0).position(x as f32, y as f32, 0.0));
+        }
+    }
+    for arch in 0..arches {
+        ring.add_to(&mut world, centered(arch, arches) * pitch, springing)?;
+    }
+    // One slab over each loose pier.
+    const SLAB: f64 = 0.15;
+    let slab = Body::dynamic()
+        .named("slab")
+        .shape(Shape::cuboid(((pitch - GAP) / 2.0) as f32, SLAB as f32, 0.5))
+        .friction(STONE);
+    for k in 1..arches {
+        let (x, y) = (centered(k, arches + 1) * pitch, springing + ring.crown() + GAP + SLAB);
+        world.add(slab.clone().position(x as f32, y as f32, 0.0));
+    }
+    Ok(Scene::new("aqueduct", world, 600).standing())
+}
+
+/// A tower of planks of 0.08 x 0.24 x 1.2 m: in each of its `storeys` nine stand on end in a square, three lie across them
+/// one way and three the other.
+pub(super) fn kapla(storeys: usize) -> Scene {
+    const PLANK: Vec3 = Vec3::new(0.04, 0.12, 0.6);
+    /// Between the planks on end: one that lies reaches over three.
+    const PITCH: f64 = 0.55;
+    let storey_height = 2.0 * f64::from(PLANK.z) + 4.0 * f64::from(PLANK.x);
+    let mut world = floor(20.0, 20.0);
+    let plank = |half: Vec3| Body::dynamic().shape(Shape::cuboid(half.x, half.y, half.z)).density(600.0);
+    for storey in 0..storeys {
+        let base = storey as f64 * storey_height;
+        let at = |k: usize| (centered(k, 3) * PITCH) as f32;
+        let mut put = |half: Vec3, x: f32, y: f64, z: f32| world.add(plank(half).position(x, (base + y) as f32, z));
+        let lying = 2.0 * f64::from(PLANK.z) + f64::from(PLANK.x);
+        for i in 0..3 {
+            for j in 0..3 {
+                // Every other one turned.
+                let (x, z) = if (i + j) % 2 == 0 { (PLANK.x, PLANK.y) } else { (PLANK.y, PLANK.x) };
+                put(Vec3::new(x, PLANK.z, z), at(i), f64::from(PLANK.z), at(j));
+            }
+        }
+        for k in 0..3 {
+            put(Vec3::new(PLANK.z, PLANK.x, PLANK.y), 0.0, lying, at(k));
+        }
+        for k in 0..3 {
+            put(Vec3::new(PLANK.y, PLANK.x, PLANK.z), at(k), lying + 2.0 * f64::from(PLANK.x), 0.0);
+        }
+    }
+    Scene::new("kapla", world, 3600).standing()
+}
+
+/// A house of `storeys` of cards, `length` [m] long, 0.8 of it wide and `thickness` [m] thick: pairs that lean at each other by
+/// `degrees` from the vertical, one pair fewer in each storey, and a plate across the pairs of each storey but the last.
+pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thickness: f64) -> Scene {
+    let half_width = 0.4 * length as f32;
     let (sin, cos) = degrees.to_radians().sin_cos();
     // From a pair's ridge to the middle of its cards, to the side; from its feet to its highest edges.
-    let aside = (THICKNESS * cos + LENGTH * sin) / 2.0;
-    let rise = THICKNESS * sin + LENGTH * cos;
-    // Feet of neighbors come 0.02 m near.
-    let pitch = 2.0 * (LENGTH * sin + THICKNESS * cos) + 0.02;
-    let cuboid = |x: f64, y: f64| Body::dynamic().shape(Shape::cuboid(x as f32, y as f32, HALF_WIDTH)).friction(mu);
-    let card = cuboid(THICKNESS / 2.0, LENGTH / 2.0);
+    let aside = (thickness * cos + length * sin) / 2.0;
+    let rise = thickness * sin + length * cos;
+    // Feet of neighbors come half of a thickness near.
+    let pitch = 2.0 * (length * sin + thickness * cos) + 0.5 * thickness;
+    let cuboid = |x: f64, y: f64| Body::dynamic().shape(Shape::cuboid(x as f32, y as f32, half_width)).friction(mu);
+    let card = cuboid(thickness / 2.0, length / 2.0);
 
     let mut world = floor(storeys as f32 + 10.0, 10.0);
     world.bodies[0].material.friction = mu;
     for storey in 0..storeys {
-        let (pairs, base) = (storeys - storey, storey as f64 * (rise + THICKNESS));
+        let (pairs, base) = (storeys - storey, storey as f64 * (rise + thickness));
         let mut place = |body: Body, x: f64, y: f64| world.add(body.position(x as f32, (base + y) as f32, 0.0));
         for k in 0..pairs {
             let ridge = centered(k, pairs) * pitch;
@@ -67,8 +175,8 @@ pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32) -> Scene {
             }
         }
         if pairs > 1 {
-            let half = (pairs - 1) as f64 * pitch / 2.0 + 3.0 * THICKNESS;
-            place(cuboid(half, THICKNESS / 2.0), 0.0, rise + THICKNESS / 2.0);
+            let half = (pairs - 1) as f64 * pitch / 2.0 + 3.0 * thickness;
+            place(cuboid(half, thickness / 2.0), 0.0, rise + thickness / 2.0);
         }
     }
     Scene::new("card-house", world, 600).standing()
@@ -106,7 +214,7 @@ mod tests {
     use parry3d::query::distance;
 
     use super::*;
-    use crate::world::{World, pose};
+    use crate::world::pose;
 
     /// Distance between body i and body j; 0 if they overlap.
     fn gap(world: &World, i: usize, j: usize) -> f32 {
@@ -126,8 +234,21 @@ mod tests {
     }
 
     #[test]
+    fn an_aqueduct_starts_without_overlap_and_every_stone_near_what_bears_it() {
+        let world = aqueduct(3).expect("an aqueduct").world;
+        assert_eq!(world.dynamic_count(), 2 * 3 + 3 * 11 + 2);
+        for j in 1..world.bodies.len() {
+            let gaps: Vec<f32> = (0..world.bodies.len()).filter(|&i| i != j).map(|i| gap(&world, i, j)).collect();
+            let near = gaps.iter().filter(|g| **g < 3.0 * GAP as f32).count();
+            let fixed = world.bodies[j].kind == crate::world::BodyKind::Fixed;
+            assert!(near >= if fixed { 1 } else { 2 }, "{j} {}: {near} neighbors", world.bodies[j].name);
+            assert!(fixed || gaps.iter().all(|g| *g > 1e-5), "{j} {} overlaps", world.bodies[j].name);
+        }
+    }
+
+    #[test]
     fn the_cards_of_a_house_touch_where_they_lean_and_nowhere_else() {
-        let world = card_house(2, 20.0, 0.5).world;
+        let world = card_house(2, 20.0, 0.5, 1.0, 0.04).world;
         // Floor, two pairs, a plate, a pair.
         assert_eq!(world.bodies.len(), 8);
         for (i, j) in [(0, 1), (0, 4), (1, 2), (3, 4), (1, 5), (4, 5), (5, 6), (5, 7), (6, 7)] {

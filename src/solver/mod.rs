@@ -31,9 +31,6 @@ use assemble::Assembled;
 /// Plain sweeps after which velocities are set right.
 const DRIFT_SWEEPS: u32 = 64;
 
-/// Share of an impulse that the rounding of some sweeps in f32 makes.
-const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
-
 /// Sweeps after which momentum begins anew: it multiplies rounding by as much as it is old.
 const LONGEST_MOMENTUM: u32 = 1024;
 
@@ -180,28 +177,14 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Gives every body the velocity that belongs to the impulses, where it differs by more than their rounding explains: that
-    /// would only come into the velocities. (tower2_1_1000 then ends 1.3e-5 from f64 instead of 8e-6.)
+    /// Gives every body the velocity that belongs to the impulses.
     fn set_right(&mut self) {
-        let impulses = self.impulses();
-        let right = self.operator.velocities(&impulses);
+        let right = self.operator.velocities(&self.impulses()).into_iter().map(assemble::body);
         match &mut self.work {
             Work::Exact(reference) => {
-                let bodies = reference.rows_mut().bodies.iter_mut();
-                bodies.zip(right).for_each(|(row, velocity)| *row = assemble::body(velocity));
+                reference.rows_mut().bodies.iter_mut().zip(right).for_each(|(row, body)| *row = body)
             }
-            Work::Rounded(_) => {
-                let explained = self.operator.moved_at_most(&impulses, ROUNDING);
-                let carried = self.velocities();
-                for (i, velocity) in right.into_iter().enumerate() {
-                    let apart = |a: DVec3, b: DVec3, explained: f64| a.distance(b) > explained;
-                    if apart(carried[i].linear, velocity.linear, explained[i][0])
-                        || apart(carried[i].angular, velocity.angular, explained[i][1])
-                    {
-                        self.problem.bodies[i] = assemble::body(velocity).store();
-                    }
-                }
-            }
+            Work::Rounded(_) => self.problem.bodies.iter_mut().zip(right).for_each(|(row, body)| *row = body.store()),
         }
     }
 }

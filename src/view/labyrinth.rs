@@ -106,7 +106,7 @@ impl Show for Labyrinth {
     }
 
     fn world(&self) -> &World {
-        &self.game.simulation.world
+        self.game.world()
     }
 
     fn bounds(&self) -> Bounds {

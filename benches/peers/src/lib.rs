@@ -10,3 +10,18 @@ mod entrant;
 mod rapier;
 
 pub use entrant::{Engine, Entrant};
+
+use drystone::Result;
+use drystone::maze::{Game, Map};
+
+/// The maze game on `map` in Rapier's hands; `frequency` as in [`Entrant`].
+///
+/// # Errors
+/// A map that is not fit for a board.
+pub fn rapier_game(map: Map, substeps: u32, frequency: Option<f32>) -> Result<Game> {
+    let entrant = Entrant { substeps, frequency, ..Entrant::default_of(Engine::Rapier) };
+    Game::with(map, |scene| {
+        let hertz = entrant.hertz(scene.dt);
+        Ok(Box::new(rapier::Rapier::new(&scene, substeps, hertz, 1)?))
+    })
+}

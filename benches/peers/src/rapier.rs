@@ -1,5 +1,6 @@
 //! rapier3d, from a drystone world and back.
 
+use drystone::maze;
 use drystone::report::front::{Contender, Setting};
 use drystone::world::{BodyKind, MassProperties as Mass};
 use drystone::{Body, Error, Result, Scene, World};
@@ -81,6 +82,46 @@ fn set_threads(_physics: &mut PhysicsWorld, threads: usize) -> Result<()> {
     }
 }
 
+impl Rapier {
+    /// Brings poses and velocities of the world up to date.
+    fn read_back(&mut self) {
+        for (body, &handle) in self.world.bodies.iter_mut().zip(&self.handles) {
+            let rapier = &self.physics.bodies[handle];
+            (body.position, body.rotation) = (rapier.position().translation, rapier.position().rotation);
+            (body.linear_velocity, body.angular_velocity) = (rapier.linvel(), rapier.angvel());
+        }
+    }
+}
+
+/// Moves a game's board and ball.
+impl maze::Engine for Rapier {
+    fn name(&self) -> String {
+        let parameters = &self.physics.integration_parameters;
+        let hertz = parameters.contact_softness.natural_frequency;
+        format!("rapier, {} substeps, {hertz:.0} Hz", parameters.num_solver_iterations)
+    }
+
+    fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    fn step(&mut self, _dt: f32) -> Result<()> {
+        for (body, &handle) in self.world.bodies.iter().zip(&self.handles) {
+            if body.kind == BodyKind::Kinematic {
+                self.physics.bodies[handle].set_linvel(body.linear_velocity, true);
+                self.physics.bodies[handle].set_angvel(body.angular_velocity, true);
+            }
+        }
+        self.physics.step();
+        self.read_back();
+        Ok(())
+    }
+}
+
 impl Contender for Rapier {
     fn setting(&self) -> Setting {
         let parameters = &self.physics.integration_parameters;
@@ -94,11 +135,7 @@ impl Contender for Rapier {
     }
 
     fn world(&mut self) -> &World {
-        for (body, &handle) in self.world.bodies.iter_mut().zip(&self.handles) {
-            let rapier = &self.physics.bodies[handle];
-            (body.position, body.rotation) = (rapier.position().translation, rapier.position().rotation);
-            (body.linear_velocity, body.angular_velocity) = (rapier.linvel(), rapier.angvel());
-        }
+        self.read_back();
         &self.world
     }
 }

@@ -172,14 +172,12 @@ impl Cpu {
                 let params = StepParams::load(&problem.params);
                 for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
                     let i = row.body as usize;
-                    let (mut body, mut mass) = (self.bodies[i].load(), load_mass(&self.masses[i]));
+                    let mut body = self.bodies[i].load();
                     let [vx, vy, vz, _, wx, wy, wz, _] = self.free[i].0;
                     let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
-                    integrate_gyroscopic(&params, inertia, &mut body, &mut free, &mut mass);
+                    integrate_gyroscopic(&params, inertia, &mut body, &mut free);
                     self.bodies[i].store_velocity(&body);
                     self.free[i] = velocity_row(free.v, free.w);
-                    let (x, yz) = (mass.inv_inertia.x, mass.inv_inertia.yz);
-                    self.masses[i] = Row8([x.x, x.y, x.z, mass.inv_mass, yz.x, yz.y, yz.z, 0.0]);
                 }
             }
             Kernel::Extrapolate { first, measured } => {

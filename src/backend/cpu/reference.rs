@@ -68,7 +68,7 @@ impl<S: Scalar> Reference<S> {
                 for (row, inertia) in problem.inertias.iter().zip(&self.rows.inertias) {
                     let i = row.body as usize;
                     let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_gyroscopic(params, inertia, body, free, &mut self.rows.masses[i]);
+                    integrate_gyroscopic(params, inertia, body, free);
                 }
             }
             Kernel::IntegratePositions => {

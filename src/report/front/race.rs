@@ -6,7 +6,6 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
-use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::metrics::{Penetration, drift, in_place_count, rms_speed};
@@ -113,7 +112,6 @@ pub fn race(
     after_block: &mut dyn FnMut(),
 ) -> Result<Vec<Row>> {
     let blocks = blocks(scene.steps);
-    let mut detector = Detector::new(&scene.world);
     let mut lanes: Vec<_> = contenders.iter().map(|_| Lane { finite: true, ..Lane::default() }).collect();
     for block in 0..blocks {
         for (contender, lane) in contenders.iter_mut().zip(&mut lanes) {
@@ -126,9 +124,8 @@ pub fn race(
                 let world = contender.world();
                 lane.finite = world.first_non_finite().is_none();
                 if lane.finite && 2 * block >= blocks {
-                    detector.detect_anew(world, &SolverConfig::default(), 0.0, &|_| ());
                     lane.ms.push(ms);
-                    lane.penetration.push(Penetration::of(detector.pairs()));
+                    lane.penetration.push(Penetration::of_world(world, &SolverConfig::default()));
                     lane.speed.push(rms_speed(world));
                     lane.gap.push(world.joint_gap().into());
                 }

@@ -1,0 +1,65 @@
+//! Settings by name. A preset is a promise with numbers, which tests/presets.rs keeps.
+
+use crate::config::SolverConfig;
+
+/// How much error is paid for with time: the same rules with more or fewer substeps, which measures best of all ways to spend
+/// a sweep (docs/speed-vs-error.md).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// 4 substeps: for games and previews.
+    Fast,
+    /// 8 substeps.
+    #[default]
+    Balanced,
+    /// 32 substeps: heavy on light.
+    Accurate,
+    /// 128 substeps: to hold the others against.
+    Reference,
+}
+
+/// What a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// Cubes of a tower that stands for 20 s.
+    pub tower: u32,
+    /// Density of the top cube of a tower of ten, relative to the others, which stands for 10 s.
+    pub heavy_top: f32,
+    /// Deepest overlap at any time of 10 s of a tower of 20 [m].
+    pub deepest: f64,
+    /// The same at the end of them [m].
+    pub at_rest: f64,
+}
+
+impl Preset {
+    /// All, from fast to accurate.
+    pub const ALL: [Self; 4] = [Self::Fast, Self::Balanced, Self::Accurate, Self::Reference];
+
+    /// The settings.
+    pub fn config(self) -> SolverConfig {
+        let substeps = match self {
+            Self::Fast => 4,
+            Self::Balanced => 8,
+            Self::Accurate => 32,
+            Self::Reference => 128,
+        };
+        SolverConfig { substeps, ..SolverConfig::default() }
+    }
+
+    /// What it holds.
+    pub fn promise(self) -> Promise {
+        let promise = |tower, heavy_top, deepest, at_rest| Promise { tower, heavy_top, deepest, at_rest };
+        match self {
+            Self::Fast => promise(50, 20.0, 10e-3, 0.1e-3),
+            Self::Balanced => promise(80, 100.0, 2.5e-3, 0.02e-3),
+            Self::Accurate => promise(160, 1000.0, 0.16e-3, 2e-6),
+            Self::Reference => promise(400, 5000.0, 0.011e-3, 1e-6),
+        }
+    }
+}
+
+impl std::fmt::Display for Preset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        clap::ValueEnum::to_possible_value(self).expect("no preset is skipped").get_name().fmt(f)
+    }
+}

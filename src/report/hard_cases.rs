@@ -1,0 +1,96 @@
+//! The page of hard cases: every preset on the CPU, and the default on every backend.
+
+use std::fmt::Write;
+
+use crate::backend::Numbers;
+use crate::error::Result;
+use crate::hard::{Case, Check, Limit, Setup};
+use crate::preset::Preset;
+
+/// What the columns are run with.
+const COLUMNS: [(Preset, Numbers); 6] = [
+    (Preset::Fast, Numbers::Cpu),
+    (Preset::Balanced, Numbers::Cpu),
+    (Preset::Accurate, Numbers::Cpu),
+    (Preset::Reference, Numbers::Cpu),
+    (Preset::Balanced, Numbers::F64),
+    (Preset::Balanced, Numbers::Gpu),
+];
+
+/// Whether a case is run in that column: what takes minutes on the CPU takes hours with many substeps or in a software adapter.
+fn is_run(case: &Case, (preset, numbers): (Preset, Numbers)) -> bool {
+    !case.long || numbers == Numbers::Cpu && preset != Preset::Reference
+}
+
+/// Runs that the page takes.
+pub fn count(cases: &[&Case]) -> u64 {
+    cases.iter().flat_map(|case| COLUMNS.iter().map(|&column| u64::from(is_run(case, column)))).sum()
+}
+
+/// The page as Markdown. `progress` is called with what begins next.
+///
+/// # Errors
+/// Of the cases; no adapter.
+pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
+    let mut passed = [0; COLUMNS.len()];
+    let mut rows = String::new();
+    for case in cases {
+        let mut columns: Vec<Option<Vec<Check>>> = Vec::new();
+        for (k, &(preset, numbers)) in COLUMNS.iter().enumerate() {
+            if !is_run(case, COLUMNS[k]) {
+                columns.push(None);
+                continue;
+            }
+            progress(&format!("{} {preset} {numbers}", case.name));
+            let checks = case.run(&Setup { config: preset.config(), open: &|| numbers.open(false) })?;
+            passed[k] += usize::from(checks.iter().all(|c| c.passed));
+            columns.push(Some(checks));
+        }
+        writeln!(rows, "| **{}** | {} ||||||||", case.name, case.summary).expect("text takes all");
+        let asked = columns.iter().flatten().next().map_or(&[][..], |checks| checks);
+        for (i, check) in asked.iter().enumerate() {
+            let cells: Vec<_> = columns.iter().map(|c| c.as_ref().map_or("not run".into(), |c| cell(&c[i]))).collect();
+            writeln!(rows, "| | {} | {} | {} |", check.what, limit(check.limit), cells.join(" | "))
+                .expect("text takes all");
+        }
+    }
+    let of = |k: usize| cases.iter().filter(|c| is_run(c, COLUMNS[k])).count();
+    let totals: Vec<_> = passed.iter().enumerate().map(|(k, passed)| format!("{passed} of {}", of(k))).collect();
+    let gpu = Numbers::Gpu.open(false)?.adapter();
+    let substeps = |preset: Preset| preset.config().substeps;
+    let heads: Vec<_> =
+        COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();
+    Ok(format!(
+        "# Hard cases\n\n\
+         Made by `drystone hard --page docs`; one case by `drystone hard --case H3 --preset accurate`. What fails is in bold. The\n\
+         columns are presets with their substeps, on eight lanes in single precision (`cpu`), on the reference with sweeps in double\n\
+         precision (`f64`), and in the shaders (`gpu`: {gpu}). `drystone hard --list` says what each case is.\n\n\
+         | case | number | asked | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}",
+        heads.join(" | "),
+        "---|".repeat(COLUMNS.len()),
+        totals.join(" | ")
+    ))
+}
+
+fn limit(limit: Limit) -> String {
+    match limit {
+        Limit::AtMost(x) => format!("≤ {x}"),
+        Limit::AtLeast(x) => format!("≥ {x}"),
+    }
+}
+
+fn cell(check: &Check) -> String {
+    let value = number(check.value);
+    if check.passed { value } else { format!("**{value}**") }
+}
+
+/// A number with as many digits as say something.
+pub fn number(x: f64) -> String {
+    if x == 0.0 || (x.fract() == 0.0 && x.abs() < 1e5) {
+        format!("{x:.0}")
+    } else if (1e-2..1e4).contains(&x.abs()) {
+        format!("{x:.3}")
+    } else {
+        format!("{x:.1e}")
+    }
+}

@@ -1,0 +1,89 @@
+//! Every number that a preset promises.
+
+use drystone::load::Load;
+use drystone::preset::Preset;
+use drystone::{Cpu, Scene, Simulation, metrics};
+
+/// Deepest overlap at any time and at the end [m], and bodies that are not in place, after `seconds` of a tower.
+fn tower(preset: Preset, seconds: u32, parameters: &[String]) -> (f64, f64, usize) {
+    let scene = Scene::find("tower", parameters).expect("a scene");
+    let mut simulation =
+        Simulation::new(scene.world.clone(), preset.config(), Box::new(Cpu::new())).expect("a simulation");
+    let (mut deepest, mut last) = (0.0_f64, 0.0);
+    for step in 1..=60 * seconds {
+        simulation.step(scene.dt).expect("a step");
+        if step % 5 == 0 {
+            last = simulation.penetration().max;
+            deepest = deepest.max(last);
+        }
+    }
+    let fallen = scene.world.dynamic_count() - metrics::in_place_count(&scene.world, &simulation.world);
+    (deepest, last, fallen)
+}
+
+fn keeps(preset: Preset) {
+    let promise = preset.promise();
+    let zigzag = |n: u32| tower(preset, 20, &[format!("n={n}"), "offset=0.01".into()]);
+    let (_, _, fallen) = zigzag(promise.tower);
+    assert_eq!(fallen, 0, "{preset}: of {} cubes", promise.tower);
+    let heavy = |ratio: f32| tower(preset, 10, &["n=10".into(), format!("top_ratio={ratio}")]).2;
+    assert_eq!(heavy(promise.heavy_top), 0, "{preset}: under {} times their weight", promise.heavy_top);
+    let (deepest, last, _) = tower(preset, 10, &["n=20".into(), "offset=0.01".into()]);
+    println!("{preset}: {:.4} mm deepest, {:.4} mm at rest", deepest * 1e3, last * 1e3);
+    assert!(deepest <= promise.deepest, "{preset}: {deepest:e} m deep");
+    assert!(last <= promise.at_rest, "{preset}: {last:e} m at rest");
+}
+
+#[test]
+fn fast_holds_what_it_promises_and_not_what_the_next_one_does() {
+    keeps(Preset::Fast);
+    let next = Preset::Balanced.promise();
+    let heavy = tower(Preset::Fast, 10, &["n=10".into(), format!("top_ratio={}", next.heavy_top)]);
+    assert!(heavy.2 > 0 || heavy.0 > next.deepest, "fast is as good as balanced");
+}
+
+#[test]
+fn balanced_holds_what_it_promises() {
+    keeps(Preset::Balanced);
+    assert_eq!(Preset::default().config(), drystone::SolverConfig::default());
+}
+
+#[test]
+fn accurate_holds_what_it_promises() {
+    keeps(Preset::Accurate);
+}
+
+#[test]
+fn reference_holds_what_it_promises() {
+    keeps(Preset::Reference);
+}
+
+/// The substeps that the load of a scene asks for, and the deepest overlap with them at any time and after 1 s [m].
+fn with_at_most(most: f64, parameters: &[String]) -> (u32, f64, f64) {
+    let scene = Scene::find("tower", parameters).expect("a scene");
+    let mut config = Preset::default().config();
+    let load = Load::heaviest(&scene.world, &config).expect("a load");
+    config.substeps = load.substeps(most, scene.dt, &config).expect("substeps");
+    let substeps = config.substeps;
+    let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new())).expect("a simulation");
+    let step = |_| {
+        simulation.step(scene.dt).expect("a step");
+        simulation.penetration().max
+    };
+    let overlaps: Vec<f64> = (0..60).map(step).collect();
+    (substeps, overlaps.iter().copied().fold(0.0, f64::max), overlaps[59])
+}
+
+/// Loads come on at once here: a heavy one on a soft stack swings beyond where it will rest, at most to twice as deep.
+#[test]
+fn substeps_chosen_for_a_load_keep_its_overlap_as_small_as_asked_and_no_smaller_than_needed() {
+    for (top, n, most, overshoot) in
+        [(1, 10, 1e-3, 1.0), (1, 20, 0.3e-3, 1.0), (100, 10, 1e-3, 1.4), (1000, 10, 1e-3, 2.0)]
+    {
+        let (substeps, deepest, last) = with_at_most(most, &[format!("n={n}"), format!("top_ratio={top}")]);
+        let share = |x: f64| 100.0 * x / most;
+        println!("{n} cubes, top {top} times: {substeps} substeps, {:.0} %, then {:.0} %", share(deepest), share(last));
+        assert!(last <= most && deepest <= overshoot * most, "{top}: {deepest:e}, then {last:e} of {most:e}");
+        assert!(deepest > 0.5 * most, "{top}: {substeps} substeps are more than needed: {deepest:e} of {most:e}");
+    }
+}
