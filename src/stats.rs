@@ -46,6 +46,8 @@ pub struct KernelTime {
     pub kernel: &'static str,
     /// All its passes together.
     pub time: Duration,
+    /// Bytes that they read and write; 0 for those that are not of the plan.
+    pub bytes: u64,
 }
 
 /// What a step moves between the processor and a device.

@@ -1,10 +1,12 @@
 //! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
 
+mod calibrate;
 mod choose;
 pub mod cpu;
 pub mod gpu;
 
-pub use choose::{AUTO_GPU_BODIES, BackendChoice, Numbers, choose};
+pub use calibrate::crossover;
+pub use choose::{BackendChoice, Numbers, choose};
 
 use crate::error::Result;
 use crate::plan::Pass;
@@ -55,8 +57,14 @@ pub trait Backend: Send {
         Traffic::default()
     }
 
-    /// Lets the device take the time of each kernel from now on, where it has a clock; that may cost time itself.
-    fn time_kernels(&mut self) {}
+    /// Lets the device take the time of each kernel from now on, where it has a clock; that may cost time itself. Gives the
+    /// bytes a second that the device reads and writes when it copies, to hold them against; none without a clock.
+    ///
+    /// # Errors
+    /// The device is lost.
+    fn time_kernels(&mut self) -> Result<Option<f64>> {
+        Ok(None)
+    }
 
     /// How long the device was at each kernel in the last step, if it took the time.
     fn kernel_times(&self) -> &[KernelTime] {

@@ -89,11 +89,10 @@ impl RunArgs {
         let (mut backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         eprintln!("{why}");
-        if self.kernel_times {
-            backend.time_kernels();
-        }
+        let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
+        report.copy_bandwidth = copy_bandwidth;
         let bar = progress(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {

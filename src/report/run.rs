@@ -8,7 +8,7 @@ use crate::config::SolverConfig;
 use crate::metrics::{fastest, in_place, rms_speed};
 use crate::scenes::{Group, Scene};
 use crate::simulation::Simulation;
-use crate::stats::{StepStats, median};
+use crate::stats::{KernelTime, StepStats, median};
 use crate::world::{BodyKind, World};
 
 /// Report of one run; its fields are the keys of the JSON object.
@@ -32,8 +32,10 @@ pub struct RunReport {
     pub step_ms: Vec<f64>,
     /// Wall time of each stage, median and least over the steps [ms].
     pub stage_ms: Vec<StageRow>,
-    /// Time of each kernel by the clock of the device, where it has one, median and least over the steps [ms].
+    /// Time of each kernel by the clock of the device, if it was asked for, median and least over the steps [ms].
     pub kernel_ms: Vec<KernelRow>,
+    /// Bytes a second that the device reads and writes when it copies [B/s], if it was asked for times.
+    pub copy_bandwidth: Option<f64>,
     /// Manifolds of the last step.
     pub manifolds: usize,
     /// Contact points of the last step.
@@ -91,7 +93,7 @@ pub struct RunReport {
     #[serde(skip)]
     stage_times: Vec<[f64; 5]>,
     #[serde(skip)]
-    kernel_times: Vec<(&'static str, Vec<f64>)>,
+    kernel_times: Vec<(KernelTime, Vec<f64>)>,
     #[serde(skip)]
     energy_before: f64,
     #[serde(skip)]
@@ -118,6 +120,10 @@ pub struct KernelRow {
     pub median: f64,
     /// Least over them.
     pub min: f64,
+    /// Bytes that it read and wrote in the last step that it was in; 0 if it is not of the plan.
+    pub bytes: u64,
+    /// Bytes a second of that step, as a share of what copying reaches.
+    pub share_of_copying: Option<f64>,
 }
 
 /// Time of one stage over a run [ms].
@@ -145,6 +151,7 @@ impl RunReport {
             step_ms: Vec::new(),
             stage_ms: Vec::new(),
             kernel_ms: Vec::new(),
+            copy_bandwidth: None,
             manifolds: 0,
             points: 0,
             asleep: 0,
@@ -186,9 +193,12 @@ impl RunReport {
         self.step_ms.push(ms(stats.times.total()));
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
         for kernel in &stats.kernels {
-            match self.kernel_times.iter_mut().find(|known| known.0 == kernel.kernel) {
-                Some(known) => known.1.push(ms(kernel.time)),
-                None => self.kernel_times.push((kernel.kernel, vec![ms(kernel.time)])),
+            match self.kernel_times.iter_mut().find(|known| known.0.kernel == kernel.kernel) {
+                Some((last, times)) => {
+                    last.clone_from(kernel);
+                    times.push(ms(kernel.time));
+                }
+                None => self.kernel_times.push((kernel.clone(), vec![ms(kernel.time)])),
             }
         }
         self.manifolds = stats.manifolds;
@@ -216,8 +226,17 @@ impl RunReport {
             StageRow { stage, median: median(&times), min: least(&times) }
         };
         self.stage_ms = names.into_iter().enumerate().map(stage).filter(|row| row.min.is_finite()).collect();
-        let kernel =
-            |(kernel, times): &(&'static str, Vec<f64>)| KernelRow { kernel, median: median(times), min: least(times) };
+        let bandwidth = self.copy_bandwidth;
+        let kernel = |(last, times): &(KernelTime, Vec<f64>)| {
+            let share = |bandwidth: f64| last.bytes as f64 / last.time.as_secs_f64() / bandwidth;
+            KernelRow {
+                kernel: last.kernel,
+                median: median(times),
+                min: least(times),
+                bytes: last.bytes,
+                share_of_copying: bandwidth.filter(|_| last.bytes > 0 && !last.time.is_zero()).map(share),
+            }
+        };
         self.kernel_ms = self.kernel_times.iter().map(kernel).collect();
         let penetration = simulation.penetration();
         let world = &simulation.world;
@@ -288,7 +307,11 @@ impl RunReport {
             row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
         }
         for kernel in &self.kernel_ms {
-            row(&format!("    {}", kernel.kernel), format!("{:.3} median, {:.3} least", kernel.median, kernel.min));
+            let share = kernel.share_of_copying.map(|s| format!(", {:.1} % of copying", 100.0 * s)).unwrap_or_default();
+            row(
+                &format!("    {}", kernel.kernel),
+                format!("{:.3} median, {:.3} least{share}", kernel.median, kernel.min),
+            );
         }
         if self.bytes_up > 0 {
             let kb = |bytes: u64| bytes as f64 / 1e3;

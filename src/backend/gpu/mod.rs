@@ -180,6 +180,43 @@ impl Gpu {
         Ok(encoder)
     }
 
+    /// Adds to the times of the kernels what they moved.
+    fn count_bytes(&mut self, problem: &StepProblem, passes: &[Pass]) {
+        for time in &mut self.times {
+            let own = passes.iter().filter(|pass| pass.kernel.name() == time.kernel);
+            time.bytes = own.map(|pass| pass.bytes_moved(problem)).sum();
+        }
+    }
+
+    /// Bytes a second that the device reads and writes when it copies a large buffer: the limit of every sweep.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub fn copy_bandwidth(&mut self) -> Result<f64> {
+        // Larger than caches are, where the adapter has such buffers.
+        let size = (self.device.limits().max_storage_buffer_binding_size).min(256 << 20);
+        let buffer = || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("bandwidth"),
+                size,
+                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let (from, to) = (buffer(), buffer());
+        let mut seconds = |copies: u32| -> Result<f64> {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
+            let start = std::time::Instant::now();
+            self.finish(encoder, &mut [])?;
+            Ok(start.elapsed().as_secs_f64())
+        };
+        // The difference leaves out what a submission costs.
+        seconds(1)?;
+        let (few, many) = (seconds(2)?, seconds(10)?);
+        Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))
+    }
+
     fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, all: &[Dispatch]) {
         let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         self.timer.iter_mut().for_each(Timer::begin);
@@ -228,6 +265,7 @@ impl Gpu {
         };
         let encoder = self.encoded(problem, first, passes)?;
         self.finish(encoder, &mut moved_rows_of(problem))?;
+        self.count_bytes(problem, passes);
         for (binding, bytes) in moved_rows_of(problem) {
             self.buffers.note(binding, bytes);
         }
@@ -235,10 +273,6 @@ impl Gpu {
         self.states.clear();
         self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
         self.buffers.note(shader::BODIES, bytemuck::cast_slice(&self.states));
-        // The gyroscopic pass turns them.
-        if !problem.inertias.is_empty() {
-            self.buffers.note(shader::MASSES, &[]);
-        }
         self.rows = Some(Rows::of(problem, carry));
         Ok(())
     }
@@ -284,8 +318,10 @@ impl Backend for Gpu {
         self.traffic
     }
 
-    fn time_kernels(&mut self) {
+    fn time_kernels(&mut self) -> Result<Option<f64>> {
+        let bandwidth = self.copy_bandwidth()?;
         self.timer = Timer::new(&self.device, &self.queue);
+        Ok(self.timer.as_ref().map(|_| bandwidth))
     }
 
     fn kernel_times(&self) -> &[KernelTime] {

@@ -81,7 +81,7 @@ impl Timer {
             let time = Duration::from_nanos(nanoseconds as u64);
             match times.iter_mut().find(|t| t.kernel == program.name()) {
                 Some(known) => known.time += time,
-                None => times.push(KernelTime { kernel: program.name(), time }),
+                None => times.push(KernelTime { kernel: program.name(), time, bytes: 0 }),
             }
         }
         times
