@@ -6,7 +6,7 @@ use common::difference::of_velocities;
 use common::gpu::gpu;
 use common::tolerance;
 use drystone::backend::crossover;
-use drystone::compare::compare;
+use drystone::compare::{Difference, compare};
 use drystone::glam::Vec3;
 use drystone::plan::Kernel;
 use drystone::stats::median;
@@ -207,4 +207,28 @@ fn a_device_tells_how_long_it_was_at_what() {
         assert_eq!(bytes, stats.bytes_moved);
     }
     assert!(bandwidth > 1e8, "{bandwidth:e} B/s");
+}
+
+/// Standing and jointed scenes that one workgroup follows, and whether all of it can be one dispatch.
+#[test]
+fn a_small_world_in_one_dispatch_has_the_bits_of_the_reference() {
+    for name in ["tower", "stack", "chain", "slide", "roll"] {
+        let scene = Scene::find(name, &[]).expect("a scene of the catalogue");
+        assert_same(&scene, &SolverConfig::default(), 30, name);
+    }
+}
+
+/// The kernels of the mixture, each in dispatches of its own because they are timed.
+#[test]
+fn kernels_that_are_timed_have_the_bits_of_the_reference() {
+    let Some(mut gpu) = gpu(true).filter(drystone::Gpu::is_exact) else { return };
+    gpu.time_kernels().expect("it copies");
+    let scene = mixture();
+    let mut ours = Simulation::new(scene.world.clone(), SolverConfig::default(), reference()).expect("good settings");
+    let mut theirs = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu)).expect("good settings");
+    for _ in 0..LANDED {
+        ours.step(scene.dt).expect("the reference runs");
+        theirs.step(scene.dt).expect("the GPU runs");
+    }
+    assert_eq!(Difference::between(&ours.world, &theirs.world).bodies, 0);
 }

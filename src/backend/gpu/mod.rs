@@ -18,6 +18,7 @@ mod programs;
 mod read_back;
 pub mod shader;
 mod timer;
+mod whole;
 
 pub use adapter::{AdapterChoice, AdapterSummary, adapters};
 pub use carry::CarryParams;
@@ -167,13 +168,23 @@ impl Gpu {
         first: Vec<Dispatch>,
         passes: &[Pass],
     ) -> Result<wgpu::CommandEncoder> {
-        let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let (pass_colors, offsets) = color_ranges(passes, stride);
-        self.buffers.update(shader::PASS_COLORS, &pass_colors);
-        let of_pass = |(pass, &colors): (&Pass, &u32)| Dispatch { colors, ..dispatch_of(problem, pass) };
-        let all: Vec<_> = first.into_iter().chain(passes.iter().zip(&offsets).map(of_pass)).collect();
+        let mut all = first;
+        // Apart where each kernel is to be timed.
+        match whole::of(problem, passes).filter(|_| self.timer.is_none()) {
+            Some((program, passes)) => {
+                self.buffers.update(shader::PASSES, bytemuck::cast_slice(&passes));
+                all.push(Dispatch::over(program, 1));
+            }
+            None => {
+                let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
+                let (pass_colors, offsets) = color_ranges(passes, stride);
+                self.buffers.update(shader::PASS_COLORS, &pass_colors);
+                let of_pass = |(pass, &colors): (&Pass, &u32)| Dispatch { colors, ..dispatch_of(problem, pass) };
+                all.extend(passes.iter().zip(&offsets).map(of_pass));
+            }
+        }
         for dispatch in &all {
-            self.programs.prepare(dispatch.program, &self.buffers)?;
+            self.programs.prepare(&dispatch.program, &self.buffers)?;
         }
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.encode(&mut encoder, &all);
@@ -222,9 +233,9 @@ impl Gpu {
         self.timer.iter_mut().for_each(Timer::begin);
         for run in all.chunk_by(|a, b| a.program == b.program) {
             if let Some(timer) = &mut self.timer {
-                timer.before(&mut compute, run[0].program);
+                timer.before(&mut compute, &run[0].program);
             }
-            let compiled = self.programs.get(run[0].program);
+            let compiled = self.programs.get(&run[0].program);
             compute.set_pipeline(&compiled.pipeline);
             for dispatch in run {
                 let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };

@@ -39,13 +39,13 @@ impl Programs {
     }
 
     /// One that was prepared.
-    pub fn get(&self, program: Program) -> &Compiled {
-        &self.compiled[&program]
+    pub fn get(&self, program: &Program) -> &Compiled {
+        &self.compiled[program]
     }
 
     /// Compiles a program if it is not yet, and binds it to the buffers that there are.
-    pub fn prepare(&mut self, program: Program, buffers: &Buffers) -> Result<()> {
-        if let Some(compiled) = self.compiled.get_mut(&program) {
+    pub fn prepare(&mut self, program: &Program, buffers: &Buffers) -> Result<()> {
+        if let Some(compiled) = self.compiled.get_mut(program) {
             if compiled.generation != buffers.generation {
                 compiled.bind_group = bind(&self.device, buffers, &compiled.layout, &compiled.bindings);
                 compiled.generation = buffers.generation;
@@ -83,7 +83,7 @@ impl Programs {
         let bindings = reflected.bindings;
         let bind_group = bind(&self.device, buffers, &layout, &bindings);
         let compiled = Compiled { pipeline, layout, bindings, bind_group, generation: buffers.generation };
-        self.compiled.insert(program, compiled);
+        self.compiled.insert(program.clone(), compiled);
         Ok(())
     }
 }

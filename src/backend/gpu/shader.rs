@@ -1,9 +1,11 @@
 //! From WGSL to what a pipeline needs: a shader is a list of parts, its layout what its entry point uses.
 
+use std::sync::Arc;
+
 use naga::back::spv;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
-use super::exact;
+use super::{exact, whole};
 use crate::config::FrictionRule;
 use crate::error::{Error, Result};
 use crate::kernels::Rules;
@@ -29,9 +31,9 @@ pub const BINDINGS: [&str; 17] = [
     "impulse_steps",
     "squares",
 ];
-/// The bindings that carry rows from step to step; their numbers follow on.
-pub const CARRY_BINDINGS: [&str; 7] =
-    ["carry", "places", "origins", "contacts_before", "points_before", "impulses_before", "separations"];
+/// The bindings that carry rows from step to step, and that of a plan that one workgroup follows; their numbers follow on.
+pub const CARRY_BINDINGS: [&str; 8] =
+    ["carry", "places", "origins", "contacts_before", "points_before", "impulses_before", "separations", "passes"];
 /// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
 /// sweeps leave for each other.
 pub const SCRATCH: usize = 4;
@@ -79,6 +81,8 @@ pub const POINTS_BEFORE: u32 = 21;
 pub const IMPULSES_BEFORE: u32 = 22;
 /// How far the points are apart when the step begins.
 pub const SEPARATIONS: u32 = 23;
+/// The passes of a plan that one workgroup follows.
+pub const PASSES: u32 = 24;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
@@ -90,10 +94,12 @@ macro_rules! part {
 }
 
 /// What a pipeline runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Program {
     /// A kernel of a plan.
     Pass(Kernel),
+    /// All kernels of a plan, whose passes one workgroup of so many threads follows.
+    Whole(Arc<[Kernel]>, u32),
     /// Bodies begin a step; before the plan, as the others.
     BeginBodies,
     /// Rows of contacts are brought to their places.
@@ -107,9 +113,10 @@ impl Program {
     pub const CARRY: [Self; 3] = [Self::BeginBodies, Self::CarryContacts, Self::BeginContacts];
 
     /// Name of the shader file and of its entry point.
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
             Self::Pass(kernel) => kernel.name(),
+            Self::Whole(..) => "whole_step",
             Self::BeginBodies => "begin_bodies",
             Self::CarryContacts => "carry_contacts",
             Self::BeginContacts => "begin_contacts",
@@ -117,9 +124,10 @@ impl Program {
     }
 
     /// Its WGSL.
-    pub fn source(self) -> String {
+    pub fn source(&self) -> String {
         let own = match self {
-            Self::Pass(kernel) => return source(kernel),
+            Self::Pass(kernel) => return source(*kernel),
+            Self::Whole(kernels, threads) => return whole::source(kernels, *threads),
             Self::BeginBodies => part!("carry/begin_bodies"),
             Self::CarryContacts => part!("carry/carry_contacts"),
             Self::BeginContacts => part!("carry/begin_contacts"),
@@ -128,13 +136,18 @@ impl Program {
     }
 
     /// Its overrides.
-    pub fn constants(self) -> Vec<(&'static str, f64)> {
-        if let Self::Pass(kernel) = self { constants(kernel) } else { Vec::new() }
+    pub fn constants(&self) -> Vec<(&'static str, f64)> {
+        if let Self::Pass(kernel) = self { constants(*kernel) } else { Vec::new() }
     }
 }
 
 /// The WGSL of a kernel: the parts it is made of, one after another.
 pub fn source(kernel: Kernel) -> String {
+    [part!("lib/types"), part!("lib/bindings"), part!("lib/math"), &own_source(kernel)].join("\n")
+}
+
+/// What of the WGSL of a kernel is not the same for all.
+pub(super) fn own_source(kernel: Kernel) -> String {
     let own: &[&str] = match kernel {
         Kernel::IntegrateVelocities { .. } => &[part!("integrate_velocities")],
         Kernel::IntegrateGyroscopic => &[part!("integrate_gyroscopic")],
@@ -156,8 +169,7 @@ pub fn source(kernel: Kernel) -> String {
         ],
         Kernel::ApplyRestitution(_) => &[part!("lib/pair"), part!("apply_restitution")],
     };
-    let shared = [part!("lib/types"), part!("lib/bindings"), part!("lib/math")];
-    [&shared[..], own].concat().join("\n")
+    own.join("\n")
 }
 
 /// The overrides of a kernel, as its source has them.

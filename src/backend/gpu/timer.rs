@@ -21,8 +21,8 @@ pub(super) struct Timer {
     resolved: wgpu::Buffer,
     /// Length of a tick [ns].
     period: f32,
-    /// The program of each run.
-    runs: Vec<Program>,
+    /// Name of the program of each run.
+    runs: Vec<&'static str>,
 }
 
 impl Timer {
@@ -51,10 +51,10 @@ impl Timer {
     }
 
     /// Notes the time before a run of `program`. Of a submission with more runs than there are queries the first are timed.
-    pub fn before(&mut self, pass: &mut wgpu::ComputePass, program: Program) {
+    pub fn before(&mut self, pass: &mut wgpu::ComputePass, program: &Program) {
         if self.runs.len() < MOST as usize {
             pass.write_timestamp(&self.queries, self.runs.len() as u32);
-            self.runs.push(program);
+            self.runs.push(program.name());
         }
     }
 
@@ -76,12 +76,12 @@ impl Timer {
     /// Time of each program, in the order in which they first ran, from what was read back.
     pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
         let mut times: Vec<KernelTime> = Vec::new();
-        for (program, ticks) in self.runs.iter().zip(ticks.windows(2)) {
+        for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)) {
             let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(self.period);
             let time = Duration::from_nanos(nanoseconds as u64);
-            match times.iter_mut().find(|t| t.kernel == program.name()) {
+            match times.iter_mut().find(|t| t.kernel == kernel) {
                 Some(known) => known.time += time,
-                None => times.push(KernelTime { kernel: program.name(), time, bytes: 0 }),
+                None => times.push(KernelTime { kernel, time, bytes: 0 }),
             }
         }
         times
