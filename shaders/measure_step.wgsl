@@ -1,8 +1,8 @@
-// measure_step: one workgroup adds up how far a sweep moved the impulses of CHUNK points or joints, squared.
-// Reads impulses, joint_impulses, impulse_steps. Writes squares; one workgroup a number.
+// measure_step: one workgroup adds up how far a sweep moved the impulses of CHUNK points or joints: squared, and along the way
+// from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair.
 // Double: src/kernels/momentum.rs.
 
-fn squared_step(i: u32) -> f32 {
+fn step_length(i: u32) -> vec2f {
     var now: vec3f;
     if i < params.point_count {
         let impulse = impulses[i];
@@ -11,7 +11,7 @@ fn squared_step(i: u32) -> f32 {
         now = joint_impulses[i - params.point_count].linear;
     }
     let d = now - impulse_steps[i].begin;
-    return dot3(d, d);
+    return vec2f(dot3(d, d), dot3(d, now - impulse_steps[i].before));
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -22,9 +22,9 @@ fn measure_step(
 ) {
     let count = params.point_count + params.joint_count;
     for (var first = group.x * CHUNK; first < count; first += groups.x * CHUNK) {
-        var own = 0.0;
-        for (var i = first + thread; i < min(first + CHUNK, count); i += WORKGROUP) { own += squared_step(i); }
+        var own = vec2f();
+        for (var i = first + thread; i < min(first + CHUNK, count); i += WORKGROUP) { own += step_length(i); }
         let sum = workgroup_sum(thread, own);
-        if thread == 0u { squares[first / CHUNK] = sum; }
+        if thread == 0u { lengths[first / CHUNK] = sum; }
     }
 }

@@ -238,6 +238,14 @@ impl SolverConfig {
         Ok(config)
     }
 
+    /// The settings that are not at their defaults, as `key=value`, but for those that are `said` otherwise.
+    pub fn unusual(&self, said: &[&str]) -> Vec<String> {
+        let table = |config: &Self| toml::Table::try_from(config).expect("a config is a table");
+        let usual = table(&Self::default());
+        let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
+        table(self).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
+    }
+
     /// Changes one setting, written `key=value` as in TOML; bare words need no quotes.
     ///
     /// # Errors

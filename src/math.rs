@@ -292,11 +292,15 @@ pub fn turned<L: Lane>(q: Quat<L>, r: Vec3<L>) -> Vec3<L> {
     (t * q.w + cross3(q.axis, t)) * L::constant(2.0)
 }
 
-/// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad).
+/// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
+/// by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
 #[inline(always)]
 pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {
-    let u = r * L::constant(0.5);
-    let s = dot3(u, u);
+    let half = r * L::constant(0.5);
+    let square = dot3(half, half);
+    let too_long = square.gt(L::constant(4.0));
+    let u = half * L::select(L::constant(1.0), L::constant(2.0) * square.inverse_sqrt(), too_long);
+    let s = L::select(square, L::constant(4.0), too_long);
     let cosine = polynomial(s, [1.0, -0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3_628_800.0]);
     let sinc = polynomial(s, [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0]);
     Quat { axis: vec3(u.x * sinc, u.y * sinc, u.z * sinc), w: cosine }

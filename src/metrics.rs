@@ -24,14 +24,14 @@ impl Penetration {
     }
 
     /// Of the manifolds of `pairs`; a manifold that is apart counts as zero.
-    pub fn of(pairs: &[Pair]) -> Self {
+    pub fn of<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> Self {
         let deepest = |m: &crate::collide::Manifold| {
             m.points()
                 .iter()
                 .map(|p| f64::from(-p.separation))
                 .fold(0.0, |x: f64, y| if y > x || y.is_nan() { y } else { x })
         };
-        let mut depths: Vec<f64> = pairs.iter().flat_map(|p| &p.manifolds).map(deepest).collect();
+        let mut depths: Vec<f64> = pairs.into_iter().flat_map(|p| &p.manifolds).map(deepest).collect();
         // NaN sorts last, so that it spoils the largest.
         depths.sort_by(f64::total_cmp);
         let max = depths.last().copied().unwrap_or(0.0);

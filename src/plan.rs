@@ -11,7 +11,7 @@ use crate::config::{
     Clamping, FUSE_BELOW, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig,
 };
 use crate::kernels::Rules;
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
     StepProblem,
@@ -298,8 +298,8 @@ impl Pass {
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
-            Kernel::MeasureStep => 2 * IMPULSE * problem.impulse_count(),
-            Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<f32>(),
+            Kernel::MeasureStep => 3 * IMPULSE * problem.impulse_count(),
+            Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<StepLength<f32>>(),
             Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {

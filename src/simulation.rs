@@ -110,7 +110,7 @@ impl Simulation {
 
     /// Assembles a step; false if there is nothing to do in it.
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> bool {
-        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, self.detector.pairs()));
+        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, &self.detector));
         if self.sleep.is_everything_still() {
             stats.asleep = self.sleep.count();
             return false;
@@ -137,7 +137,7 @@ impl Simulation {
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
         let store = &mut stats.times.store;
-        if timed(store, || self.sleep.after_step(&mut self.world, self.detector.pairs(), dt)) {
+        if timed(store, || self.sleep.after_step(&mut self.world, &self.detector, dt)) {
             // Who sleeps has its impulses in its manifolds.
             timed(store, || self.fetch());
         }
@@ -149,7 +149,7 @@ impl Simulation {
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
         self.leave_device();
-        self.sleep.before_step(&self.world, self.detector.pairs());
+        self.sleep.before_step(&self.world, &self.detector);
         self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
     }
@@ -176,7 +176,7 @@ impl Simulation {
             let (detector, sleep) = (&mut self.detector, &mut self.sleep);
             let mut found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
             // Who wakes takes part in this step already.
-            while sleep.wake_touched(detector.pairs()) {
+            while sleep.wake_touched(detector) {
                 let reshaped = found.reshaped;
                 found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
                 found.reshaped |= reshaped;
@@ -221,6 +221,12 @@ impl Simulation {
         self.sleep.asleep().get(body) == Some(&true)
     }
 
+    /// Wakes a body, if it sleeps, and all that lies still with it: for those who change what the next step cannot see, such as a
+    /// joint to the world.
+    pub fn wake(&mut self, body: usize) {
+        self.sleep.wake(body);
+    }
+
     /// Overlap of the world as it is now, from contacts computed anew. The next step is as if nobody had asked: towers of 60
     /// that stand for 20 s fall if their contacts are recomputed now and then, since reused contacts do not creep.
     pub fn penetration(&self) -> Penetration {
@@ -228,15 +234,15 @@ impl Simulation {
     }
 
     /// Contacts and impulses of the last step.
-    pub fn pairs(&mut self) -> &[Pair] {
+    pub fn pairs(&mut self) -> impl Iterator<Item = &Pair> + Clone {
         self.world_and_pairs().1
     }
 
     /// The bodies, and contacts and impulses of the last step.
-    pub fn world_and_pairs(&mut self) -> (&World, &[Pair]) {
+    pub fn world_and_pairs(&mut self) -> (&World, impl Iterator<Item = &Pair> + Clone) {
         self.fetch();
-        let pairs = self.detector.pairs_mut();
-        pairs.iter_mut().for_each(|pair| self.prepared.give_back(&self.problem, pair));
+        let pairs = self.detector.pairs_mut().flatten();
+        pairs.for_each(|pair| self.prepared.give_back(&self.problem, pair));
         (&self.world, self.detector.pairs())
     }
 
@@ -257,10 +263,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Changes what runs the steps, from the next one on.
-    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
+    /// Changes what runs the steps, from the next one on; returns what ran them so far.
+    pub fn set_backend(&mut self, backend: Box<dyn Backend>) -> Box<dyn Backend> {
         self.leave_device();
-        self.backend = backend;
+        std::mem::replace(&mut self.backend, backend)
     }
 
     /// The settings.

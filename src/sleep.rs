@@ -8,7 +8,7 @@
 
 use glam::{Quat, Vec3};
 
-use crate::collide::{Activity, Pair};
+use crate::collide::{Activity, Detector};
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, World};
 
@@ -107,7 +107,7 @@ impl Sleep {
     }
 
     /// Wakes what was changed since the last step, and what touches what moves by itself.
-    pub fn before_step(&mut self, world: &World, pairs: &[Pair]) {
+    pub fn before_step(&mut self, world: &World, detector: &Detector) {
         let everything = std::mem::replace(&mut self.gravity, world.gravity) != world.gravity;
         for i in 0..self.asleep.len() {
             let body = &world.bodies[i];
@@ -125,14 +125,14 @@ impl Sleep {
                 _ => Activity::Still,
             };
         }
-        self.wake_touched(pairs);
+        self.wake_touched(detector);
     }
 
     /// Wakes what sleeps and is touched by what does not; returns whether that was anything.
-    pub fn wake_touched(&mut self, pairs: &[Pair]) -> bool {
+    pub fn wake_touched(&mut self, detector: &Detector) -> bool {
         let before = self.count;
         if before > 0 && self.activity.iter().any(|a| *a != Activity::Still) {
-            for pair in pairs.iter().filter(|p| !p.manifolds.is_empty()) {
+            for pair in detector.pairs().filter(|p| !p.manifolds.is_empty()) {
                 let [a, b] = [pair.body_a as usize, pair.body_b as usize];
                 for (one, other) in [(a, b), (b, a)] {
                     if self.asleep[one] && self.activity[other] != Activity::Still {
@@ -144,10 +144,10 @@ impl Sleep {
         self.count < before
     }
 
-    /// Wakes the island of a body that sleeps.
-    fn wake(&mut self, body: usize) {
+    /// Wakes the island of a body, if it sleeps.
+    pub fn wake(&mut self, body: usize) {
         let mut i = body;
-        while self.asleep[i] {
+        while self.asleep.get(i) == Some(&true) {
             self.asleep[i] = false;
             self.activity[i] = Activity::Awake;
             self.slow_for[i] = 0.0;
@@ -158,7 +158,7 @@ impl Sleep {
 
     /// Notes who was slow in a step of `dt` seconds, and lets islands fall asleep that were for long enough. Returns whether
     /// any did.
-    pub fn after_step(&mut self, world: &mut World, pairs: &[Pair], dt: f32) -> bool {
+    pub fn after_step(&mut self, world: &mut World, detector: &Detector, dt: f32) -> bool {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
             if body.kind != BodyKind::Dynamic {
@@ -172,19 +172,19 @@ impl Sleep {
         self.steps += 1;
         let before = self.count;
         if ready && self.steps.is_multiple_of(EVERY) {
-            self.let_islands_sleep(world, pairs);
+            self.let_islands_sleep(world, detector);
         }
         self.count > before
     }
 
-    fn let_islands_sleep(&mut self, world: &mut World, pairs: &[Pair]) {
+    fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector) {
         // Islands of those awake, the smallest index as root; and who is held by anything, and by nothing that moves by itself.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];
         (0..self.island.len()).filter(|&i| !self.asleep[i]).for_each(|i| self.island[i] = i as u32);
         let touching =
-            pairs.iter().filter(|p| !p.manifolds.is_empty()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
+            detector.pairs().filter(|p| !p.manifolds.is_empty()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
         let joined = world.joints.iter().map(|j| (j.body_a, j.body_b));
         for (a, b) in touching.chain(joined) {
             for (one, other) in [(Some(a), b), (b, Some(a))] {

@@ -70,6 +70,7 @@ fn small_standing_scenes_stand() {
         ("mass-ratio", vec!["n=6"]),
         ("pyramid-heavy", vec!["base=4"]),
         ("card-house", vec!["storeys=2"]),
+        ("many-pyramids", vec!["n=5", "base=4"]),
         ("arch", vec![]),
     ] {
         let (scene, simulation) = run(name, &parameters, 90);

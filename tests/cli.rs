@@ -292,3 +292,28 @@ fn a_comparison_of_the_reference_and_the_cpu_finds_no_difference() {
     let found = folder.json("compare drop --steps 3 --backends reference,cpu --json");
     assert_eq!((array(&found, "steps").len(), &found["first"]), (3, &Value::Null));
 }
+
+#[test]
+fn a_bench_is_printed_in_three_forms_and_marks_what_a_baseline_was_faster_at() {
+    let folder = Folder::new();
+    let bench = "bench tower:n=2 pile:n=4,worlds=2 --turns 2 --threads 1 --backend reference,cpu";
+    let measured = folder.json(&format!("{bench} --json"));
+    let rows = measured["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 4);
+    assert!(rows.iter().all(|r| r["ms"].as_f64() > Some(0.0) && r["hash"].as_str().map(str::len) == Some(16)));
+    let csv = folder.output(&format!("{bench} --csv"));
+    assert!(csv.lines().count() == 5 && csv.starts_with("scene,hash,backend,"), "{csv}");
+
+    let mut faster = measured.clone();
+    for row in faster["rows"].as_array_mut().expect("rows") {
+        for key in ["ms", "ms_low", "ms_high"] {
+            row[key] = (row[key].as_f64().expect("a time") * 1e-6).into();
+        }
+    }
+    let folder = folder.with("faster.json", &faster.to_string()).with("broken.json", "{}");
+    let table = folder.output(&format!("{bench} --baseline faster.json"));
+    assert!(table.contains("4 of 4 rows slower beyond the spread"), "{table}");
+    let refused = folder.run(&["bench", "tower", "--baseline", "broken.json"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("not what `drystone bench --json` prints"), "{}", text(&refused.stderr));
+}

@@ -152,7 +152,7 @@ fn what_a_reused_contact_carries_stays_with_it() {
             simulation.step(scene.dt).expect("a step");
             let solved = rows(simulation.problem());
             // The manifolds have what their rows have.
-            let given_back: HashMap<Contact, Vec<[f32; 3]>> = (simulation.pairs().iter())
+            let given_back: HashMap<Contact, Vec<[f32; 3]>> = (simulation.pairs())
                 .flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
                 .map(|(pair, m)| {
                     let key = m.points().iter().map(|p| arms(p.r_a.into(), p.r_b.into())).collect();

@@ -29,8 +29,7 @@ fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Option<Picture> {
         simulation.step(scene.dt).expect("a step");
     }
     let mut film = Film::new(scene.clone(), color);
-    let (world, pairs) = simulation.world_and_pairs();
-    film.add(0.0, world, pairs);
+    film.add(0.0, &mut simulation);
     let mut canvas = Canvas::new(&scene.world, SIZE).expect("an adapter");
     let mut pictures = Vec::new();
     let keep = |p: &Picture| {

@@ -132,7 +132,7 @@ fn contacts_that_find_no_color_are_counted_and_solved_all_the_same() {
         stats = simulation.step(scene.dt).expect("a step");
     }
     assert!(stats.overflow > 0 && stats.colors >= stats.overflow, "{stats:?}");
-    let touching = simulation.pairs().iter().map(|p| p.manifolds.len()).sum::<usize>();
+    let touching = simulation.pairs().map(|p| p.manifolds.len()).sum::<usize>();
     assert_eq!(touching, stats.manifolds, "a manifold was dropped");
     assert_eq!(scene.escaped(&simulation.world), 0);
     let (deepest, speed) = (simulation.penetration().max, drystone::metrics::rms_speed(&simulation.world));

@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use common::contacts::{curve, sweeps_to};
 use common::gpu::gpu;
 use drystone::config::Method;
-use drystone::solver::Order;
+use drystone::residuals::Measure;
+use drystone::solver::{Order, Solver};
 use drystone::stats::median;
 use drystone::{Backend, ContactProblem, Cpu};
 
@@ -76,18 +77,24 @@ fn ratios((anchor, problem): &(Anchor, ContactProblem), order: Order, backend: O
 #[test]
 fn contact_by_contact_sweeps_are_those_of_the_anchors() {
     let Some(folder) = folder() else { return };
-    for line in anchors(&folder) {
+    for line in anchors(&folder).into_iter().filter(|line| line.0.method == Method::Plain) {
         for backend in backends() {
             let rounded = backend.is_some();
-            // Where momentum ends is decided by the last digits of f32.
-            if rounded && line.0.method == Method::Accelerated {
-                continue;
-            }
             let ratios = ratios(&line, Order::Contacts, backend);
             let allowed = if rounded { 0.1 } else { 0.02 };
             assert!(ratios.iter().all(|r| (r - 1.0).abs() <= allowed), "{}: {ratios:?} of the anchor", line.0.name);
         }
     }
+}
+
+#[test]
+fn momentum_that_ends_with_a_step_back_saves_sweeps() {
+    // That of the anchors ends with every step that is longer than the one before.
+    let Some(folder) = folder() else { return };
+    let lines = anchors(&folder).into_iter().filter(|line| line.0.method == Method::Accelerated);
+    let all: Vec<_> = lines.flat_map(|line| ratios(&line, Order::Contacts, None)).collect();
+    println!("ratios {all:.2?}, median {:.3}", median(&all));
+    assert!(median(&all) < 1.0 && all.iter().all(|&r| r <= 1.15), "{all:?}");
 }
 
 #[test]
@@ -102,17 +109,32 @@ fn manifold_by_manifold_sweeps_are_no_more() {
     }
 }
 
+/// Largest change of e_vel, over `sweeps` plain ones in f64, when their impulses are rounded to f32.
+fn by_rounding(problem: &ContactProblem, order: Order, sweeps: u32) -> f64 {
+    let measure = Measure::new(problem);
+    let mut solver = Solver::new(problem, Method::Plain, order, None).expect("good frames");
+    let after_one = |_| {
+        solver.advance(1).expect("it runs");
+        let (exact, velocities) = (solver.impulses(), solver.velocities());
+        let rounded: Vec<_> = exact.iter().map(|r| r.as_vec3().as_dvec3()).collect();
+        (measure.of(&exact, &velocities).e_vel - measure.of(&rounded, &velocities).e_vel).abs()
+    };
+    (0..sweeps).map(after_one).fold(0.0, f64::max)
+}
+
 #[test]
 fn single_precision_leaves_the_errors_of_double_precision() {
     let Some(folder) = folder() else { return };
     for (name, problem) in problems(&folder) {
         for order in [Order::Contacts, Order::Manifolds] {
+            // A tonne on a kilogram: no impulses in f32 are nearer than those of f64 rounded, 1.8e-5.
+            let allowed = if name == "tower2_1_1000" { by_rounding(&problem, order, 500) } else { 1e-5 };
             let mut curves = backends().into_iter().map(|b| curve(&problem, (Method::Plain, order), b, 500));
             let exact = curves.next().expect("f64 is the first");
             for rounded in curves {
                 let apart = exact.iter().zip(&rounded).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                println!("{name:<18} {order:<10?} {apart:.1e} apart");
-                assert!(apart <= 1e-5 && rounded.iter().all(|e| e.is_finite()), "{name}, {order:?}: {apart:e}");
+                println!("{name:<18} {order:<10?} {apart:.1e} apart, {allowed:.1e} allowed");
+                assert!(apart <= allowed && rounded.iter().all(|e| e.is_finite()), "{name}, {order:?}: {apart:e}");
             }
         }
     }

@@ -62,7 +62,7 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
         match step % 12 {
             0 => assert_same(&mut both, &what),
             4 => {
-                let pairs = both.each_mut().map(|s| format!("{:?}", s.pairs()));
+                let pairs = both.each_mut().map(|s| s.pairs().map(|pair| format!("{pair:?}")).collect::<Vec<_>>());
                 assert_eq!(pairs[0], pairs[1], "{what}");
             }
             // Detections between two steps.

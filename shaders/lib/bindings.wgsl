@@ -17,6 +17,6 @@
 @group(0) @binding(13) var<storage, read_write> free: array<Free>;
 @group(0) @binding(14) var<storage, read_write> velocities_before: array<Free>;
 @group(0) @binding(15) var<storage, read_write> impulse_steps: array<Step>;
-@group(0) @binding(16) var<storage, read_write> squares: array<f32>;
+@group(0) @binding(16) var<storage, read_write> lengths: array<vec2f>;
 
 const WORKGROUP: u32 = 64u;

@@ -43,10 +43,14 @@ fn turned(q: vec4f, r: vec3f) -> vec3f {
     return (t * q.w + cross3(axis, t)) * 2.0;
 }
 
-// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad).
+// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
+// by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
 fn exp_rotation(r: vec3f) -> vec4f {
-    let u = r * 0.5;
-    let s = dot3(u, u);
+    let half = r * 0.5;
+    let square = dot3(half, half);
+    let too_long = square > 4.0;
+    let u = half * select(1.0, 2.0 * inverse_sqrt(square), too_long);
+    let s = select(square, 4.0, too_long);
     let cosine = 1.0 + s * (-0.5 + s * (4.1666668e-2 + s * (-1.3888889e-3 + s * (2.4801587e-5 + s * -2.7557319e-7))));
     let sinc = 1.0 + s * (-1.6666667e-1 + s * (8.3333338e-3 + s * (-1.9841270e-4 + s * (2.7557319e-6 + s * -2.5052108e-8))));
     return vec4f(u.x * sinc, u.y * sinc, u.z * sinc, cosine);

@@ -3,10 +3,10 @@
 // Numbers that one workgroup sums.
 const CHUNK: u32 = 1024u;
 
-var<workgroup> sums: array<f32, WORKGROUP>;
+var<workgroup> sums: array<vec2f, WORKGROUP>;
 
 // The sum of what each thread has of its own: halves are added. Every thread of the workgroup calls it.
-fn workgroup_sum(thread: u32, own: f32) -> f32 {
+fn workgroup_sum(thread: u32, own: vec2f) -> vec2f {
     sums[thread] = own;
     for (var half = WORKGROUP / 2u; half > 0u; half /= 2u) {
         workgroupBarrier();

@@ -1,5 +1,6 @@
 //! The command line: parse, one library call, print.
 
+mod bench;
 mod compare;
 #[cfg(feature = "fclib")]
 mod export;
@@ -64,6 +65,8 @@ enum Command {
     /// Draw a scene (in builds with `--features view`).
     #[cfg(not(feature = "view"))]
     Render(NotBuilt),
+    /// Measure what the stages of a step cost on standard scenes.
+    Bench(bench::BenchArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
@@ -134,9 +137,32 @@ struct SceneArgs {
     json: bool,
 }
 
+/// What is run for its result may sleep; what is run for a comparison may not.
+#[derive(Args)]
+struct SleepArgs {
+    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
+    #[arg(long)]
+    no_sleep: bool,
+}
+
+impl SleepArgs {
+    fn apply(&self, config: &mut SolverConfig) {
+        if self.no_sleep {
+            config.sleep_after = 0.0;
+        } else if config.sleep_after == 0.0 {
+            config.sleep_after = 0.5;
+        }
+    }
+}
+
 impl SceneArgs {
     /// The scene with its step length, and the settings.
     fn load(&self) -> Result<(Scene, SolverConfig)> {
+        self.load_worlds(1, None)
+    }
+
+    /// The same for some worlds of the scene: [`Scene::find_worlds`].
+    fn load_worlds(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
         let mut config = match &self.config {
             Some(path) => SolverConfig::from_toml_file(path)?,
             None => self.preset.config(),
@@ -151,7 +177,7 @@ impl SceneArgs {
         }
         config.method = self.method.unwrap_or(config.method);
         config.check()?;
-        let mut scene = Scene::find(&self.scene, &self.parameter)?;
+        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
         if let Some(dt) = self.dt {
             if !(dt > 0.0 && dt <= 1.0) {
                 return Err(Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));
@@ -258,6 +284,7 @@ pub fn main() -> std::process::ExitCode {
         Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Render(args) => args.run(),
+        Command::Bench(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
         Command::Adapters(args) => args.run(),

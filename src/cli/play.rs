@@ -1,6 +1,6 @@
 //! `drystone play`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
@@ -8,6 +8,7 @@ use super::{print, print_json};
 use crate::backend::{BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::maze::{Game, Map, Outcome, Script, pilot, play};
 
 /// Arguments of `drystone play`.
@@ -82,7 +83,7 @@ impl MazeArgs {
         }
         if let Some(path) = &self.pilot {
             let script = pilot(begin(map, config)?)?;
-            write(path, &script.text())?;
+            files::write(path, script.text().as_bytes())?;
             return print(path.display());
         }
         self.window(map, config)
@@ -90,7 +91,7 @@ impl MazeArgs {
 
     /// Plays, and draws what was played.
     #[cfg(feature = "view")]
-    fn draw(&self, game: Game, script: &Script, out: &Path) -> Result<crate::maze::Played> {
+    fn draw(&self, game: Game, script: &Script, out: &std::path::Path) -> Result<crate::maze::Played> {
         use crate::maze::SAMPLES;
         use crate::view::{Canvas, Output, draw_game, poses};
         // What cannot be drawn or written is refused before the game.
@@ -132,14 +133,4 @@ impl MazeArgs {
         print(format_args!("  slip while rolling {:.3} mm/s rms, {:.3} mm/s at most", slip.rms * 1e3, slip.max * 1e3))?;
         print(format_args!("  penetration {:.4} mm deepest", f64::from(played.penetration) * 1e3))
     }
-}
-
-/// Writes a text at once or not at all.
-fn write(path: &Path, text: &str) -> Result<()> {
-    let hidden = path.with_extension(format!("{}.part", std::process::id()));
-    let written = std::fs::write(&hidden, text).and_then(|()| std::fs::rename(&hidden, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&hidden);
-    }
-    written.map_err(Error::file(path))
 }

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{SceneArgs, print, progress};
+use super::{SceneArgs, SleepArgs, print, progress};
 use crate::backend::{BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::scenes::{CATALOGUE, Scene};
 use crate::simulation::Simulation;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
@@ -20,6 +21,8 @@ pub struct RenderArgs {
     /// What runs the sweeps.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendChoice,
+    #[command(flatten)]
+    sleep: SleepArgs,
     /// Where the pictures go: FILE.png, FILE.gif, FILE.mp4, or FOLDER/ for numbered PNGs.
     #[arg(long, value_name = "PATH", required_unless_present = "gallery")]
     out: Option<PathBuf>,
@@ -57,7 +60,8 @@ impl RenderArgs {
     }
 
     fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
-        let (scene, config) = args.load()?;
+        let (scene, mut config) = args.load()?;
+        self.sleep.apply(&mut config);
         args.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let png = out.extension().is_some_and(|e| e == "png");
         let frames = self.frames.unwrap_or(if png { 1 } else { 60 });
@@ -100,8 +104,7 @@ impl RenderArgs {
                 bar.inc(1);
             }
             if kept.binary_search(&(step as usize)).is_ok() {
-                let (world, pairs) = simulation.world_and_pairs();
-                film.add(f64::from(step) * f64::from(dt), world, pairs);
+                film.add(f64::from(step) * f64::from(dt), &mut simulation);
             }
         }
         bar.finish_and_clear();
@@ -129,7 +132,9 @@ impl RenderArgs {
             let mut output = Output::open(&path, self.size, 1.0)?;
             let (name, steps) = (entry.name, scene.steps);
             let mut canvas = Canvas::new(&scene.world, self.size)?;
-            let film = self.shoot(scene, SolverConfig::default(), 1, true)?;
+            let mut config = SolverConfig::default();
+            self.sleep.apply(&mut config);
+            let film = self.shoot(scene, config, 1, true)?;
             film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
             output.finish()?;
             let picture = folder.file_name().map(Path::new).unwrap_or(folder).join(format!("{name}.png"));
@@ -140,7 +145,7 @@ impl RenderArgs {
             );
         }
         let page_path = folder.with_extension("md");
-        std::fs::write(&page_path, page).map_err(Error::file(&page_path))?;
+        files::write(&page_path, page.as_bytes())?;
         print(page_path.display())
     }
 }

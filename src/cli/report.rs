@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::{print, progress};
 use crate::error::{Error, Result};
+use crate::files;
 use crate::report::{RUNS, convergence, rules};
 
 /// Arguments of `drystone report`.
@@ -48,8 +49,9 @@ impl ReportArgs {
                     bar.inc(1);
                 })?;
                 bar.finish_and_clear();
+                std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
                 let path = self.out.join("convergence.md");
-                std::fs::write(&path, page).map_err(Error::file(&path))?;
+                files::write(&path, page.as_bytes())?;
                 print(path.display())
             }
         }

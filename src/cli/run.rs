@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, print, print_json, progress, step_with_contacts};
+use super::{SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
 use crate::backend::{BackendChoice, choose};
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
@@ -27,9 +27,14 @@ pub struct RunArgs {
     /// Take the time of each kernel by the clock of the GPU; a software adapter is slower with it.
     #[arg(long)]
     kernel_times: bool,
-    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
-    #[arg(long)]
-    no_sleep: bool,
+    #[command(flatten)]
+    sleep: SleepArgs,
+    /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    worlds: usize,
+    /// Let each world have one more of a parameter of the scene than the one before, such as `seed`; else all are the same.
+    #[arg(long, value_name = "KEY", requires = "worlds")]
+    vary: Option<String>,
     /// Write poses and velocities of the bodies that can move, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -78,13 +83,9 @@ impl SaveProblem {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
-        if self.no_sleep {
-            config.sleep_after = 0.0;
-        } else if config.sleep_after == 0.0 {
-            config.sleep_after = 0.5;
-        }
+        self.sleep.apply(&mut config);
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         let (mut backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::SceneArgs;
+use super::{SceneArgs, SleepArgs};
 use crate::backend::BackendChoice;
 use crate::error::Result;
 use crate::view::{ColorBy, Live, window};
@@ -18,6 +18,8 @@ pub struct ViewArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
+    #[command(flatten)]
+    sleep: SleepArgs,
     /// What bodies are colored by.
     #[arg(long, value_enum, default_value_t)]
     color: ColorBy,
@@ -26,7 +28,8 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// Shows the scene until the window is closed.
     pub fn run(&self) -> Result<()> {
-        let (scene, config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load()?;
+        self.sleep.apply(&mut config);
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
         window::run(Box::new(Live::new(scene, config, self.backend, self.exact, self.color)?))
     }

@@ -95,13 +95,13 @@ fn cube_on_pads(side: usize) -> World {
 }
 
 /// Contact points, and by what share the force on a pad is off the mean of the pads that are its mirror images.
-fn asymmetry(pairs: &[Pair], side: usize) -> (usize, f64) {
+fn asymmetry<'a>(pairs: impl Iterator<Item = &'a Pair> + Clone, side: usize) -> (usize, f64) {
     let force =
         |p: &Pair| p.manifolds.iter().flat_map(|m| m.points()).map(|p| f64::from(p.normal_impulse)).sum::<f64>();
-    let points = pairs.iter().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
+    let points = pairs.clone().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
     // Pads are the first bodies, in rows.
     let mut forces = vec![f64::NAN; side * side];
-    pairs.iter().for_each(|p| forces[p.body_a.min(p.body_b) as usize] = force(p));
+    pairs.for_each(|p| forces[p.body_a.min(p.body_b) as usize] = force(p));
     let image = |i: usize| {
         let fold = |k: usize| k.min(side - 1 - k);
         let (x, z) = (fold(i % side), fold(i / side));
@@ -127,7 +127,8 @@ fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
     let (mut growth, mut before) = (0.0_f64, error(1)?);
     for power in 0..SWEEPS.ilog2() {
         let e = error(1 << power)?;
-        growth = growth.max(e / before);
+        // Below that it is rounding.
+        growth = growth.max(if e < 1e-12 { 0.0 } else { e / before });
         before = e;
     }
     Ok((growth, before))
@@ -144,8 +145,8 @@ pub(super) fn kapla(setup: &Setup) -> Result<Vec<Check>> {
 }
 
 pub(super) fn arches(setup: &Setup) -> Result<Vec<Check>> {
-    let thick = setup.run("arch", &["voussoirs=51", "thickness=0.12"], TEN)?;
-    let thin = setup.run("arch", &["voussoirs=51", "thickness=0.095"], TEN)?;
+    let thick = setup.run("arch", &["voussoirs=31", "thickness=0.12"], TEN)?;
+    let thin = setup.run("arch", &["voussoirs=31", "thickness=0.095"], TEN)?;
     let fallen = Check::at_least("0.095 of the radius: stones out of place", thin.fallen, 1.0);
     Ok(vec![thick.stands("0.12 of the radius"), fallen])
 }
@@ -186,6 +187,6 @@ mod tests {
         assert!(points == 16 && even < 0.05, "{points} points, {even}");
         world.bodies[4] = lopsided;
         assert!(measure(world).1 > 0.1);
-        assert!(asymmetry(&[], 1).1.is_nan());
+        assert!(asymmetry([].iter(), 1).1.is_nan());
     }
 }

@@ -1,13 +1,17 @@
-//! Nesterov's momentum for sweeps, with a restart as soon as steps grow (O'Donoghue and Candès 2015). Doubles of the kernels
+//! Nesterov's momentum for sweeps, with a restart where it leads uphill (O'Donoghue and Candès 2015). Doubles of the kernels
 //! `extrapolate`, `measure_step` and `update_momentum`.
 //!
 //! With S one sweep over all constraints, x its result and r where it begins:
 //!
 //! ```text
 //! x_k = S(r_k-1)        f_k = |x_k - r_k-1|
-//! if f_k > f_k-1:       t_k = 1,  r_k = x_k
+//! if (x_k - r_k-1)·(x_k - x_k-1) < 0, or f_k > 2 f_j for a j since the last restart:
+//!                       t_k = 1,  r_k = x_k
 //! else:                 t_k = (1 + sqrt(1 + 4 t_k-1²))/2,  r_k = x_k + (t_k-1 - 1)/t_k (x_k - x_k-1)
 //! ```
+//!
+//! The first condition is the sharper one: a sweep that goes back where momentum went on. But it can hold off for ever on a
+//! cycle, which the second one ends. Numbers are in docs/convergence.md.
 //!
 //! Velocities are linear in the impulses and go along with the same factor. The result is x_k, so nothing follows the last
 //! sweep; the factor is 0 before the second.
@@ -29,15 +33,37 @@ impl<S: Scalar> Momentum<S> {
         *self = Self { t: S::constant(1.0), factor: S::constant(0.0), square, restarts: self.restarts };
     }
 
-    /// After a sweep whose step has the squared norm `square`. Kernel `update_momentum`.
-    pub fn update(&mut self, square: S) {
-        let (zero, half, one) = (S::constant(0.0), S::constant(0.5), S::constant(1.0));
-        let x = one + S::constant(4.0) * self.t * self.t;
+    /// After a sweep. Kernel `update_momentum`.
+    pub fn update(&mut self, step: StepLength<S>) {
+        let (zero, half, one, four) = (S::constant(0.0), S::constant(0.5), S::constant(1.0), S::constant(4.0));
+        let x = one + four * self.t * self.t;
         let t = half * (one + x * x.inverse_sqrt());
         let factor = (self.t - one) * reciprocal(t);
-        let grew = square > self.square;
-        let restarts = self.restarts + u32::from(grew);
-        *self = Self { t: if grew { one } else { t }, factor: if grew { zero } else { factor }, square, restarts };
+        let ends = step.along < zero || step.square > four * self.square;
+        let shorter = ends || step.square < self.square;
+        *self = Self {
+            t: if ends { one } else { t },
+            factor: if ends { zero } else { factor },
+            square: if shorter { step.square } else { self.square },
+            restarts: self.restarts + u32::from(ends),
+        };
+    }
+}
+
+/// A sum over impulses. Double of the `vec2f` of `measure_step`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepLength<L> {
+    /// |x_k - r_k-1|²
+    pub square: L,
+    /// (x_k - r_k-1)·(x_k - x_k-1)
+    pub along: L,
+}
+
+impl<L: Add<Output = L>> Add for StepLength<L> {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { square: self.square + other.square, along: self.along + other.along }
     }
 }
 
@@ -72,16 +98,16 @@ pub fn extrapolate<L: Lane>(first: bool, factor: L, impulse: Vec3<L>, step: &mut
     begin
 }
 
-/// How far a sweep moved an impulse, squared. Kernel `measure_step`.
+/// How far a sweep moved an impulse. Kernel `measure_step`.
 #[inline(always)]
-pub fn squared_step<L: Lane>(impulse: Vec3<L>, step: &Step<L>) -> L {
+pub fn step_length<L: Lane>(impulse: Vec3<L>, step: &Step<L>) -> StepLength<L> {
     let d = impulse - step.begin;
-    dot3(d, d)
+    StepLength { square: dot3(d, d), along: dot3(d, impulse - step.before) }
 }
 
 /// Sum of some numbers as the kernels form it: `measure_step` that of each chunk, `update_momentum` that of those.
-pub fn chunked_sum<L: Lane>(numbers: &[L]) -> L {
-    let mut sums = [L::constant(0.0); WORKGROUP];
+pub fn chunked_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
+    let mut sums = [T::default(); WORKGROUP];
     for (i, chunk) in numbers.chunks(CHUNK).enumerate() {
         sums[i % WORKGROUP] = sums[i % WORKGROUP] + workgroup_sum(chunk);
     }
@@ -89,8 +115,8 @@ pub fn chunked_sum<L: Lane>(numbers: &[L]) -> L {
 }
 
 /// Sum of some numbers as a workgroup forms it: each thread takes every 64th, then halves are added.
-fn workgroup_sum<L: Lane>(numbers: &[L]) -> L {
-    let mut sums = [L::constant(0.0); WORKGROUP];
+fn workgroup_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
+    let mut sums = [T::default(); WORKGROUP];
     for row in numbers.chunks(WORKGROUP) {
         for (sum, &x) in sums.iter_mut().zip(row) {
             *sum = *sum + x;
@@ -99,7 +125,7 @@ fn workgroup_sum<L: Lane>(numbers: &[L]) -> L {
     sum_of_halves(sums)
 }
 
-fn sum_of_halves<L: Lane>(mut sums: [L; WORKGROUP]) -> L {
+fn sum_of_halves<T: Copy + Add<Output = T>>(mut sums: [T; WORKGROUP]) -> T {
     let mut half = WORKGROUP / 2;
     while half > 0 {
         for i in 0..half {
@@ -115,18 +141,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn momentum_grows_as_it_is_told_and_a_longer_step_ends_it() {
+    fn momentum_grows_as_it_is_told_and_a_step_back_or_a_longer_one_ends_it() {
+        let step = |square, along| StepLength { square, along };
         let mut momentum = Momentum::<f64>::default();
         momentum.begin();
         let mut t = 1.0_f64;
         for k in 0..20 {
-            momentum.update(1.0 / f64::from(1 + k));
+            // Steps grow again at last, but none is twice the shortest.
+            momentum.update(step(if k < 10 { 1.0 / f64::from(1 + k) } else { 0.399 }, 0.0));
             let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
             assert!((momentum.t - next).abs() < 1e-12 && (momentum.factor - (t - 1.0) / next).abs() < 1e-12);
             t = next;
         }
-        momentum.update(0.06);
-        assert_eq!(momentum, Momentum { t: 1.0, factor: 0.0, square: 0.06, restarts: 1 });
+        for (ending, restarts) in [(step(0.401, 1.0), 1), (step(0.3, -1e-9), 2)] {
+            momentum.update(step(0.1, 1.0));
+            momentum.update(ending);
+            assert_eq!(momentum, Momentum { t: 1.0, factor: 0.0, square: ending.square, restarts });
+        }
     }
 
     #[test]

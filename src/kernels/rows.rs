@@ -148,7 +148,7 @@ pub struct Momentum<L> {
     pub t: L,
     /// (t_k-1 - 1)/t_k.
     pub factor: L,
-    /// f_k².
+    /// The least f² since the last restart.
     pub square: L,
     /// How often momentum ended so far.
     pub restarts: u32,

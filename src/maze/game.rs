@@ -17,8 +17,10 @@ use crate::world::World;
 const TILT_RATE: f32 = 60.0;
 /// Steps after which a ball on the floor rolls: a tenth of a second.
 const SETTLED: u32 = 12;
-/// The ball touches what is nearer than this [m].
-const ON_FLOOR: f32 = 2e-5;
+/// The ball is on the floor if it is nearer than this, and off the walls if it is further from them than that [m]. A board that
+/// turns back throws the ball up by some micrometers.
+const ON_FLOOR: f32 = 2e-6;
+const OFF_WALLS: f32 = 2e-5;
 /// The ball has arrived when its middle is this near to the goal's [m].
 const ARRIVED: f32 = 0.4 * CELL;
 
@@ -182,7 +184,7 @@ impl Game {
     fn measure(&mut self) {
         let gap = gap(&self.map, self.ball());
         self.deepest = self.deepest.max(-gap.floor.unwrap_or(0.0)).max(-gap.wall);
-        let rolls = gap.floor.is_some_and(|floor| floor < ON_FLOOR) && gap.wall > ON_FLOOR;
+        let rolls = gap.floor.is_some_and(|floor| floor < ON_FLOOR) && gap.wall > OFF_WALLS;
         self.rolled = if rolls { self.rolled + 1 } else { 0 };
         if self.rolled > SETTLED {
             let bodies = &self.world().bodies;

@@ -10,13 +10,16 @@ use super::StepProblem;
 use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
-use crate::collide::{Manifold, ManifoldPoint, Motion, Pair};
+use crate::collide::{Detector, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::world::World;
 
 /// Where a contact comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Source {
+    /// World of the pair.
+    pub world: u32,
+    /// Place of the pair among those of its world.
     pub pair: u32,
     /// Which manifold of the pair.
     pub manifold: u32,
@@ -80,7 +83,7 @@ const CHUNK: usize = 256;
 /// What the rows of contacts are written from.
 pub(super) struct Writer<'a> {
     pub world: &'a World,
-    pub pairs: &'a [Pair],
+    pub detector: &'a Detector,
     pub config: &'a SolverConfig,
     /// Length of a substep [s].
     pub substep: f32,
@@ -108,7 +111,7 @@ impl Writer<'_> {
         // Headers first: they depend on nothing but their manifold, so the waits for memory overlap.
         for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
-            let pair = &self.pairs[source.pair as usize];
+            let pair = self.detector.pair(source.world, source.pair);
             if pair.computed_in > self.seen {
                 self.write_header(row, pair, &pair.manifolds[source.manifold as usize]);
             } else if let (Some(before), Some(from)) = (self.before, source.row_before) {
@@ -119,7 +122,7 @@ impl Writer<'_> {
         let mut next = 0;
         for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
-            let pair = &self.pairs[source.pair as usize];
+            let pair = self.detector.pair(source.world, source.pair);
             let own = next..next + source.points as usize + patch;
             next = own.end;
             let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);

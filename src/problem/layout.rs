@@ -198,9 +198,9 @@ pub struct MomentumRow {
     pub t: f32,
     /// How far the next sweep is extrapolated, as a share of the last step; 0 after a restart.
     pub factor: f32,
-    /// Norm of the last sweep's change of all impulses, squared [N² s²].
+    /// Norm of the least change that a sweep made of all impulses since momentum last began, squared [N² s²].
     pub square: f32,
-    /// Steps that grew and ended the momentum, over the whole step.
+    /// How often momentum ended, over the whole step.
     pub restarts: u32,
 }
 

@@ -62,22 +62,22 @@ impl Prepared {
         self.sources.clear();
         self.edges.clear();
         let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
-        for (i, pair) in detector.pairs_mut().iter_mut().enumerate() {
-            if pair.rests {
-                continue;
-            }
-            let before = pair.contact as usize;
-            pair.contact = self.sources.len() as u32;
-            for k in 0..pair.manifolds.len() {
-                if pair.computed_in > self.seen {
-                    let manifold = &pair.manifolds[k];
-                    let points = manifold.points().len() as u32;
-                    self.sources.push(Source { pair: i as u32, manifold: k as u32, points, row_before: None });
-                    self.edges.push(Edge { a: movable(pair.body_a), b: movable(pair.body_b), color: manifold.color });
-                } else {
-                    let row_before = Some(self.row_of[before + k]);
-                    self.sources.push(Source { pair: i as u32, row_before, ..self.sources_before[before + k] });
-                    self.edges.push(self.edges_before[before + k]);
+        for (part, pairs) in detector.pairs_mut().enumerate() {
+            for (i, pair) in pairs.iter_mut().enumerate().filter(|(_, pair)| !pair.rests) {
+                let before = pair.contact as usize;
+                pair.contact = self.sources.len() as u32;
+                for k in 0..pair.manifolds.len() {
+                    let (source, edge) = if pair.computed_in > self.seen {
+                        let manifold = &pair.manifolds[k];
+                        let points = manifold.points().len() as u32;
+                        let source = Source { world: 0, pair: 0, manifold: k as u32, points, row_before: None };
+                        (source, Edge { a: movable(pair.body_a), b: movable(pair.body_b), color: manifold.color })
+                    } else {
+                        let row_before = Some(self.row_of[before + k]);
+                        (Source { row_before, ..self.sources_before[before + k] }, self.edges_before[before + k])
+                    };
+                    self.sources.push(Source { world: part as u32, pair: i as u32, ..source });
+                    self.edges.push(edge);
                 }
             }
         }
@@ -216,7 +216,7 @@ impl Prepared {
         }
         let writer = Writer {
             world,
-            pairs: detector.pairs(),
+            detector,
             config,
             substep: problem.params.substep,
             bodies: &problem.bodies,
@@ -248,7 +248,7 @@ impl Prepared {
         }
         for (row, &contact) in (0..).zip(&self.coloring.order) {
             let source = &self.sources[contact as usize];
-            let pair = &detector.pairs()[source.pair as usize];
+            let pair = detector.pair(source.world, source.pair);
             if pair.computed_in > self.seen {
                 let manifold = &pair.manifolds[source.manifold as usize];
                 let mut origin = Origin { row, contact: manifold.row_before.unwrap_or(NO_ROW), points: [NO_ROW; 4] };

@@ -12,6 +12,7 @@ use crate::simulation::Simulation;
 use crate::solver::Order;
 use crate::stats::median;
 
+use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};
 
 /// Scenes of the catalogue whose steps are solved, with their parameters and the step.
@@ -30,6 +31,17 @@ const KINDS: [(Method, u8); 4] =
 /// Most sweeps of one solve.
 const MOST: u32 = 40_000;
 
+/// Scenes that are run under settings with equal numbers of sweeps, and their steps.
+const RUNS: [(&str, &[&str], u32); 4] = [
+    ("tower", &["n=20", "offset=0.01"], 300),
+    ("wall", &[], 120),
+    ("mass-ratio", &["ratio=1000"], 300),
+    ("pile", &["n=1000"], 180),
+];
+
+/// Substeps, and sweeps of each kind in one: 16 or 64 in all.
+const SETTINGS: [(u32, u32); 7] = [(8, 1), (4, 2), (2, 4), (1, 8), (32, 1), (4, 8), (2, 16)];
+
 /// Makes the page from steps of catalogue scenes and the `.contacts` files of `folder`; `after_problem` is called with the
 /// number of problems after each.
 ///
@@ -45,12 +57,12 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
     for problem in &problems {
         let mut first = None;
         for (kind, (fewer, lower)) in KINDS.iter().zip(&mut gains) {
-            let report = solved(problem, *kind)?;
+            let report = solved(problem, *kind, MOST, 1e-4)?;
             let to = |i: usize| report.reached[i].sweeps.map_or(f64::INFINITY, f64::from);
-            let after_32 = report.curve.iter().find(|row| row.sweeps == 32).map_or(0.0, |row| row.residuals.e_vel);
+            let after_32 = solved(problem, *kind, 32, 0.0)?.curve.last().map_or(f64::NAN, |row| row.residuals.e_vel);
             let (plain_sweeps, plain_error) = *first.get_or_insert((to(2), after_32));
             fewer.push(plain_sweeps / to(2));
-            lower.push(plain_error / after_32.max(f64::MIN_POSITIVE));
+            lower.push(plain_error / after_32);
             let sweeps = [0, 1, 2, 3].map(|i| report.reached[i].sweeps.map_or("-".into(), |n| n.to_string()));
             let (name, contacts) = (&problem.name, problem.contacts.len());
             let (name, contacts) =
@@ -72,7 +84,46 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
         line(&mut page, format_args!("| {} | {:.1} | {:.1} |", kind_name(*kind), median(fewer), median(lower)));
     }
     page.push_str(include_str!("convergence_tail.md"));
+    runs(&mut page)?;
     Ok(page)
+}
+
+/// What plain and accelerated sweeps make of whole runs.
+fn runs(page: &mut String) -> Result<()> {
+    page.push_str(include_str!("convergence_runs.md"));
+    page.push_str("\n| scene | substeps | sweeps | method | deepest [mm] | rms speed [mm/s] | in place |\n");
+    page.push_str("|---|--:|--:|---|--:|--:|--:|\n");
+    for (name, parameters, steps) in RUNS {
+        let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
+        let scene = Scene::find(name, &parameters)?;
+        let mut title = [&[name.to_owned()], &parameters[..]].concat().join(" ");
+        for (substeps, sweeps) in SETTINGS {
+            // Momentum begins with the third sweep.
+            let methods = if sweeps < 3 { &[Method::Plain][..] } else { &[Method::Plain, Method::Accelerated] };
+            for &method in methods {
+                let config =
+                    SolverConfig { substeps, iterations: sweeps, relax: sweeps, method, ..SolverConfig::default() };
+                let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new()))?;
+                let mut report = RunReport::new(&scene, &simulation);
+                for _ in 0..steps {
+                    report.add(&simulation.step(scene.dt)?);
+                }
+                report.measure(&scene, &mut simulation);
+                let (deepest, speed) = (1e3 * report.penetration_max, 1e3 * report.speed_rms);
+                let method = format!("{method:?}").to_lowercase();
+                let in_place =
+                    if scene.stands { format!("{} of {}", report.in_place, report.bodies) } else { String::new() };
+                line(
+                    page,
+                    format_args!(
+                        "| {} | {substeps} | {sweeps} + {sweeps} | {method} | {deepest:.2} | {speed:.2} | {in_place} |",
+                        std::mem::take(&mut title)
+                    ),
+                );
+            }
+        }
+    }
+    Ok(())
 }
 
 fn line(page: &mut String, text: std::fmt::Arguments) {
@@ -83,8 +134,13 @@ fn kind_name((method, passes): (Method, u8)) -> String {
     format!("{method:?}, {passes} pass{}", if passes == 1 { "" } else { "es" }).to_lowercase()
 }
 
-fn solved(problem: &ContactProblem, (method, passes): (Method, u8)) -> Result<SolveReport> {
-    let settings = SolveSettings { method, order: Order::Manifolds, passes, sweeps: MOST, tolerance: 1e-4 };
+fn solved(
+    problem: &ContactProblem,
+    (method, passes): (Method, u8),
+    sweeps: u32,
+    tolerance: f64,
+) -> Result<SolveReport> {
+    let settings = SolveSettings { method, order: Order::Manifolds, passes, sweeps, tolerance };
     SolveReport::new(problem, &settings, None)
 }
 

@@ -1,5 +1,6 @@
 //! What runs came to: one run for people and programs, its motion, and pages made from many runs.
 
+pub mod bench;
 mod convergence;
 pub mod front;
 pub mod hard_cases;

@@ -20,7 +20,9 @@ pub struct RunReport {
     pub backend: String,
     /// What it ran on.
     pub adapter: String,
-    /// Dynamic bodies.
+    /// Worlds beside each other.
+    pub worlds: usize,
+    /// Dynamic bodies of all of them.
     pub bodies: usize,
     /// Steps that were run.
     pub steps: u32,
@@ -144,6 +146,7 @@ impl RunReport {
             scene: scene.name.clone(),
             backend: simulation.backend().name().into(),
             adapter: simulation.backend().adapter(),
+            worlds: scene.world.parts().len(),
             bodies: scene.world.dynamic_count(),
             steps: 0,
             dt: scene.dt,
@@ -272,6 +275,10 @@ impl RunReport {
         let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
         let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
         row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
+        if self.worlds > 1 {
+            let steps = self.worlds as f64 / (1e-3 * median(&self.step_ms));
+            row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
+        }
         row("backend", format!("{}: {}", self.backend, self.adapter));
         row(
             "steps",

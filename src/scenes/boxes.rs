@@ -5,7 +5,7 @@ use glam::{Quat, Vec3};
 use super::Scene;
 use super::parts::{centered, floor, unit_box};
 use super::random::SplitMix64;
-use crate::world::{Body, Shape};
+use crate::world::{Body, Shape, World};
 
 /// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
 pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
@@ -53,19 +53,39 @@ fn small_turn(random: &mut SplitMix64) -> Quat {
     Quat::from_xyzw(x, y, z, cosine as f32)
 }
 
+/// Distance of neighbors in a row of a pyramid, middle to middle [m].
+const PYRAMID_PITCH: f64 = 1.1;
+
 /// Rows of boxes, each one shorter than the row below it, 0.1 m between neighbors.
 pub(super) fn pyramid(base: usize) -> Scene {
-    const PITCH: f64 = 1.1;
     let mut world = floor(base as f32 + 10.0, 10.0);
+    add_pyramid(&mut world, base, 0.0, 0.0);
+    Scene::new("pyramid", world, 300).standing()
+}
+
+/// `n` such pyramids on a square grid, near each other but apart.
+pub(super) fn many_pyramids(n: usize, base: usize) -> Scene {
+    const DEPTH: f64 = 2.0;
+    let side = (n as f64).sqrt().ceil() as usize;
+    let width = base as f64 * PYRAMID_PITCH + 1.0;
+    let half = side as f64 / 2.0;
+    let mut world = floor((half * width) as f32 + 10.0, (half * DEPTH) as f32 + 10.0);
+    for i in 0..n {
+        add_pyramid(&mut world, base, centered(i % side, side) * width, centered(i / side, side) * DEPTH);
+    }
+    Scene::new("many-pyramids", world, 300).standing()
+}
+
+/// Adds a pyramid, the lowest row's middle at `x` and `z`.
+fn add_pyramid(world: &mut World, base: usize, x: f64, z: f64) {
     let body = unit_box();
     for row in 0..base {
         let boxes = base - row;
         for column in 0..boxes {
-            let x = (centered(column, boxes) * PITCH) as f32;
-            world.add(body.clone().position(x, row as f32 + 0.5, 0.0));
+            let x = x + centered(column, boxes) * PYRAMID_PITCH;
+            world.add(body.clone().position(x as f32, row as f32 + 0.5, z as f32));
         }
     }
-    Scene::new("pyramid", world, 300).standing()
 }
 
 /// A stack of `n` boxes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
@@ -128,7 +148,9 @@ mod tests {
 
     #[test]
     fn no_two_bodies_overlap_at_the_start() {
-        for scene in [pile(1000, 0.03, 1), pile(500, 0.04, 7), pyramid(6), tower(5, 0.2, 1.0), wall(6, 4)] {
+        for scene in
+            [pile(1000, 0.03, 1), pile(500, 0.04, 7), pyramid(6), many_pyramids(5, 3), tower(5, 0.2, 1.0), wall(6, 4)]
+        {
             no_two_overlap(&scene);
         }
     }

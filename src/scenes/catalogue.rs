@@ -69,7 +69,8 @@ impl Entry {
         self.values(assignments).and_then(|v| (self.build)(&v)).map_err(|e| e.within(self.name))
     }
 
-    fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
+    /// One value for each parameter, in their order.
+    pub(super) fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
         let mut values: Vec<f64> = self.parameters.iter().map(|p| p.default).collect();
         for assignment in assignments {
             let (key, value) = assignment

@@ -21,7 +21,7 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
         return Err(unknown_version(file.version));
     }
     let dt = one("dt", file.dt, "more than 0 and at most 1", |x| x > 0.0 && x <= 1.0)?;
-    let mut world = World { gravity: finite("gravity", file.gravity)?.into(), bodies: Vec::new(), joints: Vec::new() };
+    let mut world = World { gravity: finite("gravity", file.gravity)?.into(), ..World::new() };
     let container = file.container.map(container).transpose()?;
     for (index, body_file) in file.bodies.into_iter().enumerate() {
         let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;

@@ -27,6 +27,15 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| Ok(boxes::pyramid(v[0] as usize)),
     },
     Entry {
+        name: "many-pyramids",
+        summary: "n plane pyramids of boxes beside each other on one floor: all stand",
+        parameters: &[
+            Parameter::whole("n", 100, (1.0, 10_000.0), "number of pyramids"),
+            Parameter::whole("base", 10, (1.0, 25.0), "boxes in the lowest row of each"),
+        ],
+        build: |v| Ok(boxes::many_pyramids(v[0] as usize, v[1] as usize)),
+    },
+    Entry {
         name: "tower",
         summary: "one stack of boxes, straight or zigzag, with a light or heavy top: it stands up to an offset of 0.2 m",
         parameters: &[

@@ -18,7 +18,7 @@ impl Write for Sink {
 }
 
 impl Scene {
-    /// 64-bit FNV-1a hash of the bodies, joints, gravity and the length of a step, as 16 hexadecimal digits. Names do not count.
+    /// 64-bit FNV-1a hash of the bodies, joints, worlds, gravity and the length of a step, as 16 hexadecimal digits. Names do not count.
     pub fn content_hash(&self) -> String {
         let mut sink = Sink(FnvHasher::default());
         // Writing to a hasher does not fail. Numbers are written with as many digits as tell them apart.
@@ -31,6 +31,9 @@ impl Scene {
             }
         }
         let _ = write!(sink, "{:?}", self.world.joints);
+        if !self.world.begins.is_empty() {
+            let _ = write!(sink, "{:?}", self.world.begins);
+        }
         format!("{:016x}", sink.0.finish())
     }
 }
@@ -43,12 +46,13 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(scene.content_hash(), Scene::find("drop", &[]).unwrap().content_hash());
-        let changes: [fn(&mut Scene); 5] = [
+        let changes: [fn(&mut Scene); 6] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
             |s| s.world.bodies[3].force.y = 1e-3,
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].colliders[0].shape = crate::Shape::ball(0.25),
+            |s| s.world.begins.push(3),
         ];
         for change in changes {
             let mut changed = scene.clone();

@@ -15,6 +15,7 @@ mod masonry;
 mod parts;
 mod random;
 mod stacks;
+mod worlds;
 
 pub use catalogue::{Entry, Parameter};
 pub use entries::CATALOGUE;

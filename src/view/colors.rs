@@ -1,6 +1,7 @@
 //! What the color of a body says.
 
 use crate::collide::Pair;
+use crate::simulation::Simulation;
 use crate::world::{BodyKind, World};
 
 /// What bodies are colored by.
@@ -15,6 +16,8 @@ pub enum ColorBy {
     Speed,
     /// Sum of the normal impulses on the body in the last substep, dark to light.
     Impulse,
+    /// Whether the body sleeps, dark, or is awake, light.
+    Sleeping,
 }
 
 /// A color as sRGB with an unused fourth byte.
@@ -24,6 +27,8 @@ const FIXED: Rgba = [176, 178, 182, 255];
 const KINEMATIC: Rgba = [150, 160, 178, 255];
 /// Bodies about which there is nothing to say: no contact.
 const NOTHING: Rgba = [222, 222, 218, 255];
+const ASLEEP: Rgba = [74, 92, 128, 255];
+const AWAKE: Rgba = [240, 178, 84, 255];
 
 /// Stones, bricks, slates.
 const MATERIALS: [Rgba; 8] = [
@@ -42,15 +47,28 @@ const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
 impl ColorBy {
-    /// Whether it is about contacts, which a recorded motion does not have.
-    pub fn needs_contacts(self) -> bool {
-        matches!(self, Self::Batch | Self::Impulse)
+    /// Whether it is about what only a run knows, and a recorded motion does not: contacts, and who sleeps.
+    pub fn needs_run(self) -> bool {
+        matches!(self, Self::Batch | Self::Impulse | Self::Sleeping)
     }
 
-    /// One number for each body: number of the material, number of the batch, speed [m/s] or impulse [N s]; NaN for bodies
-    /// about which there is nothing to say.
-    pub fn values(self, world: &World, pairs: &[Pair]) -> Vec<f32> {
+    /// One number for each body: number of the material, number of the batch, speed [m/s], impulse [N s], or 1 if it sleeps and
+    /// 0 if not; NaN for bodies about which there is nothing to say.
+    pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
+        let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();
+        let (world, pairs) = simulation.world_and_pairs();
+        self.values_of(world, pairs, &asleep)
+    }
+
+    /// The same, for bodies that make the contacts `pairs`, and of which some are `asleep`.
+    pub(super) fn values_of<'a>(
+        self,
+        world: &World,
+        pairs: impl IntoIterator<Item = &'a Pair>,
+        asleep: &[bool],
+    ) -> Vec<f32> {
         match self {
+            Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
             Self::Speed => world.bodies.iter().map(|b| b.linear_velocity.length()).collect(),
             Self::Batch => {
@@ -94,14 +112,17 @@ impl ColorBy {
             _ if value.is_nan() => NOTHING,
             (_, Self::Material) => shaded(MATERIALS[value as usize % MATERIALS.len()], i),
             (_, Self::Batch) => batch_color(value as u32),
+            (_, Self::Sleeping) => shaded(if value > 0.0 { ASLEEP } else { AWAKE }, i),
             (_, Self::Speed | Self::Impulse) => on_scale(value / scale.max(f32::MIN_POSITIVE)),
         };
         world.bodies.iter().zip(values).enumerate().map(color).collect()
     }
 }
 
-fn contacts(pairs: &[Pair]) -> impl Iterator<Item = (&Pair, &crate::collide::Manifold)> {
-    pairs.iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
+fn contacts<'a>(
+    pairs: impl IntoIterator<Item = &'a Pair>,
+) -> impl Iterator<Item = (&'a Pair, &'a crate::collide::Manifold)> {
+    pairs.into_iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
 }
 
 /// Number of each dynamic body's material, in the order in which they first occur.
@@ -162,7 +183,8 @@ mod tests {
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");
         let reference = Box::new(Reference::<f32>::new());
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
+        let config = SolverConfig { sleep_after: 0.1, ..SolverConfig::default() };
+        let mut simulation = Simulation::new(scene.world, config, reference).expect("a simulation");
         for _ in 0..20 {
             simulation.step(scene.dt).expect("a step");
         }
@@ -172,8 +194,7 @@ mod tests {
     #[test]
     fn batches_that_share_a_body_have_different_colors() {
         let mut tower = settled("tower", &[]);
-        let (world, pairs) = tower.world_and_pairs();
-        let values = ColorBy::Batch.values(world, pairs);
+        let values = ColorBy::Batch.values(&mut tower);
         assert!(values[1..].iter().all(|v| v.is_finite()), "every box touches something");
         let distinct: std::collections::HashSet<Rgba> = (0..24).map(batch_color).collect();
         assert_eq!(distinct.len(), 24);
@@ -182,8 +203,7 @@ mod tests {
     #[test]
     fn the_lowest_box_of_a_tower_bears_most() {
         let mut tower = settled("tower", &[]);
-        let (world, pairs) = tower.world_and_pairs();
-        let values = ColorBy::Impulse.values(world, pairs);
+        let values = ColorBy::Impulse.values(&mut tower);
         assert!(values[1] > 1.5 * values[6] && values[10] > 0.0, "{values:?}");
         let scale = ColorBy::Impulse.scale(&tower.world, &values);
         let colors = ColorBy::Impulse.paint(&tower.world, &values, scale);
@@ -192,9 +212,21 @@ mod tests {
     }
 
     #[test]
+    fn who_sleeps_is_darker_than_who_is_awake() {
+        let mut stack = settled("stack", &["n=2".into()]);
+        let before = ColorBy::Sleeping.values(&mut stack);
+        assert_eq!(before, [0.0, 1.0, 1.0]);
+        stack.wake(2);
+        let after = ColorBy::Sleeping.values(&mut stack);
+        assert_eq!(after, [0.0; 3]);
+        let light = |values: &[f32]| ColorBy::Sleeping.paint(&stack.world, values, 1.0)[1][0];
+        assert!(light(&before) < light(&after));
+    }
+
+    #[test]
     fn a_heavy_top_is_another_material() {
         let world = Scene::find("tower", &["top_ratio=100".into()]).expect("a scene").world;
-        let values = ColorBy::Material.values(&world, &[]);
+        let values = ColorBy::Material.values_of(&world, &[], &[]);
         assert_eq!(values[1..], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
     }
 }

@@ -8,11 +8,12 @@ use super::camera::{Bounds, Camera};
 use super::canvas::{Canvas, Picture};
 use super::colors::ColorBy;
 use super::mesh::{Poses, poses};
+use super::overlay::ropes;
 use super::renderer::Shot;
-use crate::collide::Pair;
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
-use crate::world::{BodyKind, Collider, World};
+use crate::simulation::Simulation;
+use crate::world::{BodyKind, World};
 
 /// A world at one time.
 #[derive(Clone, Debug)]
@@ -34,6 +35,9 @@ pub struct Look {
     pub pitch: f32,
 }
 
+/// Step, time, body, place of its center of mass, rotation, velocities: as [`crate::report::Trajectory`] writes them.
+type Row = (u32, f64, usize, [f32; 3], [f32; 4], [f32; 3], [f32; 3]);
+
 /// Frames of one scene.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -48,9 +52,15 @@ impl Film {
         Self { scene, color, frames: Vec::new() }
     }
 
-    /// Adds the world as it is; `pairs` are the contacts of the last step.
-    pub fn add(&mut self, time: f64, world: &World, pairs: &[Pair]) {
-        self.frames.push(Frame { time, poses: poses(world), values: self.color.values(world, pairs) });
+    /// Adds the world as it is after the last step.
+    pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
+        let values = self.color.values(simulation);
+        self.frames.push(Frame { time, poses: poses(&simulation.world), values });
+    }
+
+    /// Adds a world of which no more is known.
+    fn add_world(&mut self, time: f64, world: &World) {
+        self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, [], &[]) });
     }
 
     /// The frames.
@@ -73,14 +83,16 @@ impl Film {
     /// # Errors
     /// The file cannot be read, or is not such a motion of this scene; the line is named.
     pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
-        if color.needs_contacts() {
-            return Err(Error::input("--from: a recorded motion has no contacts; color by material or speed"));
+        if color.needs_run() {
+            return Err(Error::input(
+                "--from: a recorded motion has neither contacts nor sleep; color by material or speed",
+            ));
         }
         let file = std::fs::File::open(path).map_err(Error::file(path))?;
         let mut film = Self::new(scene, color);
         let mut world = film.scene.world.clone();
         let mut last: Option<(u32, f64)> = None;
-        for (i, row) in csv::Reader::from_reader(file).deserialize::<[f64; 16]>().enumerate() {
+        for (i, row) in csv::Reader::from_reader(file).deserialize::<Row>().enumerate() {
             // The first line names the columns.
             let line = i + 2;
             let refuse = |what: String| Error::input(format!("{}: line {line}: {what}", path.display()));
@@ -90,25 +102,24 @@ impl Film {
                 csv::ErrorKind::UnequalLengths { len, .. } => refuse(format!("{len} values instead of 16")),
                 _ => refuse("not a row of 16 numbers".into()),
             })?;
-            let (step, time, index) = (row[0] as u32, row[1], row[2] as usize);
+            let (step, time, index, place, [qx, qy, qz, qw], velocity, _) = row;
             if let Some((before, then)) = last.filter(|(before, _)| *before != step) {
                 if step < before {
                     return Err(refuse(format!("step {step} after step {before}")));
                 }
-                film.add(then, &world, &[]);
+                film.add_world(then, &world);
             }
             last = Some((step, time));
             let bodies = world.bodies.len();
             let Some(body) = world.bodies.get_mut(index).filter(|b| b.kind != BodyKind::Fixed) else {
                 return Err(refuse(format!("body {index} is not one of the {bodies} of the scene that can move")));
             };
-            let [x, y, z, qx, qy, qz, qw, vx, vy, vz] = std::array::from_fn(|k| row[3 + k] as f32);
             body.rotation = Quat::from_xyzw(qx, qy, qz, qw);
-            body.position = Vec3::new(x, y, z) - body.rotation * body.mass.center;
-            body.linear_velocity = Vec3::new(vx, vy, vz);
+            body.position = Vec3::from_array(place) - body.rotation * body.mass.center;
+            body.linear_velocity = Vec3::from_array(velocity);
         }
         match last {
-            Some((_, time)) => film.add(time, &world, &[]),
+            Some((_, time)) => film.add_world(time, &world),
             None => return Err(Error::input(format!("{}: no motion in it", path.display()))),
         }
         Ok(film)
@@ -132,7 +143,8 @@ impl Film {
         let container = self.scene.container.map(|(low, high)| Bounds { low, high });
         for frame in &self.frames {
             let colors = self.color.paint(world, &frame.values, scale);
-            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &[] };
+            let ropes = ropes(world, &frame.poses);
+            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };
             show(&canvas.draw(&shot)?)?;
         }
         Ok(())
@@ -151,10 +163,12 @@ pub fn bounds(world: &World) -> Bounds {
 }
 
 fn bounds_at(world: &World, poses: &Poses) -> Bounds {
-    let reach = |c: &Collider| c.position.length() + c.shape.bounding_radius();
     let moving = world.bodies.iter().zip(poses).filter(|(b, _)| b.kind != BodyKind::Fixed);
-    let around = moving.map(|(body, &(position, _))| {
-        Bounds::around(position, 1.5 * body.colliders.iter().map(reach).fold(0.0, f32::max))
+    let around = moving.map(|(body, &(position, rotation))| {
+        let bounds = body.colliders.iter().map(|c| c.bounds(position, rotation));
+        let body = bounds.fold(Bounds::EMPTY, |all, (low, high)| all.join(Bounds { low, high }));
+        let room = 0.25 * (body.high - body.low);
+        Bounds { low: body.low - room, high: body.high + room }
     });
     let hung = world.joints.iter().filter(|j| j.body_b.is_none());
     let anchors = hung.map(|j| Bounds::around(j.anchor_b, 0.0));

@@ -131,6 +131,9 @@ impl Live {
             let at = body.position + body.rotation * grabbed.anchor;
             joint.anchor_b = at + (grabbed.target - at) * (PULL * dt).min(1.0);
         }
+        if let Some(grabbed) = &self.grabbed {
+            self.simulation.wake(grabbed.body);
+        }
         self.stats = self.simulation.step(dt)?;
         self.steps += 1;
         for (mean, (_, time)) in self.stage_ms.iter_mut().zip(self.stats.times.stages()) {
@@ -165,8 +168,8 @@ impl Show for Live {
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
-        let (world, pairs) = self.simulation.world_and_pairs();
-        let values = self.color.values(world, pairs);
+        let values = self.color.values(&mut self.simulation);
+        let world = &self.simulation.world;
         // Follows slowly, so that colors do not flicker.
         let scale = self.color.scale(world, &values);
         self.light_end += 0.05 * (scale - self.light_end);

@@ -11,9 +11,10 @@ use crate::error::{Error, Result};
 /// A place for pictures that is known to be writable; nothing is under its name until [`Output::finish`].
 pub struct Output {
     path: PathBuf,
+    /// Before the draft: what writes into it ends first.
+    kind: Kind,
     /// Where the pictures are until then.
     draft: Draft,
-    kind: Kind,
     size: (u32, u32),
     /// Hundredths of a second that a frame of a GIF is shown.
     delay: u16,
@@ -23,7 +24,18 @@ enum Kind {
     Png(File),
     Gif(Box<gif::Encoder<BufWriter<File>>>),
     Frames(u32),
-    Mp4(Child),
+    Mp4(Ffmpeg),
+}
+
+/// A process that ends with its pictures, or with the output if they were not finished.
+struct Ffmpeg(Child);
+
+impl Drop for Ffmpeg {
+    fn drop(&mut self) {
+        // Fails if it has ended, which is as well.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// A file or folder that goes away again unless it is kept.
@@ -96,7 +108,7 @@ impl Output {
                 encoder.write_frame(&frame).map_err(|e| failed(path, e))
             }
             Kind::Mp4(child) => {
-                let Some(pipe) = &mut child.stdin else { return Ok(()) };
+                let Some(pipe) = &mut child.0.stdin else { return Ok(()) };
                 pipe.write_all(&picture.rgba).map_err(|e| failed(path, format!("ffmpeg ended early: {e}")))
             }
         }
@@ -114,8 +126,8 @@ impl Output {
                 file.flush().map_err(Error::file(&path))?;
             }
             Kind::Mp4(mut child) => {
-                drop(child.stdin.take());
-                let status = child.wait().map_err(Error::file(&path))?;
+                drop(child.0.stdin.take());
+                let status = child.0.wait().map_err(Error::file(&path))?;
                 if !status.success() {
                     return Err(failed(&path, format!("ffmpeg ended with {status}")));
                 }
@@ -161,13 +173,13 @@ fn write_png(file: &File, picture: &Picture) -> std::result::Result<(), png::Enc
 }
 
 /// An ffmpeg that takes rows of pixels and writes H.264.
-fn ffmpeg(to: &Path, (width, height): (u32, u32), rate: f64) -> Result<Child> {
+fn ffmpeg(to: &Path, (width, height): (u32, u32), rate: f64) -> Result<Ffmpeg> {
     let mut command = Command::new("ffmpeg");
     command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
     command.args(["-s", &format!("{width}x{height}"), "-r", &format!("{rate:.4}"), "-i", "-"]);
     // Players want even sides.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-c:v", "libx264", "-f", "mp4"]);
-    command.arg(to).stdin(Stdio::piped()).spawn().map_err(|e| match e.kind() {
+    command.arg(to).stdin(Stdio::piped()).spawn().map(Ffmpeg).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {
             Error::input("mp4 needs ffmpeg, which is not installed; write a .gif or a folder instead")
         }

@@ -4,8 +4,9 @@ use glam::Vec3;
 
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
+use super::mesh::Poses;
 use crate::simulation::Simulation;
-use crate::world::BodyKind;
+use crate::world::{BallJoint, BodyKind, World};
 
 /// One end of a line, as the shader takes it.
 #[repr(C)]
@@ -29,6 +30,17 @@ pub struct Overlay {
 const JOINT: Rgba = [30, 90, 200, 255];
 const GAP: Rgba = [220, 30, 30, 255];
 const BOX: Rgba = [90, 90, 90, 255];
+
+/// From the bodies that hang from the world to where they hang, as pairs of line ends.
+pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
+    let hung = world.joints.iter().filter(|j| j.body_b.is_none());
+    let rope = |j: &BallJoint| {
+        let (position, rotation) = poses[j.body_a];
+        let center = position + rotation * world.bodies[j.body_a].mass.center;
+        [center, j.anchor_b].map(|p| LineEnd { position: p.to_array(), color: BOX })
+    };
+    hung.flat_map(rope).collect()
+}
 
 /// Pairs of line ends, `size` long where a length has no other measure [m].
 pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
@@ -89,7 +101,7 @@ mod tests {
         let reference = Box::new(Reference::<f32>::new());
         let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
         simulation.step(scene.dt).expect("a step");
-        let points: usize = simulation.pairs().iter().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
+        let points: usize = simulation.pairs().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
         assert!(points > 0);
         let world = simulation.world.clone();
         let mut count = |overlay: Overlay| lines(&mut simulation, overlay, 0.1).len() / 2;

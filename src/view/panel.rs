@@ -6,7 +6,6 @@ use super::colors::ColorBy;
 use super::live::Live;
 use crate::config::FrictionRule;
 use crate::metrics::Penetration;
-use crate::stats::StepStats;
 
 /// Fills `ui`.
 pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
@@ -29,8 +28,14 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
 }
 
 fn numbers(live: &mut Live, ui: &mut egui::Ui) {
-    let StepStats { manifolds, points, colors, .. } = live.stats;
-    let depth = Penetration::of(live.simulation.pairs());
+    let asleep = live.stats.asleep;
+    let pairs = live.simulation.pairs();
+    let depth = Penetration::of(pairs.clone());
+    // With those of sleepers, which the last step does not count.
+    let (manifolds, points, colors) =
+        pairs.flat_map(|p| &p.manifolds).fold((0, 0, 0), |(manifolds, points, colors), m| {
+            (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
+        });
     let world = &live.simulation.world;
     let total: f64 = live.stage_ms.iter().sum();
     egui::Grid::new("numbers").num_columns(2).show(ui, |ui| {
@@ -40,7 +45,7 @@ fn numbers(live: &mut Live, ui: &mut egui::Ui) {
             ui.end_row();
         };
         row("backend", live.simulation.backend().name().into());
-        row("bodies", world.dynamic_count().to_string());
+        row("bodies", format!("{}, {asleep} asleep", world.dynamic_count()));
         row("time", format!("{:.2} s, {} steps", live.time(), live.steps));
         row("speed", format!("{:.2} of {:.2} real time", live.reached, live.speed));
         row("pictures", format!("{:.1} a second", live.pictures));

@@ -273,12 +273,16 @@ fn pattern_edge(radius: f32) -> f32 {
     10.0_f32.powf((radius.log10() - 0.5).round())
 }
 
-/// Whether something outside of `container` is on the side of it that the eye is on.
+/// Whether something outside of `container` is on the side of it that the eye is on, and covers more than half of its length and
+/// of its height there: a wall.
 fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
     let slack = 1e-3 * container.radius();
+    let covered = b.high.min(container.high) - b.low.max(container.low);
+    let is_wide = |k: usize| covered[k] > 0.5 * (container.high[k] - container.low[k]);
     (0..3).any(|k| {
-        (eye[k] > container.high[k] && b.low[k] > container.high[k] - slack)
-            || (eye[k] < container.low[k] && b.high[k] < container.low[k] + slack)
+        let above = eye[k] > container.high[k] && b.low[k] > container.high[k] - slack;
+        let below = eye[k] < container.low[k] && b.high[k] < container.low[k] + slack;
+        (above || below) && is_wide((k + 1) % 3) && is_wide((k + 2) % 3)
     })
 }
 

@@ -85,7 +85,9 @@ pub fn run(show: Box<dyn Show>) -> Result<()> {
 }
 
 fn no_display() -> Error {
-    Error::Adapter("no display to open a window on; `drystone render SCENE --out FILE.png` draws without one".into())
+    let without =
+        "`drystone render SCENE --out FILE.png` and `drystone play maze --script FILE --out FILE.gif` draw without one";
+    Error::Adapter(format!("no display to open a window on; {without}"))
 }
 
 struct App {
@@ -115,6 +117,8 @@ struct Open {
     ui: egui_winit::State,
     ui_renderer: egui_wgpu::Renderer,
     panel: bool,
+    /// How much of the window the panel covers, from the right [pixels].
+    panel_width: f32,
     drag: Drag,
     mouse: PhysicalPosition<f64>,
     last: Instant,
@@ -134,14 +138,17 @@ impl ApplicationHandler for App {
         let Some(open) = &mut self.open else { return };
         let taken = open.ui.on_window_event(&open.window, &event).consumed;
         match event {
-            WindowEvent::CloseRequested => events.exit(),
-            WindowEvent::Resized(size) => open.resize(size.width, size.height),
-            WindowEvent::RedrawRequested => {
-                let result = open.frame(&mut *self.show);
-                self.end(events, result);
-            }
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => events.exit(),
+            WindowEvent::Resized(size) if open.resize(size.width, size.height) => {}
+            WindowEvent::Resized(_) => events.exit(),
+            WindowEvent::RedrawRequested => match open.frame(&mut *self.show) {
+                Ok(true) => {}
+                Ok(false) => events.exit(),
+                Err(e) => self.end(events, Err(e)),
+            },
             WindowEvent::KeyboardInput { event: KeyEvent { logical_key, state, repeat, .. }, .. } if !taken => {
                 let down = state == ElementState::Pressed;
+                let logical_key = in_lower_case(logical_key);
                 if logical_key == Key::Named(NamedKey::Escape) {
                     return events.exit();
                 }
@@ -172,6 +179,14 @@ impl ApplicationHandler for App {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // Before the event loop, whose display it is on.
         self.open = None;
+    }
+}
+
+/// Shift and caps lock make no difference.
+fn in_lower_case(key: Key) -> Key {
+    match key {
+        Key::Character(text) => Key::Character(text.to_lowercase().into()),
+        other => other,
     }
 }
 
@@ -221,6 +236,7 @@ impl Open {
             ui,
             ui_renderer,
             panel: true,
+            panel_width: 0.0,
             drag: Drag::Nothing,
             mouse: PhysicalPosition::default(),
             last: Instant::now(),
@@ -231,17 +247,35 @@ impl Open {
         self.surface_config.width as f32 / self.surface_config.height as f32
     }
 
-    fn resize(&mut self, width: u32, height: u32) {
-        if width > 0 && height > 0 {
-            (self.surface_config.width, self.surface_config.height) = (width, height);
-            self.surface.configure(&self.device, &self.surface_config);
+    /// Returns whether the window is still there.
+    fn resize(&mut self, width: u32, height: u32) -> bool {
+        if width == 0 || height == 0 {
+            return true;
         }
+        (self.surface_config.width, self.surface_config.height) = (width, height);
+        self.configure()
+    }
+
+    /// Makes the surface as large as the window; returns whether that is still there: another program may have closed it.
+    fn configure(&self) -> bool {
+        let refused = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        self.surface.configure(&self.device, &self.surface_config);
+        pollster::block_on(refused.pop()).is_none()
+    }
+
+    /// The camera that `show` asks for, for what the panel leaves of the window.
+    fn frame_scene(&mut self, show: &dyn Show) {
+        let (width, height) = (self.surface_config.width as f32, self.surface_config.height as f32);
+        // Never more than half.
+        let panel = if self.panel { self.panel_width.min(0.5 * width) } else { 0.0 };
+        self.camera = show.camera((width - panel) / height);
+        self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
     }
 
     /// Keys that are the window's own.
     fn key(&mut self, key: &Key, down: bool, show: &dyn Show) {
         match key.as_ref() {
-            Key::Character("f") if down => self.camera = show.camera(self.aspect()),
+            Key::Character("f") if down => self.frame_scene(show),
             Key::Character("h") if down => self.panel = !self.panel,
             _ => {}
         }
@@ -279,8 +313,8 @@ impl Open {
         }
     }
 
-    /// Lets time pass, then draws.
-    fn frame(&mut self, show: &mut dyn Show) -> Result<()> {
+    /// Lets time pass, then draws; returns whether the window is still there.
+    fn frame(&mut self, show: &mut dyn Show) -> Result<bool> {
         let now = Instant::now();
         show.advance((now - self.last).as_secs_f32())?;
         self.last = now;
@@ -292,12 +326,9 @@ impl Open {
         use wgpu::CurrentSurfaceTexture::{Lost, Outdated, Suboptimal, Success};
         let target = match self.surface.get_current_texture() {
             Success(target) | Suboptimal(target) => target,
-            Outdated | Lost => {
-                self.surface.configure(&self.device, &self.surface_config);
-                return Ok(());
-            }
+            Outdated | Lost => return Ok(self.configure()),
             // Hidden, or late: the next frame may do.
-            _ => return Ok(()),
+            _ => return Ok(true),
         };
         let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (colors, lines) = (show.colors(), show.lines());
@@ -315,20 +346,26 @@ impl Open {
         self.draw_panel(&view, show);
         self.window.pre_present_notify();
         self.queue.present(target);
-        Ok(())
+        Ok(true)
     }
 
     fn draw_panel(&mut self, view: &wgpu::TextureView, show: &mut dyn Show) {
         let context = self.ui.egui_ctx().clone();
         let input = self.ui.take_egui_input(&self.window);
         let panel = self.panel;
+        let mut width = 0.0;
         let mut output = context.run_ui(input, |ui| {
             if panel {
                 let corner = ui.ctx().content_rect().right_top() + egui::vec2(-8.0, 8.0);
                 let window = egui::Window::new(show.title()).pivot(egui::Align2::RIGHT_TOP).default_pos(corner);
-                window.resizable(false).show(ui.ctx(), |ui| show.panel(ui));
+                let shown = window.resizable(false).show(ui.ctx(), |ui| show.panel(ui));
+                width = shown.map_or(0.0, |s| s.response.rect.width() * ui.ctx().pixels_per_point());
             }
         });
+        // The first time shows how much room it leaves.
+        if width > 0.0 && std::mem::replace(&mut self.panel_width, width) == 0.0 {
+            self.frame_scene(show);
+        }
         self.ui.handle_platform_output(&self.window, output.platform_output);
         let triangles = context.tessellate(output.shapes, output.pixels_per_point);
         let screen = egui_wgpu::ScreenDescriptor {

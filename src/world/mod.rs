@@ -11,6 +11,8 @@ pub use shape::Shape;
 pub(crate) use shape::pose;
 pub use surface::Triangles;
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::error::{Error, Result};
@@ -24,6 +26,8 @@ pub struct World {
     pub bodies: Vec<Body>,
     /// Ball joints between them.
     pub joints: Vec<BallJoint>,
+    /// First body of each world that was set [beside](World::beside) the first; empty for one world.
+    pub begins: Vec<usize>,
 }
 
 impl Default for World {
@@ -35,7 +39,7 @@ impl Default for World {
 impl World {
     /// An empty world with gravity 9.81 m/s² along -Y.
     pub fn new() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new(), joints: Vec::new() }
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new(), joints: Vec::new(), begins: Vec::new() }
     }
 
     /// Adds a body and returns its index.
@@ -58,6 +62,34 @@ impl World {
         self.joints.len() - 1
     }
 
+    /// Sets another world beside this one: its bodies and joints follow those that are here, and its bodies never meet them,
+    /// wherever they are. What is added later belongs to the last world.
+    ///
+    /// # Errors
+    /// The gravity of the two is not the same.
+    pub fn beside(&mut self, other: &Self) -> Result<()> {
+        if self.gravity != other.gravity {
+            let (here, there) = (self.gravity, other.gravity);
+            return Err(Error::input(format!("worlds of gravity {here} and {there}: all must have the same")));
+        }
+        let first = self.bodies.len();
+        self.begins.extend(other.parts().map(|part| first + part.start));
+        self.bodies.extend_from_slice(&other.bodies);
+        self.joints.extend(other.joints.iter().map(|j| BallJoint {
+            body_a: first + j.body_a,
+            body_b: j.body_b.map(|b| first + b),
+            ..*j
+        }));
+        Ok(())
+    }
+
+    /// The bodies of each world.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
+        let begin = |k: usize| if k == 0 { 0 } else { self.begins[k - 1] };
+        let end = move |k: usize| self.begins.get(k).copied().unwrap_or(self.bodies.len());
+        (0..self.begins.len() + 1).map(move |k| begin(k)..end(k))
+    }
+
     /// Where the two anchors of a joint are in the world [m].
     pub fn anchors(&self, joint: &BallJoint) -> [Vec3; 2] {
         let on_body = |b: usize, anchor: Vec3| self.bodies[b].position + self.bodies[b].rotation * anchor;
@@ -78,6 +110,12 @@ impl World {
     pub fn check(&self) -> Result<()> {
         if !self.gravity.is_finite() {
             return Err(Error::input(format!("gravity = {}: must be finite", self.gravity)));
+        }
+        if let Some(k) = self.parts().position(|part| part.start > part.end || part.end > self.bodies.len()) {
+            return Err(Error::input(format!(
+                "world {k}: begins or ends beyond the last of {} bodies",
+                self.bodies.len()
+            )));
         }
         for (i, body) in self.bodies.iter().enumerate() {
             body.check().map_err(|e| Error::input(format!("body {i} {:?}: {e}", body.name)))?;

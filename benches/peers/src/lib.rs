@@ -14,14 +14,15 @@ pub use entrant::{Engine, Entrant};
 use drystone::Result;
 use drystone::maze::{Game, Map};
 
-/// The maze game on `map` in Rapier's hands; `frequency` as in [`Entrant`].
+/// The maze game on `map` in Rapier's hands; `frequency` as in [`Entrant`], `unit` the size of things [m], 1 unless told: Rapier's
+/// margins and thresholds go with it.
 ///
 /// # Errors
 /// A map that is not fit for a board.
-pub fn rapier_game(map: Map, substeps: u32, frequency: Option<f32>) -> Result<Game> {
+pub fn rapier_game(map: Map, substeps: u32, frequency: Option<f32>, unit: f32) -> Result<Game> {
     let entrant = Entrant { substeps, frequency, ..Entrant::default_of(Engine::Rapier) };
     Game::with(map, |scene| {
         let hertz = entrant.hertz(scene.dt);
-        Ok(Box::new(rapier::Rapier::new(&scene, substeps, hertz, 1)?))
+        Ok(Box::new(rapier::Rapier::new(&scene, substeps, hertz, 1)?.length_unit(unit)))
     })
 }

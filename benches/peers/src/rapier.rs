@@ -38,6 +38,12 @@ impl Rapier {
         }
         Ok(Self { physics, handles, world })
     }
+
+    /// Says how large things are [m]: margins and thresholds are as much smaller.
+    pub(crate) fn length_unit(mut self, unit: f32) -> Self {
+        self.physics.integration_parameters.length_unit = unit;
+        self
+    }
 }
 
 fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {

@@ -6,7 +6,7 @@ use super::crew::Crew;
 use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
 use crate::kernels::Step;
-use crate::kernels::momentum::{extrapolate, squared_step};
+use crate::kernels::momentum::{StepLength, extrapolate, step_length};
 use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
@@ -92,18 +92,19 @@ impl Groups {
         });
     }
 
-    /// How far the last sweep moved the impulse of each point of the problem, squared.
-    pub fn squared_steps(&self, problem: &StepProblem, squares: &mut [f32], crew: &Crew) {
-        let squares = Shared::new(squares);
+    /// How far the last sweep moved the impulse of each point of the problem.
+    pub fn measure_step(&self, problem: &StepProblem, lengths: &mut [StepLength<f32>], crew: &Crew) {
+        let lengths = Shared::new(lengths);
         crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for k in 0..group.points as usize {
                     let at = group.first_point as usize + k;
-                    let square = squared_step(components(&self.impulses[at]), &self.steps[at]).store();
+                    let StepLength { square, along } = step_length(components(&self.impulses[at]), &self.steps[at]);
+                    let (square, along) = (square.store(), along.store());
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                         let to = problem.contacts[row as usize].first_point as usize + k;
                         // SAFETY: a contact is in one lane of one group, and its points are its own.
-                        unsafe { squares.write(to, square.0[lane]) };
+                        unsafe { lengths.write(to, StepLength { square: square.0[lane], along: along.0[lane] }) };
                     }
                 }
             }

@@ -17,7 +17,7 @@ use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_vel
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::momentum::{chunked_sum, extrapolate, squared_step};
+use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, step_length};
 use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
 use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
@@ -40,7 +40,7 @@ pub struct Cpu {
     /// What accelerated sweeps leave for each other: velocities of the sweep before, and what the joints' impulses were.
     velocities_before: Vec<Row8>,
     joint_steps: Vec<Step<f32>>,
-    squares: Vec<f32>,
+    lengths: Vec<StepLength<f32>>,
 }
 
 impl Default for Cpu {
@@ -75,7 +75,7 @@ impl Cpu {
             momentum: Momentum::default(),
             velocities_before: Vec::new(),
             joint_steps: Vec::new(),
-            squares: Vec::new(),
+            lengths: Vec::new(),
         }
     }
 
@@ -186,14 +186,14 @@ impl Cpu {
                 }
             }
             Kernel::MeasureStep => {
-                self.squares.resize(problem.impulse_count(), 0.0);
-                self.groups.squared_steps(problem, &mut self.squares, crew);
+                self.lengths.resize(problem.impulse_count(), StepLength::default());
+                self.groups.measure_step(problem, &mut self.lengths, crew);
                 let joints = self.joint_impulses.iter().zip(&self.joint_steps);
-                for (square, (now, step)) in self.squares[problem.impulses.len()..].iter_mut().zip(joints) {
-                    *square = squared_step(*now, step);
+                for (length, (now, step)) in self.lengths[problem.impulses.len()..].iter_mut().zip(joints) {
+                    *length = step_length(*now, step);
                 }
             }
-            Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.squares)),
+            Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.lengths)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),

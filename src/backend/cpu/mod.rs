@@ -4,11 +4,13 @@ mod crew;
 mod groups;
 mod lane8;
 mod lanes;
+mod peak;
 mod reference;
 mod shared;
 mod sweep;
 
 pub use lanes::Cpu;
+pub use peak::multiply_and_add;
 pub use reference::Reference;
 
 use crate::problem::ConvergenceRow;

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::momentum::{chunked_sum, extrapolate, extrapolated, squared_step};
+use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
 use crate::kernels::{Contact, Free, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
@@ -23,7 +23,7 @@ pub struct Reference<S> {
     velocities_before: Vec<[Vec3<S>; 2]>,
     point_steps: Vec<Step<S>>,
     joint_steps: Vec<Step<S>>,
-    squares: Vec<S>,
+    lengths: Vec<StepLength<S>>,
 }
 
 impl<S: Scalar> Reference<S> {
@@ -86,10 +86,10 @@ impl<S: Scalar> Reference<S> {
             Kernel::MeasureStep => {
                 let points = self.rows.impulses.iter().map(Impulse::components).zip(&self.point_steps);
                 let joints = self.rows.joint_impulses.iter().copied().zip(&self.joint_steps);
-                self.squares.clear();
-                self.squares.extend(points.chain(joints).map(|(now, step)| squared_step(now, step)));
+                self.lengths.clear();
+                self.lengths.extend(points.chain(joints).map(|(now, step)| step_length(now, step)));
             }
-            Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.squares)),
+            Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.lengths)),
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),

@@ -28,7 +28,7 @@ use std::sync::{Arc, Mutex};
 
 use super::Backend;
 use crate::error::{Error, Result};
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::plan::{Kernel, Pass};
 use crate::problem::carry::Carry;
 use crate::problem::{BodyRow, PassColors, StepProblem};
@@ -378,7 +378,7 @@ fn moved_rows_of(problem: &mut StepProblem) -> Vec<(u32, &mut [u8])> {
 fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [usize; SCRATCH] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };
-    let sums = size_of::<f32>() * impulses.div_ceil(CHUNK);
+    let sums = size_of::<StepLength<f32>>() * impulses.div_ceil(CHUNK);
     [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums]
 }
 

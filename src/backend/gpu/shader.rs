@@ -29,7 +29,7 @@ pub const BINDINGS: [&str; 17] = [
     "free",
     "velocities_before",
     "impulse_steps",
-    "squares",
+    "lengths",
 ];
 /// The bindings that carry rows from step to step, and that of a plan that one workgroup follows; their numbers follow on.
 pub const CARRY_BINDINGS: [&str; 8] =

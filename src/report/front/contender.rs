@@ -55,7 +55,7 @@ impl Setting {
             sweeps: config.iterations,
             method: "plain".into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
-            more: unusual(config).join(" "),
+            more: config.unusual(&["substeps", "iterations", "friction"]).join(" "),
         }
     }
 
@@ -70,15 +70,6 @@ impl Setting {
         }
         label
     }
-}
-
-/// Settings that are not at their defaults, as `key=value`, those of [`Setting`] left out.
-fn unusual(config: &SolverConfig) -> Vec<String> {
-    let table = |config: &SolverConfig| toml::Table::try_from(config).expect("a config is a table");
-    let usual = table(&SolverConfig::default());
-    let said = ["substeps", "iterations", "friction"];
-    let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-    table(config).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
 }
 
 /// Drystone itself.

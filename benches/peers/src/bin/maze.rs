@@ -1,32 +1,70 @@
 //! `maze [FOLDER]`: the boards of the maze game with drystone and with Rapier, as a page with pictures in FOLDER (docs).
 //!
-//! Twice: by one script for all, written by the pilot on drystone; and by the pilot itself, which looks where the ball is.
+//! Three times: by one script for all, which the pilot wrote on drystone; by another, which it wrote on Rapier; and by the pilot
+//! itself, which looks where the ball is.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use drystone::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Sample, Script, pilot, play};
-use drystone::{Cpu, Error, Result, SolverConfig};
+use drystone::backend::{BackendChoice, choose};
+use drystone::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
+use drystone::{Error, Result, SolverConfig, files};
 use drystone_peers::rapier_game;
+use plotters::prelude::*;
 
-/// An engine as it is set, its name in the tables and its color in the pictures.
-type Player = (&'static str, &'static str, fn(Map) -> Result<Game>);
-
-const PLAYERS: [Player; 4] = [
-    ("drystone, 8 substeps", "#0072b2", |map| drystone(map, 8)),
-    ("drystone, 4 substeps", "#56b4e9", |map| drystone(map, 4)),
-    ("rapier, 4 substeps, 30 Hz (defaults)", "#d55e00", |map| rapier_game(map, 4, None)),
-    ("rapier, 8 substeps, 120 Hz", "#e69f00", |map| rapier_game(map, 8, Some(0.125))),
-];
-
-fn drystone(map: Map, substeps: u32) -> Result<Game> {
-    Game::new(map, SolverConfig { substeps, ..SolverConfig::default() }, Box::new(Cpu::new()))
+/// An engine as it is set.
+struct Player {
+    name: &'static str,
+    begin: fn(Map) -> Result<Game>,
+    /// Color of its track in the pictures, if it has one there.
+    color: Option<RGBColor>,
 }
 
-/// How often a game is played for its time; the least counts.
-const REPEATS: usize = 5;
+const PLAYERS: [Player; 8] = [
+    Player { name: "drystone, 8 substeps (default)", begin: |m| drystone(m, 8), color: Some(RGBColor(0, 114, 178)) },
+    Player { name: "drystone, 4 substeps", begin: |m| drystone(m, 4), color: None },
+    Player { name: "drystone, 32 substeps", begin: |m| drystone(m, 32), color: Some(RGBColor(86, 180, 233)) },
+    Player { name: "drystone, 8 substeps, software GPU", begin: drystone_gpu, color: None },
+    Player {
+        name: "rapier, 4 iterations, 30 Hz (default)",
+        begin: |m| rapier_game(m, 4, None, 1.0),
+        color: Some(RGBColor(213, 94, 0)),
+    },
+    Player {
+        name: "rapier, length unit 3 cm",
+        begin: |m| rapier_game(m, 4, None, 0.03),
+        color: Some(RGBColor(0, 158, 115)),
+    },
+    Player {
+        name: "rapier, length unit 3 cm, 8 iterations, 120 Hz",
+        begin: |m| rapier_game(m, 8, Some(0.125), 0.03),
+        color: None,
+    },
+    Player {
+        name: "rapier, length unit 3 cm, 32 iterations, 480 Hz",
+        begin: |m| rapier_game(m, 32, Some(0.125), 0.03),
+        color: None,
+    },
+];
+
+/// Who has written the scripts for all: the default of one, and the other with what suits it best.
+const DRYSTONE: usize = 0;
+const RAPIER: usize = 5;
+
+fn drystone(map: Map, substeps: u32) -> Result<Game> {
+    let config = SolverConfig { substeps, ..SolverConfig::default() };
+    Game::new(map, config, choose(BackendChoice::Cpu, 1, false)?.0)
+}
+
+fn drystone_gpu(map: Map) -> Result<Game> {
+    Game::new(map, SolverConfig::default(), choose(BackendChoice::Gpu, 1, false)?.0)
+}
+
+/// How often a game is played for its time, all players in turn; the GPU, which is slow here, plays once.
+const ROUNDS: usize = 9;
+const GPU: usize = 3;
 
 fn main() -> ExitCode {
     let folder = std::env::args_os().nth(1).map_or_else(|| "docs".into(), PathBuf::from);
@@ -40,112 +78,155 @@ fn main() -> ExitCode {
 }
 
 fn page(folder: &Path) -> Result<()> {
-    let mut text = String::new();
+    // The rounds must not wait for threads that a ball has no use for.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
+    let mut text = include_str!("maze_head.md").to_owned();
+    let pictures = folder.join("maze");
+    std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
     for (board, _) in BOARDS {
         let map = Map::find(board)?;
-        let script = pilot(PLAYERS[0].2(map.clone())?)?;
-        let (mut by_script, mut by_pilot) = (Vec::new(), Vec::new());
-        for (_, _, begin) in PLAYERS {
-            by_script.push(timed(|| play(begin(map.clone())?, &script, |_| ()))?);
-            // The pilot's own script is what the engine did with it.
-            let own = pilot(begin(map.clone())?);
-            let steered = own.and_then(|own: Script| timed(|| play(begin(map.clone())?, &own, |_| ())));
-            by_pilot.push(steered);
-        }
-        let _ = write!(text, "\n## {board}\n\n| one script for all | ended | time s | slip rms mm/s | slip max mm/s | rolling | deepest mm | us a step |\n|---|---|---|---|---|---|---|---|\n");
-        for ((name, ..), (played, us)) in PLAYERS.iter().zip(&by_script) {
-            text += &row(name, played, *us);
-        }
-        let _ = write!(text, "\n| the pilot steers | ended | time s | slip rms mm/s | slip max mm/s | rolling | deepest mm | us a step |\n|---|---|---|---|---|---|---|---|\n");
-        for ((name, ..), steered) in PLAYERS.iter().zip(&by_pilot) {
-            match steered {
-                Ok((played, us)) => text += &row(name, played, *us),
-                Err(e) => {
-                    let _ = writeln!(text, "| {name} | {e} | | | | | | |");
-                }
-            }
-        }
-        let tracks = by_script.iter().zip(PLAYERS).map(|((played, _), (_, color, _))| (&played.track[..], color));
-        write_file(&folder.join(format!("maze/{board}.svg")), &picture(&map, tracks))?;
+        // A script that the pilot wrote is what it did with the engine.
+        let own = PLAYERS.each_ref().map(|player| pilot((player.begin)(map.clone())?));
+        let of = |writer: usize| {
+            PLAYERS.each_ref().map(|_| own[writer].as_ref().cloned().map_err(|e| Error::input(e.to_string())))
+        };
+        let _ = write!(text, "\n## {board}\n");
+        let by_script = table(&mut text, "script written on drystone", &map, &of(DRYSTONE))?;
+        table(&mut text, "script written on rapier, 3 cm", &map, &of(RAPIER))?;
+        table(&mut text, "the pilot steers", &map, &own)?;
+        let tracks = by_script.iter().zip(&PLAYERS).filter_map(|(played, player)| Some((played.as_ref()?, player)));
+        let path = pictures.join(format!("{board}.svg"));
+        files::write(&path, picture(&map, tracks).as_bytes())?;
         let _ = write!(text, "\n![tracks on the {board} board](maze/{board}.svg)\n");
     }
-    let legend = PLAYERS.map(|(name, color, _)| format!("{name} `{color}`")).join(", ");
-    let page = format!("{}\nColors of the tracks, which follow the one script: {legend}.\n{text}", include_str!("maze_head.md"));
-    write_file(&folder.join("maze.md"), &page)?;
-    println!("{}", folder.join("maze.md").display());
+    let path = folder.join("maze.md");
+    files::write(&path, text.as_bytes())?;
+    println!("{}", path.display());
     Ok(())
 }
 
-/// Plays a few times; the game, and its least time [us a step].
-fn timed(play: impl Fn() -> Result<Played>) -> Result<(Played, f64)> {
-    let mut least = f64::INFINITY;
-    let mut last = None;
-    for _ in 0..REPEATS {
-        let start = Instant::now();
-        let played = play()?;
-        least = least.min(start.elapsed().as_secs_f64() * 1e6 / f64::from(played.steps.max(1)));
-        last = Some(played);
+/// Adds a table of what all players make of their scripts, or why there is none; returns the games.
+fn table(text: &mut String, title: &str, map: &Map, scripts: &[Result<Script>]) -> Result<Vec<Option<Played>>> {
+    let mut games: Vec<Option<Played>> = PLAYERS.iter().map(|_| None).collect();
+    let mut ratios = PLAYERS.each_ref().map(|_| Vec::new());
+    for round in 0..ROUNDS {
+        let mut first = f64::NAN;
+        for (k, (player, script)) in PLAYERS.iter().zip(scripts).enumerate() {
+            let Some(script) = script.as_ref().ok().filter(|_| k != GPU || round == 0) else { continue };
+            let game = (player.begin)(map.clone())?;
+            let start = Instant::now();
+            let played = play(game, script, |_| ())?;
+            let step = start.elapsed().as_secs_f64() / f64::from(played.steps.max(1));
+            first = if k == 0 { step } else { first };
+            ratios[k].push(step / first);
+            games[k] = Some(played);
+        }
     }
-    last.map(|played| (played, least)).ok_or_else(|| Error::input("no game was played"))
+    let _ = write!(
+        text,
+        "\n| {title} | ended | time s | slip rms mm/s | slip max mm/s | rolling | deepest mm | time a step |\n\
+         |---|---|---|---|---|---|---|---|\n"
+    );
+    for (k, Player { name, .. }) in PLAYERS.iter().enumerate() {
+        let _ = match (&games[k], &scripts[k]) {
+            (Some(played), _) => writeln!(text, "| {name} | {} | {:.2} |", row(played), median(&mut ratios[k])),
+            (None, Err(e)) => writeln!(text, "| {name} | {e} | | | | | | |"),
+            (None, Ok(_)) => writeln!(text, "| {name} | not played | | | | | | |"),
+        };
+    }
+    Ok(games)
 }
 
-fn row(name: &str, played: &Played, us: f64) -> String {
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn row(played: &Played) -> String {
     let ended = match played.outcome {
         Outcome::Goal => "goal",
         Outcome::Hole => "hole",
         Outcome::Time => "on the way",
     };
     let rolling = 100.0 * f64::from(played.slip.steps) / f64::from(played.steps.max(1));
-    format!(
-        "| {name} | {ended} | {:.2} | {:.3} | {:.2} | {rolling:.0} % | {:.4} | {us:.0} |\n",
-        played.time,
-        played.slip.rms * 1e3,
-        played.slip.max * 1e3,
-        played.penetration * 1e3
-    )
+    let (rms, max, deepest) = (played.slip.rms * 1e3, played.slip.max * 1e3, played.penetration * 1e3);
+    format!("{ended} | {:.2} | {rms:.3} | {max:.2} | {rolling:.0} % | {deepest:.4}", played.time)
 }
 
-/// The board from above with the tracks on it.
-fn picture<'a>(map: &Map, tracks: impl Iterator<Item = (&'a [Sample], &'static str)>) -> String {
-    const SCALE: f32 = 40.0;
-    let (width, height) = (map.columns as f32 * SCALE, map.rows as f32 * SCALE);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-4 -4 {} {}\" width=\"{width}\">\n<rect width=\"{width}\" \
-         height=\"{height}\" fill=\"#f2e6cf\" stroke=\"#96623a\" stroke-width=\"8\"/>\n",
-        width + 8.0,
-        height + 8.0
-    );
-    for (row, column) in (0..map.rows).flat_map(|r| (0..map.columns).map(move |c| (r, c))) {
-        let (x, y) = (column as f32 * SCALE, row as f32 * SCALE);
-        let _ = match map.at(row as isize, column as isize) {
-            Cell::Wall => writeln!(svg, "<rect x=\"{x}\" y=\"{y}\" width=\"{SCALE}\" height=\"{SCALE}\" fill=\"#96623a\"/>"),
-            Cell::Hole => {
-                let (x, y, r) = (x + 0.5 * SCALE, y + 0.5 * SCALE, 0.4 * SCALE);
-                writeln!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"#555\"/>")
-            }
-            Cell::Floor if (row, column) == map.goal => {
-                writeln!(svg, "<rect x=\"{x}\" y=\"{y}\" width=\"{SCALE}\" height=\"{SCALE}\" fill=\"#8cc88f\"/>")
-            }
-            Cell::Floor => Ok(()),
-        };
-    }
-    for (track, color) in tracks {
-        let place = |s: &Sample| {
-            let at = |x: f32, cells: usize| (x / CELL + 0.5 * cells as f32) * SCALE;
-            format!("{:.1},{:.1}", at(s.ball[0], map.columns), at(s.ball[2], map.rows))
-        };
-        let points: Vec<String> = track.iter().map(place).collect();
-        let _ = writeln!(svg, "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>", points.join(" "));
-    }
-    svg + "</svg>\n"
+/// Pixels of a side of a cell, of the space around the board, and of a line of the legend.
+const SIDE: usize = 48;
+const MARGIN: usize = 56;
+const LINE: i32 = 20;
+
+type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// The board from above with the tracks on it, as SVG text.
+fn picture<'a>(map: &Map, tracks: impl Iterator<Item = (&'a Played, &'a Player)>) -> String {
+    let tracks: Vec<_> = tracks.filter_map(|(played, player)| Some((played, player.name, player.color?))).collect();
+    let height = map.rows * SIDE + MARGIN;
+    let legend = 12 + LINE * tracks.len() as i32;
+    let size = ((map.columns * SIDE + MARGIN + 12) as u32, height as u32 + 12 + legend as u32);
+    let mut text = String::new();
+    let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+    let drawn = (|| -> Drawn {
+        root.fill(&WHITE)?;
+        let (upper, lower) = root.split_vertically(height as i32 + 12);
+        board(&upper, map, &tracks)?;
+        for (k, (_, name, color)) in (0..).zip(&tracks) {
+            let y = 6 + LINE * k;
+            lower.draw(&PathElement::new(
+                [(MARGIN as i32, y + 7), (MARGIN as i32 + 24, y + 7)],
+                color.stroke_width(3),
+            ))?;
+            lower.draw(&Text::new(*name, (MARGIN as i32 + 32, y), ("sans-serif", 15)))?;
+        }
+        root.present()?;
+        Ok(())
+    })();
+    // Writing to memory does not fail.
+    debug_assert!(drawn.is_ok(), "{drawn:?}");
+    drop(root);
+    text
 }
 
-/// Writes a text at once or not at all.
-fn write_file(path: &Path, text: &str) -> Result<()> {
-    let hidden = path.with_extension("part");
-    let written = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    written
-        .and_then(|()| std::fs::write(&hidden, text))
-        .and_then(|()| std::fs::rename(&hidden, path))
-        .map_err(Error::file(path))
+/// Draws the map and the tracks; axes in centimeters from the far left corner of the board.
+fn board(
+    area: &DrawingArea<SVGBackend, plotters::coord::Shift>,
+    map: &Map,
+    tracks: &[(&Played, &str, RGBColor)],
+) -> Drawn {
+    let cell = f64::from(CELL) * 100.0;
+    let (width, depth) = (map.columns as f64 * cell, map.rows as f64 * cell);
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(MARGIN as u32 - 12)
+        .y_label_area_size(MARGIN as u32 - 12)
+        .build_cartesian_2d(0.0..width, depth..0.0)?;
+    let (wall, floor) = (RGBColor(150, 98, 58), RGBColor(242, 230, 207));
+    let square = |row: usize, column: usize, color: RGBColor| {
+        let low = (column as f64 * cell, row as f64 * cell);
+        Rectangle::new([low, (low.0 + cell, low.1 + cell)], color.filled())
+    };
+    let places = (0..map.rows).flat_map(|row| (0..map.columns).map(move |column| (row, column)));
+    let color = |place: (usize, usize)| match map.at(place.0 as isize, place.1 as isize) {
+        Cell::Wall => wall,
+        _ if place == map.goal => RGBColor(140, 200, 143),
+        _ => floor,
+    };
+    chart.draw_series(places.clone().map(|(row, column)| square(row, column, color((row, column)))))?;
+    let holes = places.filter(|&(row, column)| map.at(row as isize, column as isize) == Cell::Hole);
+    let middle = |(row, column): (usize, usize)| ((column as f64 + 0.5) * cell, (row as f64 + 0.5) * cell);
+    chart
+        .draw_series(holes.map(|place| Circle::new(middle(place), 0.4 * SIDE as f64, RGBColor(85, 85, 85).filled())))?;
+    chart.configure_mesh().disable_mesh().x_desc("to the right, cm").y_desc("to the front, cm").draw()?;
+    for (played, _, color) in tracks {
+        let place =
+            |ball: [f32; 3]| (f64::from(ball[0]) * 100.0 + 0.5 * width, f64::from(ball[2]) * 100.0 + 0.5 * depth);
+        let points: Vec<_> = played.track.iter().map(|sample| place(sample.ball)).collect();
+        let end = points.last().copied();
+        chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
+        // Where it ended.
+        chart.draw_series(end.map(|end| Circle::new(end, 5, color.filled())))?;
+    }
+    Ok(())
 }

@@ -1,0 +1,40 @@
+//! The most that the lanes can calculate: what sweeps are held against.
+
+#![allow(unsafe_code)]
+
+use super::lane8::{Lane8, Portable};
+use super::sweep::InstructionSet;
+
+/// Chains of each kind, so that every unit of the processor always has one that waits for nothing.
+const CHAINS: usize = 6;
+
+/// Multiplies and adds `rounds` times on the best instruction set there is; returns how many operations on single numbers that
+/// were. Multiplications and additions apart, as in the kernels, which never fuse them.
+pub fn multiply_and_add(rounds: usize) -> u64 {
+    match InstructionSet::best() {
+        InstructionSet::Portable => chains::<Portable>(rounds),
+        // SAFETY: `InstructionSet::best` asked the processor.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => unsafe { chains_avx2(rounds) },
+    }
+    (rounds * 2 * CHAINS * 8) as u64
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn chains_avx2(rounds: usize) {
+    chains::<super::lane8::avx2::Avx2>(rounds);
+}
+
+#[inline(always)]
+fn chains<L: Lane8>(rounds: usize) {
+    let (factor, summand) = (std::hint::black_box(L::constant(0.999_999)), std::hint::black_box(L::constant(1e-3)));
+    let (mut products, mut sums) = ([L::constant(1.0); CHAINS], [L::constant(1.0); CHAINS]);
+    for _ in 0..rounds {
+        for chain in 0..CHAINS {
+            products[chain] = products[chain] * factor;
+            sums[chain] = sums[chain] + summand;
+        }
+    }
+    std::hint::black_box((products, sums));
+}

@@ -1,0 +1,237 @@
+//! The colliders of one world: which of them are near each other, and what they touch with.
+
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, DefaultHasher};
+
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
+use parry3d::math::Pose;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use rayon::prelude::*;
+
+use super::narrow::{ColliderInfo, Margins, Moving, Pair, Scratch, Update};
+use super::{Activity, DetectStats, Manifold};
+use crate::world::BodyKind;
+
+/// What all worlds are told about one detection; bodies are counted over all of them.
+pub(super) struct Now<'a> {
+    pub margins: Margins,
+    pub kinds: &'a [BodyKind],
+    pub moving: &'a [Moving],
+    pub activity: &'a [Activity],
+    /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
+    pub jointed: &'a HashSet<(u32, u32)>,
+}
+
+/// The colliders of one world, which meet no others.
+pub(super) struct Arena {
+    colliders: Vec<ColliderInfo>,
+    unbounded: Vec<u32>,
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    /// Fattened box of each collider, as the tree has it.
+    fat: Vec<Aabb>,
+    /// Box now of each collider that left its fattened one.
+    left: Vec<Option<Aabb>>,
+    /// Colliders whose fattened boxes are new.
+    moved: Vec<u32>,
+    /// The pairs whose boxes overlap.
+    pub pairs: Vec<Pair>,
+    slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
+    found: Vec<(u32, u32)>,
+}
+
+/// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
+const FAT: f32 = 0.1;
+
+impl Arena {
+    pub fn new(colliders: Vec<ColliderInfo>) -> Self {
+        let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
+        Self {
+            colliders,
+            unbounded,
+            tree: Bvh::new(),
+            workspace: BvhWorkspace::default(),
+            fat: Vec::new(),
+            left: Vec::new(),
+            moved: Vec::new(),
+            pairs: Vec::new(),
+            slots: HashMap::default(),
+            found: Vec::new(),
+        }
+    }
+
+    /// Brings the pairs to where the bodies are.
+    pub fn detect(&mut self, now: &Now, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+        let parted = self.broad_phase(now);
+        let stats = self.narrow_phase(now, give_back);
+        DetectStats { reshaped: stats.reshaped | parted, ..stats }
+    }
+
+    /// Finds new pairs and ends parted ones; returns whether it ended any.
+    fn broad_phase(&mut self, now: &Now) -> bool {
+        let mut parted = false;
+        // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
+        let tight = |c: &ColliderInfo| {
+            let body = &now.moving[c.body as usize];
+            let pose = Pose::from_parts(body.position, body.rotation);
+            let mut aabb = c.aabb(pose).loosened(now.margins.speculative * c.size + now.margins.fall);
+            let sweep = body.v * now.margins.dt;
+            aabb.mins += sweep.min(glam::Vec3::ZERO);
+            aabb.maxs += sweep.max(glam::Vec3::ZERO);
+            aabb
+        };
+        if self.fat.is_empty() {
+            let fatten = |c: &ColliderInfo| if c.unbounded { empty_box() } else { tight(c).loosened(FAT * c.size) };
+            self.fat = self.colliders.iter().map(fatten).collect();
+            self.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &self.fat);
+            self.found.clear();
+            let found = &mut self.found;
+            self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+            self.moved.extend(0..self.colliders.len() as u32);
+            self.find_unbounded(now);
+        } else {
+            let left = |(c, fat): (&ColliderInfo, &Aabb)| {
+                let still = now.activity.get(c.body as usize) == Some(&Activity::Still);
+                if now.kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
+                    return None;
+                }
+                let aabb = tight(c);
+                (!fat.contains(&aabb) && is_finite(&aabb)).then_some(aabb)
+            };
+            let colliders = self.colliders.par_iter().with_min_len(256);
+            colliders.zip(&self.fat).map(left).collect_into_vec(&mut self.left);
+            self.found.clear();
+            self.moved.clear();
+            for (i, aabb) in self.left.iter().enumerate().filter_map(|(i, left)| Some((i, left.as_ref()?))) {
+                let margin = FAT * self.colliders[i].size;
+                self.tree.insert_or_update_partially(*aabb, i as u32, margin);
+                self.fat[i] = aabb.loosened(margin);
+                self.moved.push(i as u32);
+            }
+            if !self.moved.is_empty() {
+                self.tree.optimize_incremental(&mut self.workspace);
+                self.tree.refit(&mut self.workspace);
+                let found = &mut self.found;
+                self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+                self.find_unbounded(now);
+                parted = self.drop_parted(now);
+            }
+        }
+        self.add_found(now);
+        parted
+    }
+
+    /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
+    fn find_unbounded(&mut self, now: &Now) {
+        let mut found = std::mem::take(&mut self.found);
+        for &plane in &self.unbounded {
+            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(now, plane, c));
+            found.extend(near.map(|&c| (plane, c)));
+        }
+        self.found = found;
+    }
+
+    /// Whether the fattened boxes of two colliders still overlap.
+    fn touches(&self, now: &Now, a: u32, b: u32) -> bool {
+        let (ca, cb) = (&self.colliders[a as usize], &self.colliders[b as usize]);
+        match (ca.unbounded, cb.unbounded) {
+            (false, false) => self.fat[a as usize].intersects(&self.fat[b as usize]),
+            (true, true) => false,
+            (true, false) => box_reaches_plane(now, ca, &self.fat[b as usize]),
+            (false, true) => box_reaches_plane(now, cb, &self.fat[a as usize]),
+        }
+    }
+
+    /// Ends the pairs whose boxes came apart; the last pair takes an ended one's slot. Returns whether there were any.
+    fn drop_parted(&mut self, now: &Now) -> bool {
+        let (mut slot, before) = (0, self.pairs.len());
+        while slot < self.pairs.len() {
+            let pair = &self.pairs[slot];
+            if self.touches(now, pair.collider_a, pair.collider_b) {
+                slot += 1;
+                continue;
+            }
+            self.slots.remove(&key(pair.collider_a, pair.collider_b));
+            self.pairs.swap_remove(slot);
+            if let Some(moved) = self.pairs.get(slot) {
+                self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
+            }
+        }
+        self.pairs.len() < before
+    }
+
+    /// Begins the pairs that are new, of different bodies of which one can be pushed, the further reaching first.
+    fn add_found(&mut self, now: &Now) {
+        for &(i, j) in &self.found {
+            let (ci, cj) = (&self.colliders[i as usize], &self.colliders[j as usize]);
+            let dynamic = |c: &ColliderInfo| now.kinds[c.body as usize] == BodyKind::Dynamic;
+            let apart = ci.body == cj.body || now.jointed.contains(&key(ci.body, cj.body));
+            if apart || !(dynamic(ci) || dynamic(cj)) {
+                continue;
+            }
+            let slot = self.pairs.len() as u32;
+            if let std::collections::hash_map::Entry::Vacant(entry) = self.slots.entry(key(i, j)) {
+                entry.insert(slot);
+                let (first, second) = (i.min(j), i.max(j));
+                let swap = self.colliders[second as usize].reach > self.colliders[first as usize].reach;
+                let (a, b) = if swap { (second, first) } else { (first, second) };
+                self.pairs.push(Pair::new(a, b, &self.colliders));
+            }
+        }
+    }
+
+    fn narrow_phase(&mut self, now: &Now, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+        let (colliders, moving, margins) = (&self.colliders, now.moving, now.margins);
+        let update = |scratch: &mut Scratch, pair: &mut Pair| {
+            let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
+            let of = |body: u32| now.activity.get(body as usize).copied().unwrap_or(Activity::Awake);
+            let both = [of(pair.body_a), of(pair.body_b)];
+            // What a pair has belongs to its manifolds while it takes no part, and to their rows while it does.
+            let takes_part = both.contains(&Activity::Awake);
+            let changes = pair.rests == takes_part;
+            if changes && !takes_part {
+                give_back(pair);
+                pair.manifolds.iter_mut().for_each(Manifold::forget_rows);
+            }
+            let mut update = Update::Reused;
+            if both != [Activity::Still; 2] {
+                update = pair.update(colliders, a, b, margins, scratch, give_back);
+            }
+            if changes && takes_part {
+                pair.computed_in = margins.detection;
+            }
+            pair.rests = !takes_part;
+            if changes && !pair.manifolds.is_empty() {
+                update = Update::Reshaped;
+            }
+            (usize::from(update != Update::Reused), update == Update::Reshaped)
+        };
+        let both = |x: (usize, bool), y: (usize, bool)| (x.0 + y.0, x.1 | y.1);
+        let updates = self.pairs.par_iter_mut().with_min_len(64).map_init(Scratch::default, update);
+        let (computed, reshaped) = updates.reduce(|| (0, false), both);
+        DetectStats { pairs: self.pairs.len(), computed, reshaped }
+    }
+}
+
+/// Whether a box reaches a half-space, by its corner that lies deepest.
+fn box_reaches_plane(now: &Now, plane: &ColliderInfo, aabb: &Aabb) -> bool {
+    let body = &now.moving[plane.body as usize];
+    let pose = Pose::from_parts(body.position, body.rotation) * plane.local;
+    let Some(half_space) = plane.shape.as_halfspace() else { return false };
+    let normal = pose.rotation * half_space.normal;
+    let deepest = (aabb.center() - pose.translation).dot(normal) - aabb.half_extents().dot(normal.abs());
+    deepest <= 0.0
+}
+
+pub(super) fn key(i: u32, j: u32) -> (u32, u32) {
+    (i.min(j), i.max(j))
+}
+
+/// A box that overlaps nothing, far from everything.
+fn empty_box() -> Aabb {
+    Aabb::new(glam::Vec3::splat(f32::MAX / 4.0), glam::Vec3::splat(f32::MAX / 4.0))
+}
+
+fn is_finite(aabb: &Aabb) -> bool {
+    aabb.mins.is_finite() && aabb.maxs.is_finite()
+}

@@ -1,0 +1,45 @@
+//! What a bench ran on.
+
+use serde::{Deserialize, Serialize};
+
+/// The machine and the build, as far as they say anything about times.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Model of the processor; empty where the system does not say.
+    pub processor: String,
+    /// Cores that this process may use.
+    pub cores: usize,
+    /// Memory of the machine [MiB]; 0 where the system does not say.
+    pub memory: u64,
+    /// Operating system and instruction set.
+    pub system: String,
+    /// Version of drystone, and whether it is a build for speed.
+    pub build: String,
+}
+
+impl Machine {
+    /// The one that this runs on.
+    pub fn this() -> Self {
+        // Linux says it in files; nobody else is asked.
+        let said = |file: &str, key: &str| {
+            let text = std::fs::read_to_string(file).unwrap_or_default();
+            let line = text.lines().find(|line| line.starts_with(key)).unwrap_or_default();
+            line.split_once(':').map(|(_, value)| value.trim().to_owned()).unwrap_or_default()
+        };
+        let kilobytes = said("/proc/meminfo", "MemTotal");
+        let optimized = if cfg!(debug_assertions) { "debug" } else { "release" };
+        Self {
+            processor: said("/proc/cpuinfo", "model name"),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            memory: kilobytes.trim_end_matches(" kB").parse().unwrap_or(0) / 1024,
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            build: format!("{} {optimized}", env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    /// One line for people.
+    pub fn line(&self) -> String {
+        let Self { processor, cores, memory, system, build } = self;
+        format!("{processor}, {cores} cores, {memory} MiB, {system}; drystone {build}")
+    }
+}

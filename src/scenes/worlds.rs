@@ -1,0 +1,82 @@
+//! Many worlds of one scene beside each other.
+
+use super::catalogue::MOST_BODIES;
+use super::{CATALOGUE, Group, Scene};
+use crate::error::{Error, Result};
+
+impl Scene {
+    /// `count` worlds of a scene as one, whose bodies never meet: see [`World::beside`](crate::World::beside). All are the
+    /// same, or, with `vary`, each has one more of that parameter than the one before.
+    ///
+    /// ```
+    /// let towers = drystone::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;
+    /// let bodies: Vec<_> = towers.world.parts().map(|bodies| bodies.len()).collect();
+    /// assert_eq!(bodies, [5, 6, 7]);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Scene::find`]; no world, more than four million bodies, or nothing of that name that is a whole number.
+    pub fn find_worlds(name_or_path: &str, parameters: &[String], count: usize, vary: Option<&str>) -> Result<Self> {
+        let mut all = Self::find(name_or_path, parameters)?;
+        let each = all.world.bodies.len();
+        if count == 0 || each.saturating_mul(count) as f64 > MOST_BODIES {
+            return Err(Error::input(format!(
+                "{count} worlds of {each} bodies: must be at least one world, and at most {MOST_BODIES} bodies in all"
+            )));
+        }
+        let first = all.clone();
+        let begin = vary.map(|key| whole(name_or_path, parameters, key)).transpose()?;
+        for k in 1..count {
+            match (vary, begin) {
+                (Some(key), Some(begin)) => {
+                    let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
+                    all.beside(&Self::find(name_or_path, &varied)?)?;
+                }
+                _ => all.beside(&first)?,
+            }
+        }
+        Ok(all)
+    }
+
+    /// Finds a scene by one word, `name:key=value,...`: its parameters, how many `worlds` of it, and what to `vary`, each as in
+    /// [`Scene::find_worlds`].
+    ///
+    /// # Errors
+    /// As there; worlds that are not a number.
+    pub fn find_spec(spec: &str) -> Result<Self> {
+        let (name, parameters) = spec.split_once(':').unwrap_or((spec, ""));
+        let (mut count, mut vary, mut own) = (1, None, Vec::new());
+        for assignment in parameters.split(',').filter(|a| !a.is_empty()) {
+            match assignment.split_once('=') {
+                Some(("worlds", number)) => {
+                    let refusal = |_| Error::input(format!("{spec}: worlds = {number:?}: must be a whole number"));
+                    count = number.parse().map_err(refusal)?;
+                }
+                Some(("vary", key)) => vary = Some(key),
+                _ => own.push(assignment.to_owned()),
+            }
+        }
+        Self::find_worlds(name, &own, count, vary)
+    }
+
+    /// Sets the world of another scene beside this one's. What both say holds for both.
+    fn beside(&mut self, other: &Self) -> Result<()> {
+        let first = self.world.bodies.len();
+        self.world.beside(&other.world)?;
+        let moved = |g: &Group| Group { name: g.name.clone(), bodies: first + g.bodies.start..first + g.bodies.end };
+        self.groups.extend(other.groups.iter().map(moved));
+        self.container = self.container.filter(|c| other.container == Some(*c));
+        self.stands &= other.stands;
+        Ok(())
+    }
+}
+
+/// The value of a parameter that is a whole number.
+fn whole(scene: &str, parameters: &[String], key: &str) -> Result<f64> {
+    let refusal = |known: &str| Error::input(format!("{scene} has no whole number {key:?} to vary; it has: {known}"));
+    let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal("none, being a file"))?;
+    let known: Vec<_> = entry.parameters.iter().filter(|p| p.whole).map(|p| p.name).collect();
+    let place = entry.parameters.iter().position(|p| p.whole && p.name == key);
+    Ok(entry.values(parameters)?[place.ok_or_else(|| refusal(&known.join(", ")))?])
+}

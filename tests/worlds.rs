@@ -1,0 +1,120 @@
+//! Worlds beside each other: each goes its own way to the last bit, as if it were alone.
+
+use drystone::config::FrictionAt;
+use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, World};
+
+/// Every bit of every pose and velocity of some bodies.
+fn bits(world: &World, bodies: std::ops::Range<usize>) -> Vec<[u32; 13]> {
+    let of = |b: &drystone::Body| {
+        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
+        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
+        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
+    };
+    world.bodies[bodies].iter().map(of).collect()
+}
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn cpu() -> Box<dyn Backend> {
+    Box::new(Cpu::new())
+}
+
+fn scene(name: &str, parameters: &[&str], worlds: usize, vary: Option<&str>) -> Scene {
+    let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
+    Scene::find_worlds(name, &parameters, worlds, vary).expect("the scene")
+}
+
+fn end(scene: &Scene, backend: fn() -> Box<dyn Backend>, config: &SolverConfig, steps: u32) -> World {
+    let mut simulation = Simulation::new(scene.world.clone(), config.clone(), backend()).expect("a simulation");
+    for _ in 0..steps {
+        simulation.step(scene.dt).expect("a step");
+    }
+    simulation.world
+}
+
+#[test]
+fn every_copy_of_a_world_goes_as_it_goes_alone() {
+    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default() };
+    let asleep = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
+    for (name, parameters, config, steps) in [
+        ("pile", &["n=60"][..], SolverConfig::default(), 90),
+        ("pile", &["n=27"], at_manifold, 60),
+        ("tower", &["n=5"], asleep, 120),
+        ("bridge", &["planks=6", "boxes=2"], SolverConfig::default(), 60),
+        ("drop", &[], SolverConfig::default(), 60),
+    ] {
+        for backend in [reference, cpu] {
+            let alone = end(&scene(name, parameters, 1, None), backend, &config, steps);
+            let alone = bits(&alone, 0..alone.bodies.len());
+            let all = end(&scene(name, parameters, 5, None), backend, &config, steps);
+            for (k, bodies) in all.parts().enumerate() {
+                assert_eq!(bits(&all, bodies), alone, "{name}: world {k}");
+            }
+        }
+    }
+}
+
+/// The neighbors come, touch and part at other times, and take no part in it.
+#[test]
+fn a_world_does_not_see_what_other_worlds_do() {
+    let alone: Vec<_> = (1..=4)
+        .map(|seed| end(&scene("pile", &["n=60", &format!("seed={seed}")], 1, None), cpu, &SolverConfig::default(), 90))
+        .collect();
+    let all = end(&scene("pile", &["n=60"], 4, Some("seed")), cpu, &SolverConfig::default(), 90);
+    let whole = |world: &World| bits(world, 0..world.bodies.len());
+    for (bodies, alone) in all.parts().zip(&alone) {
+        assert_eq!(bits(&all, bodies), whole(alone));
+    }
+    assert_ne!(whole(&alone[0]), whole(&alone[1]));
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit_of_many_worlds() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let world = end(&scene("pile", &["n=30"], 12, Some("seed")), cpu, &SolverConfig::default(), 80);
+            bits(&world, 0..world.bodies.len())
+        })
+    };
+    let one = run(1);
+    assert!([2, 5].into_iter().all(|threads| run(threads) == one));
+}
+
+/// Without worlds the towers would stand in each other.
+#[test]
+fn bodies_of_different_worlds_never_meet() {
+    let mut towers = scene("tower", &["n=3"], 3, None);
+    let apart = SolverConfig::default();
+    let contacts = |scene: &Scene| {
+        let mut simulation = Simulation::new(scene.world.clone(), apart.clone(), cpu()).expect("a simulation");
+        let stats = simulation.step(scene.dt).expect("a step");
+        (stats.manifolds, simulation.penetration().max)
+    };
+    let (manifolds, deepest) = contacts(&towers);
+    assert!(manifolds == 9 && deepest < 1e-3, "{manifolds} {deepest}");
+    towers.world.begins.clear();
+    let (manifolds, deepest) = contacts(&towers);
+    assert!(manifolds > 30 && deepest > 0.5, "{manifolds} {deepest}");
+}
+
+#[test]
+fn what_cannot_stand_beside_each_other_is_refused_in_one_line() {
+    let refusal = |name: &str, worlds: usize, vary: Option<&str>| {
+        Scene::find_worlds(name, &[], worlds, vary).expect_err("a refusal").to_string()
+    };
+    assert_eq!(refusal("tower", 2, Some("offset")), "tower has no whole number \"offset\" to vary; it has: n");
+    assert!(refusal("examples/two_boxes.json", 2, Some("n")).contains("being a file"));
+    assert!(refusal("pile", 0, None).starts_with("0 worlds of 1005 bodies"));
+    assert!(refusal("pile", 1_000_000, None).contains("at most 4000000 bodies"));
+    // The ends of ranges hold for every world.
+    assert!(refusal("arch", 200, Some("voussoirs")).contains("must be a whole number from 3 to 201"));
+
+    let (mut moon, earth) = (World::new(), World::new());
+    moon.gravity.y = -1.62;
+    assert!(moon.beside(&earth).expect_err("a refusal").to_string().contains("all must have the same"));
+    let broken = World { begins: vec![3], ..World::new() };
+    assert!(broken.check().expect_err("a refusal").to_string().starts_with("world 0: begins or ends beyond"));
+}
