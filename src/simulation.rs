@@ -44,6 +44,8 @@ pub struct Simulation {
     prepared: Prepared,
     problem: StepProblem,
     plan: StepPlan,
+    /// Whether the backend keeps the rows of the last step on a device.
+    on_device: bool,
 }
 
 impl Simulation {
@@ -66,6 +68,7 @@ impl Simulation {
             prepared: Prepared::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
+            on_device: false,
         })
     }
 
@@ -91,6 +94,7 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
         }
+        self.leave_device();
         let mut stats = StepStats::default();
         if !self.begin_step(dt, &mut stats) {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
@@ -117,13 +121,26 @@ impl Simulation {
 
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
-        timed(&mut stats.times.run, || self.backend.run(&mut self.problem, &self.plan.passes))?;
+        let (carry, passes) = (&self.prepared.carry, &self.plan.passes);
+        let ran = timed(&mut stats.times.run, || self.backend.step(&mut self.problem, passes, carry));
+        if let Err(error) = ran {
+            self.on_device = false;
+            if carry.on_device {
+                self.problem.forget_impulses();
+            }
+            return Err(error);
+        }
+        self.on_device = self.backend.keeps_rows();
+        stats.traffic = self.backend.traffic();
+        stats.kernels.extend_from_slice(self.backend.kernel_times());
         timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
         stats.sweeps = self.problem.convergence.sweeps;
         stats.planned_sweeps = self.problem.convergence.planned;
-        timed(&mut stats.times.store, || {
-            self.sleep.after_step(&mut self.world, &self.detector, dt);
-        });
+        let store = &mut stats.times.store;
+        if timed(store, || self.sleep.after_step(&mut self.world, &self.detector, dt)) {
+            // Who sleeps has its impulses in its manifolds.
+            timed(store, || self.fetch());
+        }
         stats.asleep = self.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
         Ok(())
@@ -131,9 +148,24 @@ impl Simulation {
 
     /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
     pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
+        self.leave_device();
         self.sleep.before_step(&self.world, &self.detector);
         self.assemble(dt, &mut StepStats::default());
         (&self.problem, &self.plan)
+    }
+
+    /// Brings what only the backend has of the last step to the problem. What a lost device had is forgotten.
+    fn fetch(&mut self) {
+        if self.on_device && self.backend.fetch(&mut self.problem).is_err() {
+            self.on_device = false;
+            self.problem.forget_impulses();
+        }
+    }
+
+    /// Lets the next step begin from the problem as it is here.
+    fn leave_device(&mut self) {
+        self.fetch();
+        self.on_device = false;
     }
 
     /// Detects, colors, prepares and plans.
@@ -156,6 +188,7 @@ impl Simulation {
             self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
         });
         timed(&mut times.prepare, || {
+            self.prepared.carry.on_device = self.on_device;
             self.prepared.prepare(
                 &self.world,
                 self.sleep.asleep(),
@@ -181,7 +214,6 @@ impl Simulation {
         stats.overflow = self.prepared.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.plan.bytes_moved(&self.problem);
-        stats.bytes_transferred = self.backend.bytes_transferred(&self.problem);
     }
 
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
@@ -208,6 +240,7 @@ impl Simulation {
 
     /// The bodies, and contacts and impulses of the last step.
     pub fn world_and_pairs(&mut self) -> (&World, impl Iterator<Item = &Pair> + Clone) {
+        self.fetch();
         let pairs = self.detector.pairs_mut().flatten();
         pairs.for_each(|pair| self.prepared.give_back(&self.problem, pair));
         (&self.world, self.detector.pairs())
@@ -224,12 +257,15 @@ impl Simulation {
     /// One is out of range or contradicts another; they are then as they were.
     pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
         config.check()?;
+        self.leave_device();
         self.config = config;
+        self.plan = StepPlan::default();
         Ok(())
     }
 
     /// Changes what runs the steps, from the next one on; returns what ran them so far.
     pub fn set_backend(&mut self, backend: Box<dyn Backend>) -> Box<dyn Backend> {
+        self.leave_device();
         std::mem::replace(&mut self.backend, backend)
     }
 
@@ -239,7 +275,8 @@ impl Simulation {
     }
 
     /// The last step's problem, with the impulses that solved it.
-    pub fn problem(&self) -> &StepProblem {
+    pub fn problem(&mut self) -> &StepProblem {
+        self.fetch();
         &self.problem
     }
 

@@ -31,10 +31,32 @@ pub struct StepStats {
     pub dispatches: usize,
     /// Bytes that the kernels of the plan read and write.
     pub bytes_moved: u64,
-    /// Bytes sent to the device and read back.
-    pub bytes_transferred: u64,
+    /// Bytes sent to a device and read back.
+    pub traffic: Traffic,
+    /// How long a device was at each kernel, where it has a clock.
+    pub kernels: Vec<KernelTime>,
     /// The first body whose pose or velocity is not finite, if any.
     pub first_non_finite: Option<usize>,
+}
+
+/// Time that a device spent at one kernel in one step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KernelTime {
+    /// Its name.
+    pub kernel: &'static str,
+    /// All its passes together.
+    pub time: Duration,
+    /// Bytes that they read and write; 0 for those that are not of the plan.
+    pub bytes: u64,
+}
+
+/// What a step moves between the processor and a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Bytes sent to the device.
+    pub up: u64,
+    /// Bytes read back.
+    pub down: u64,
 }
 
 /// Wall time of each stage of a step.

@@ -5,12 +5,13 @@ mod common;
 use common::difference::of_velocities;
 use common::gpu::gpu;
 use common::tolerance;
-use drystone::compare::compare;
+use drystone::backend::crossover;
+use drystone::compare::{Difference, compare};
 use drystone::glam::Vec3;
 use drystone::plan::Kernel;
 use drystone::stats::median;
 use drystone::{
-    Backend, BallJoint, Body, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+    Backend, BallJoint, Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
 
 fn pile() -> Scene {
@@ -173,4 +174,61 @@ fn a_problem_too_large_for_the_adapter_is_refused_by_name() {
     let Err(Error::TooLarge(line)) = gpu.run(&mut problem, &[]) else { panic!("{summary} took it") };
     assert!(line.starts_with("the colors of this problem take "), "{line}");
     assert!(line.contains(&summary.name) && line.ends_with("use --backend cpu"), "{line}");
+}
+
+#[test]
+fn any_adapter_can_be_measured_against_the_processor() {
+    let Some(mut gpu) = gpu(false) else { return };
+    let found = crossover(&mut Cpu::new(), &mut gpu).expect("both run small piles");
+    println!("{} pays from {found:?} bodies on", gpu.summary());
+    assert!(found.is_none_or(|n| n < 1 << 30));
+}
+
+#[test]
+fn a_device_tells_how_long_it_was_at_what() {
+    let Some(mut gpu) = gpu(false) else { return };
+    let Some(bandwidth) = gpu.time_kernels().expect("it copies") else {
+        return eprintln!("not checked: {} has no clock", gpu.summary());
+    };
+    let scene = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu)).expect("good settings");
+    for step in 1..=60 {
+        let start = std::time::Instant::now();
+        let stats = simulation.step(scene.dt).expect("a step");
+        let (wall, sum) = (start.elapsed(), stats.kernels.iter().map(|k| k.time).sum::<std::time::Duration>());
+        assert!(sum <= wall && !sum.is_zero(), "{sum:?} of {wall:?}");
+        let planned = simulation.plan().passes.iter().map(|pass| pass.kernel.name());
+        let carried = ["begin_bodies", "carry_contacts", "begin_contacts"];
+        let named = |name: &str| stats.kernels.iter().filter(|k| k.kernel == name).count();
+        assert!(planned.clone().all(|name| named(name) == 1), "{:?}", stats.kernels);
+        let known = |name: &str| planned.clone().any(|p| p == name) || (step > 1 && carried.contains(&name));
+        assert!(stats.kernels.iter().all(|k| known(k.kernel)), "{:?}", stats.kernels);
+        let bytes: u64 = stats.kernels.iter().map(|k| k.bytes).sum();
+        assert_eq!(bytes, stats.bytes_moved);
+    }
+    assert!(bandwidth > 1e8, "{bandwidth:e} B/s");
+}
+
+/// Standing and jointed scenes that one workgroup follows, and whether all of it can be one dispatch.
+#[test]
+fn a_small_world_in_one_dispatch_has_the_bits_of_the_reference() {
+    for name in ["tower", "stack", "chain", "slide", "roll"] {
+        let scene = Scene::find(name, &[]).expect("a scene of the catalogue");
+        assert_same(&scene, &SolverConfig::default(), 30, name);
+    }
+}
+
+/// The kernels of the mixture, each in dispatches of its own because they are timed.
+#[test]
+fn kernels_that_are_timed_have_the_bits_of_the_reference() {
+    let Some(mut gpu) = gpu(true).filter(drystone::Gpu::is_exact) else { return };
+    gpu.time_kernels().expect("it copies");
+    let scene = mixture();
+    let mut ours = Simulation::new(scene.world.clone(), SolverConfig::default(), reference()).expect("good settings");
+    let mut theirs = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu)).expect("good settings");
+    for _ in 0..LANDED {
+        ours.step(scene.dt).expect("the reference runs");
+        theirs.step(scene.dt).expect("the GPU runs");
+    }
+    assert_eq!(Difference::between(&ours.world, &theirs.world).bodies, 0);
 }

@@ -7,7 +7,10 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use common::kernels::{every_kernel, every_rules};
-use drystone::backend::gpu::shader::{BINDINGS, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source};
+use drystone::backend::gpu::shader::{
+    BINDINGS, PASSES, Program, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source,
+};
+use drystone::config::FrictionRule;
 use drystone::kernels::Rules;
 use drystone::plan::Kernel;
 
@@ -33,9 +36,9 @@ mod layouts {
 
     /// Size of a struct, and offset of each of its fields.
     #[derive(Debug, PartialEq)]
-    struct Layout {
-        size: usize,
-        fields: BTreeMap<String, usize>,
+    pub struct Layout {
+        pub size: usize,
+        pub fields: BTreeMap<String, usize>,
     }
 
     macro_rules! layouts {
@@ -67,6 +70,7 @@ mod layouts {
             Inertia = InertiaRow { principal body inv_principal frame }
             Contact = ContactRow {
                 normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+                preload
             }
             Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
             Joint = JointRow { r_a body_a r_b body_b gap }
@@ -85,7 +89,7 @@ mod layouts {
     }
 
     /// The layout of each struct of `types`.
-    fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
+    pub fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
         let module = parsed(types);
         let structs = module.types.iter().filter_map(|(_, t)| match &t.inner {
             naga::TypeInner::Struct { members, span } => Some((t.name.clone()?, members, *span)),
@@ -176,6 +180,119 @@ fn every_binding_stands_where_its_name_stands_in_the_list() {
         for (at, name, space) in bound {
             assert_eq!(space == naga::AddressSpace::Uniform, (at as usize) < UNIFORMS, "{name}");
         }
+    }
+}
+
+/// The programs that carry rows from step to step.
+mod carry {
+    use super::*;
+    use drystone::backend::gpu::CarryParams;
+    use drystone::backend::gpu::shader::{CARRY, CARRY_BINDINGS};
+    use drystone::problem::carry::{NO_ROW, Origin, Preload};
+
+    fn reflected(program: Program) -> Reflected {
+        Reflected::new(&program.source(), program.name(), &program.constants()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    #[test]
+    fn each_is_a_file_with_an_entry_point_of_its_name() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/carry");
+        let files = std::fs::read_dir(folder).expect("the folder").count();
+        assert_eq!(files, Program::CARRY.len() + 1, "and their bindings");
+        for program in Program::CARRY {
+            let names: Vec<_> = parsed(&program.source()).entry_points.into_iter().map(|e| e.name).collect();
+            assert_eq!(names, [program.name()]);
+        }
+    }
+
+    #[test]
+    fn each_stays_inside_what_every_webgpu_offers() {
+        for program in Program::CARRY {
+            let name = program.name();
+            let reflected = reflected(program);
+            let storage = reflected.bindings.iter().filter(|&&b| b != CARRY).count();
+            assert!(storage <= 8, "{name} has {storage} storage buffers");
+            assert_eq!(reflected.module.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
+        }
+    }
+
+    #[test]
+    fn every_binding_has_the_number_of_its_name() {
+        let name_of = |at: usize| BINDINGS.get(at).copied().unwrap_or_else(|| CARRY_BINDINGS[at - BINDINGS.len()]);
+        let module = parsed(&Program::CarryContacts.source());
+        let bound: Vec<_> = module.global_variables.iter().filter_map(|(_, v)| Some((v.binding?, v))).collect();
+        // All but that of a plan that one workgroup follows.
+        assert_eq!(bound.len(), 5 + CARRY_BINDINGS.len() - 1);
+        for (at, variable) in bound {
+            assert_eq!(variable.name.as_deref(), Some(name_of(at.binding as usize)));
+            assert_eq!(variable.space == naga::AddressSpace::Uniform, at.binding == CARRY);
+        }
+    }
+
+    #[test]
+    fn every_struct_has_the_layout_of_its_twin() {
+        let theirs = layouts::in_wgsl(&Program::CarryContacts.source());
+        let fields = |name: &str| theirs[name].fields.clone();
+        let own = |fields: &[(&str, usize)]| BTreeMap::from_iter(fields.iter().map(|&(n, at)| (n.to_owned(), at)));
+        let preload = [
+            ("movable_compliance", offset_of!(Preload, movable_compliance)),
+            ("fixed_compliance", offset_of!(Preload, fixed_compliance)),
+            ("share", offset_of!(Preload, share)),
+            ("warm_start", offset_of!(Preload, warm_start)),
+        ];
+        assert_eq!(fields("Preload"), own(&preload));
+        let carry = [
+            ("preload", offset_of!(CarryParams, preload)),
+            ("body_count", offset_of!(CarryParams, body_count)),
+            ("contact_count", offset_of!(CarryParams, contact_count)),
+            ("contacts_before", offset_of!(CarryParams, contacts_before)),
+            ("patches", offset_of!(CarryParams, patches)),
+            ("has_points", offset_of!(CarryParams, has_points)),
+        ];
+        assert_eq!(fields("Carry"), own(&carry));
+        assert!(theirs["Carry"].size <= size_of::<CarryParams>());
+        let origin = [
+            ("row", offset_of!(Origin, row)),
+            ("contact", offset_of!(Origin, contact)),
+            ("points", offset_of!(Origin, points)),
+        ];
+        assert_eq!((fields("Origin"), theirs["Origin"].size), (own(&origin), size_of::<Origin>()));
+        assert_eq!(theirs["Place"].size, size_of::<[u32; 2]>());
+        let constants = parsed(&Program::CarryContacts.source());
+        let no_row =
+            constants.constants.iter().find(|(_, c)| c.name.as_deref() == Some("NO_ROW")).expect("the constant");
+        let value = &constants.global_expressions[no_row.1.init];
+        assert!(matches!(value, naga::Expression::Literal(naga::Literal::U32(x)) if *x == NO_ROW), "{value:?}");
+    }
+}
+
+#[test]
+fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
+    let of = |measured, patch, friction| {
+        let shared = Rules { measured, patch, friction, round: true, ..Rules::default() };
+        let biased = Rules { biased: true, friction: FrictionRule::None, patch: false, ..shared };
+        let mut kernels = vec![
+            Kernel::IntegrateVelocities { carry: false },
+            Kernel::WarmStart(shared.of_warm_start()),
+            Kernel::SolveContacts(biased),
+            Kernel::IntegratePositions,
+            Kernel::SolveContacts(shared),
+            Kernel::IntegrateVelocities { carry: true },
+            Kernel::ApplyRestitution(Rules { patch, ..Rules::default() }),
+        ];
+        // Eight buffers are enough for one or the other.
+        kernels.push(if measured { Kernel::BeginSweep { first: false } } else { Kernel::IntegrateGyroscopic });
+        kernels
+    };
+    for (measured, patch, friction) in
+        [(false, false, FrictionRule::Disc), (true, false, FrictionRule::Box), (false, true, FrictionRule::Disc)]
+    {
+        let program = Program::Whole(of(measured, patch, friction).into(), 16);
+        let reflected = Reflected::new(&program.source(), program.name(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let storage = reflected.bindings.iter().filter(|&&b| b as usize >= UNIFORMS && b != PASSES).count();
+        assert!(storage <= 8, "{storage} storage buffers");
+        assert!(reflected.module.overrides.is_empty());
+        assert_eq!(reflected.module.entry_points[0].workgroup_size, [16, 1, 1]);
     }
 }
 

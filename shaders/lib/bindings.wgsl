@@ -3,7 +3,7 @@
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> pass_colors: PassColors;
 @group(0) @binding(2) var<storage, read_write> bodies: array<Body>;
-@group(0) @binding(3) var<storage, read_write> masses: array<Mass>;
+@group(0) @binding(3) var<storage, read> masses: array<Mass>;
 @group(0) @binding(4) var<storage, read> inertias: array<Inertia>;
 @group(0) @binding(5) var<storage, read> contacts: array<Contact>;
 @group(0) @binding(6) var<storage, read> points: array<Point>;

@@ -16,7 +16,7 @@ struct Contact {
     normal: vec3f, friction: f32,
     tangent: vec3f, restitution: f32,
     body_a: u32, body_b: u32, first_point: u32, point_count: u32,
-    radius_a: f32, radius_b: f32,
+    radius_a: f32, radius_b: f32, preload: f32,
 }
 
 struct Point {

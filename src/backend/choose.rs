@@ -1,14 +1,15 @@
 //! Which backend runs a scene.
 
-use super::Backend;
 use super::cpu::{Cpu, Reference};
 use super::gpu::{AdapterChoice, Gpu};
+use super::{Backend, crossover};
 use crate::error::Result;
 
 /// What a person asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// A hardware GPU where there is one and the scene is large enough to pay, else the CPU.
+    /// A hardware GPU where there is one and the scene is large enough that it pays, as measured by some steps of a small pile on
+    /// both; else the CPU.
     #[default]
     Auto,
     /// The compute shaders, on the best adapter there is.
@@ -54,9 +55,8 @@ impl std::fmt::Display for Numbers {
     }
 }
 
-/// Dynamic bodies from which `auto` takes a GPU. Below it the dispatches of a step cost more than its sweeps do on a
-/// processor: a colored step is some 200 dispatches of 5 to 10 us each.
-pub const AUTO_GPU_BODIES: usize = 5_000;
+/// Scenes of fewer dynamic bodies run on the processor: their steps take less time than it takes to open a GPU.
+const LEAST_BODIES: usize = 500;
 
 /// Opens the backend for a scene of `dynamic_bodies`, and says in one line what was taken and why.
 ///
@@ -74,15 +74,23 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
             let why = format!("gpu: asked for; {}", gpu.adapter());
             Ok((Box::new(gpu), why))
         }
-        BackendChoice::Auto if dynamic_bodies < AUTO_GPU_BODIES => {
-            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU pays from {AUTO_GPU_BODIES}")))
+        BackendChoice::Auto if dynamic_bodies < LEAST_BODIES => {
+            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU is not tried below {LEAST_BODIES}")))
         }
-        BackendChoice::Auto => match Gpu::new(AdapterChoice::Hardware, exact) {
-            Ok(gpu) => {
-                let why = format!("gpu: {dynamic_bodies} dynamic bodies and {}", gpu.adapter());
-                Ok((Box::new(gpu), why))
+        BackendChoice::Auto => {
+            let Ok(mut gpu) = Gpu::new(AdapterChoice::Hardware, exact) else {
+                return Ok(cpu("cpu: no hardware GPU found (drystone adapters lists what there is)".into()));
+            };
+            let adapter = gpu.adapter();
+            let crossover = crossover(&mut Cpu::new(), &mut gpu)?;
+            let pays = crossover.map_or("never pays".into(), |n| format!("pays from about {n} on"));
+            if crossover.is_some_and(|n| dynamic_bodies >= n) {
+                return Ok((
+                    Box::new(gpu),
+                    format!("gpu: {dynamic_bodies} dynamic bodies, and as measured it {pays}; {adapter}"),
+                ));
             }
-            Err(_) => Ok(cpu("cpu: no hardware GPU found (drystone adapters lists what there is)".into())),
-        },
+            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, and as measured the GPU {pays}; {adapter}")))
+        }
     }
 }

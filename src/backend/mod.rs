@@ -1,14 +1,18 @@
 //! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
 
+mod calibrate;
 mod choose;
 pub mod cpu;
 pub mod gpu;
 
-pub use choose::{AUTO_GPU_BODIES, BackendChoice, Numbers, choose};
+pub use calibrate::crossover;
+pub use choose::{BackendChoice, Numbers, choose};
 
 use crate::error::Result;
 use crate::plan::Pass;
 use crate::problem::StepProblem;
+use crate::problem::carry::Carry;
+use crate::stats::{KernelTime, Traffic};
 
 /// Something that can run the passes of a plan.
 pub trait Backend: Send {
@@ -25,8 +29,45 @@ pub trait Backend: Send {
     /// The problem does not fit the device, or the device is lost.
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()>;
 
-    /// Bytes that one run of `problem` sends to the device and reads back.
-    fn bytes_transferred(&self, _problem: &StepProblem) -> u64 {
-        0
+    /// Runs the passes of a step that follows on the one before as `carry` says. A backend with a device of its own keeps the
+    /// rows there, sends what changed and brings back what moved: where `carry` says that the impulses are on the device, those
+    /// of `problem` are not looked at, and where [`Self::keeps_rows`] says so afterwards, they are not written either.
+    ///
+    /// # Errors
+    /// As of [`Self::run`].
+    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], _carry: &Carry) -> Result<()> {
+        self.run(problem, passes)
+    }
+
+    /// Whether the rows of the last step are on a device, and its impulses and preloads nowhere else.
+    fn keeps_rows(&self) -> bool {
+        false
+    }
+
+    /// Brings to `problem`, that of the last step, what of it is only on the device.
+    ///
+    /// # Errors
+    /// The device is lost.
+    fn fetch(&mut self, _problem: &mut StepProblem) -> Result<()> {
+        Ok(())
+    }
+
+    /// What the last step moved to a device and back.
+    fn traffic(&self) -> Traffic {
+        Traffic::default()
+    }
+
+    /// Lets the device take the time of each kernel from now on, where it has a clock; that may cost time itself. Gives the
+    /// bytes a second that the device reads and writes when it copies, to hold them against; none without a clock.
+    ///
+    /// # Errors
+    /// The device is lost.
+    fn time_kernels(&mut self) -> Result<Option<f64>> {
+        Ok(None)
+    }
+
+    /// How long the device was at each kernel in the last step, if it took the time.
+    fn kernel_times(&self) -> &[KernelTime] {
+        &[]
     }
 }

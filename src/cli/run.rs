@@ -24,6 +24,9 @@ pub struct RunArgs {
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
+    /// Take the time of each kernel by the clock of the GPU; a software adapter is slower with it.
+    #[arg(long)]
+    kernel_times: bool,
     #[command(flatten)]
     sleep: SleepArgs,
     /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
@@ -84,11 +87,13 @@ impl RunArgs {
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
-        let (backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
+        let (mut backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         eprintln!("{why}");
+        let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
+        report.copy_bandwidth = copy_bandwidth;
         let bar = progress(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {

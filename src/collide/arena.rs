@@ -9,7 +9,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
 use super::narrow::{ColliderInfo, Margins, Moving, Pair, Scratch, Update};
-use super::{Activity, DetectStats};
+use super::{Activity, DetectStats, Manifold};
 use crate::world::BodyKind;
 
 /// What all worlds are told about one detection; bodies are counted over all of them.
@@ -191,6 +191,7 @@ impl Arena {
             let changes = pair.rests == takes_part;
             if changes && !takes_part {
                 give_back(pair);
+                pair.manifolds.iter_mut().for_each(Manifold::forget_rows);
             }
             let mut update = Update::Reused;
             if both != [Activity::Still; 2] {

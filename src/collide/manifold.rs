@@ -28,6 +28,8 @@ pub struct ManifoldPoint {
     pub normal_impulse: f32,
     /// Friction impulse on b of the last substep, world axes [N s].
     pub friction_impulse: Vec3,
+    /// Its row in the last step, if it had one. Written by `problem`.
+    pub(crate) row_before: Option<u32>,
 }
 
 /// The contact of two bodies over one pair of convex parts.
@@ -49,6 +51,8 @@ pub struct Manifold {
     pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
+    /// Its row in the last step, if it had one. Written by `problem`.
+    pub(crate) row_before: Option<u32>,
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
 }
@@ -67,6 +71,7 @@ impl Manifold {
             friction_impulse: Vec3::ZERO,
             preload: 0.0,
             color: None,
+            row_before: None,
             points,
             count: count as u8,
         }
@@ -88,6 +93,12 @@ impl Manifold {
         &mut self.points[..self.count as usize]
     }
 
+    /// Forgets where its rows were.
+    pub(super) fn forget_rows(&mut self) {
+        self.row_before = None;
+        self.points.iter_mut().for_each(|point| point.row_before = None);
+    }
+
     /// Takes over color and impulses of the same contact one step earlier: points match by feature and, where that
     /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` [m].
     pub(super) fn inherit(&mut self, old: &Self, distance: f32) {
@@ -95,6 +106,7 @@ impl Manifold {
         self.twist_impulse = old.twist_impulse;
         self.friction_impulse = old.friction_impulse;
         self.preload = old.preload;
+        self.row_before = old.row_before;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
@@ -126,6 +138,7 @@ impl ManifoldPoint {
     fn take_impulses(&mut self, old: &Self) {
         self.normal_impulse = old.normal_impulse;
         self.friction_impulse = old.friction_impulse;
+        self.row_before = old.row_before;
     }
 }
 

@@ -62,6 +62,7 @@ pub struct Detector {
     kinds: Vec<BodyKind>,
     moving: Vec<Moving>,
     detections: u64,
+    computed_in: u64,
     reshaped_in: u64,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
@@ -91,6 +92,7 @@ impl Detector {
             kinds: world.bodies.iter().map(|b| b.kind).collect(),
             moving: Vec::new(),
             detections: 0,
+            computed_in: 0,
             reshaped_in: 0,
             jointed: world
                 .joints
@@ -149,6 +151,9 @@ impl Detector {
         let now = Now { margins, kinds: &self.kinds, moving: &self.moving, activity, jointed: &self.jointed };
         let detected = self.arenas.par_iter_mut().map(|arena| arena.detect(&now, give_back));
         let stats = detected.reduce(DetectStats::default, DetectStats::and);
+        if stats.computed > 0 {
+            self.computed_in = self.detections;
+        }
         if stats.reshaped {
             self.reshaped_in = self.detections;
         }
@@ -158,6 +163,11 @@ impl Detector {
     /// The last detection, counted from 1.
     pub fn detections(&self) -> u64 {
         self.detections
+    }
+
+    /// The last detection that computed any manifold.
+    pub fn computed_in(&self) -> u64 {
+        self.computed_in
     }
 
     /// The last detection after which another set of manifolds touched, or with other numbers of points.

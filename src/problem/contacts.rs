@@ -7,6 +7,7 @@
 use glam::{Vec2, Vec3};
 
 use super::StepProblem;
+use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{Detector, Manifold, ManifoldPoint, Motion, Pair};
@@ -79,9 +80,6 @@ impl Chunk<'_> {
 /// Contacts that one task writes at most.
 const CHUNK: usize = 256;
 
-/// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
-const LARGEST_PRELOAD: f32 = 2.0;
-
 /// What the rows of contacts are written from.
 pub(super) struct Writer<'a> {
     pub world: &'a World,
@@ -91,14 +89,8 @@ pub(super) struct Writer<'a> {
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
-    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move [s].
-    pub movable_compliance: f32,
-    /// The same of contacts with bodies that cannot [s].
-    pub fixed_compliance: f32,
-    /// Share of what is missing that preloads gain in this step.
-    pub preload_share: f32,
-    /// Whether anything can bounce, so that the velocity of the approach matters.
-    pub bounces: bool,
+    /// What preloads follow from, and whether a device sees to them.
+    pub carry: &'a Carry,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
     /// The detection whose manifolds have rows already.
@@ -148,12 +140,15 @@ impl Writer<'_> {
                 }
                 self.refresh_points(row, pair.motion(), points, computed);
             }
-            row.preload = self.preload(row, points, impulses);
-            points[..row.point_count as usize].iter_mut().for_each(|point| point.separation -= row.preload);
-            let warm_start = self.config.warm_start;
-            impulses
-                .iter_mut()
-                .for_each(|i| *i = if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() });
+            // Where they are on a device, the kernel begin_contacts does this.
+            if !self.carry.on_device {
+                row.preload = self.preload(row, points, impulses);
+                points[..row.point_count as usize].iter_mut().for_each(|point| point.separation -= row.preload);
+                let warm_start = self.carry.preload.warm_start != 0;
+                impulses
+                    .iter_mut()
+                    .for_each(|i| *i = if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() });
+            }
         }
     }
 
@@ -223,26 +218,20 @@ impl Writer<'_> {
     }
 
     /// How much a contact is preloaded in this step, by the impulses that it bore in the step before.
-    ///
-    /// At rest its springs are compressed by what it bears: the overlap of a soft contact. That much, as a mean over the points,
-    /// its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as
-    /// they are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each
-    /// point rocks towers.
     fn preload(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
         let both = [row.body_a, row.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
-        let compliance = if both { self.movable_compliance } else { self.fixed_compliance };
-        let count = row.point_count as usize;
-        let sags = points[..count].iter().zip(impulses).map(|(p, impulse)| impulse.normal * compliance / p.normal_mass);
-        let sag = sags.sum::<f32>() / count as f32;
-        // What is borne no more is not held up either.
-        (row.preload + self.preload_share * (sag - row.preload)).min(LARGEST_PRELOAD * sag)
+        let (mut pressed, mut mass) = (0.0, 0.0);
+        for (point, impulse) in points[..row.point_count as usize].iter().zip(impulses) {
+            pressed += impulse.normal;
+            mass += point.normal_mass;
+        }
+        preloaded(&self.carry.preload, row.preload, both, pressed, mass)
     }
 
     /// What a row knows of the velocities when the step begins: that of the approach where it may bounce, and the direction
     /// of the slip where friction has one only.
     fn approach(&self, row: &ContactRow, point: &mut PointRow) {
-        let slips = self.config.friction == FrictionRule::Slip;
-        if !(self.bounces || slips) {
+        if !self.carry.approach {
             return;
         }
         let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
@@ -255,7 +244,7 @@ impl Writer<'_> {
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
             velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
-        if slips && !self.patches {
+        if self.config.friction == FrictionRule::Slip && !self.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
             let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);

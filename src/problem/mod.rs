@@ -1,5 +1,6 @@
 //! One step as a value: plain rows in color order, whose names are the names of the WGSL bindings.
 
+pub mod carry;
 mod contacts;
 pub mod effective;
 mod layout;
@@ -81,6 +82,12 @@ impl StepProblem {
     /// Number of impulses, those of patches and joints included.
     pub fn impulse_count(&self) -> usize {
         self.impulses.len() + self.joint_impulses.len()
+    }
+
+    /// Begins without impulses and preloads.
+    pub fn forget_impulses(&mut self) {
+        self.impulses.fill(ImpulseRow::default());
+        self.contacts.iter_mut().for_each(|contact| contact.preload = 0.0);
     }
 
     /// Whether any contact has friction.

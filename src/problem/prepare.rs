@@ -4,6 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::StepProblem;
+use super::carry::{Carry, NO_ROW, Origin, Preload};
 use super::contacts::{Chunk, ContactRows, Source, Writer};
 use super::layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
@@ -38,6 +39,8 @@ pub struct Prepared {
     edges_before: Vec<Edge>,
     joint_edges: Vec<Edge>,
     joint_coloring: Coloring,
+    /// How the rows of contacts follow from those of the step before.
+    pub carry: Carry,
     /// Which joint each row is of: those of bodies that are awake.
     pub(super) joint_rows: Vec<u32>,
     /// Impulse of each joint at the end of the step before.
@@ -200,17 +203,25 @@ impl Prepared {
             problem.impulses.resize(total, ImpulseRow::default());
             self.computed.resize(total, 0.0);
         }
+        self.carry.approach =
+            config.friction == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
+        self.carry.preload = Preload {
+            movable_compliance: problem.params.movable.compliance(),
+            fixed_compliance: problem.params.fixed.compliance(),
+            share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
+            warm_start: config.warm_start.into(),
+        };
+        if self.carry.on_device {
+            self.note_rows_before(detector);
+        }
         let writer = Writer {
             world,
             detector,
             config,
             substep: problem.params.substep,
-            movable_compliance: problem.params.movable.compliance(),
-            fixed_compliance: problem.params.fixed.compliance(),
-            preload_share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
             bodies: &problem.bodies,
             masses: &problem.masses,
-            bounces: world.bodies.iter().any(|b| b.material.restitution > 0.0),
+            carry: &self.carry,
             patches: self.patches,
             seen: self.seen,
             sources: &self.sources,
@@ -224,6 +235,36 @@ impl Prepared {
             computed: &mut self.computed,
         });
         self.seen = detector.detections();
+    }
+
+    /// Notes where the rows of each contact were in the step before.
+    fn note_rows_before(&mut self, detector: &Detector) {
+        let Carry { rows_before, computed, .. } = &mut self.carry;
+        rows_before.clear();
+        computed.clear();
+        let reshaped = detector.reshaped_in() > self.seen;
+        if !reshaped && detector.computed_in() <= self.seen {
+            return;
+        }
+        for (row, &contact) in (0..).zip(&self.coloring.order) {
+            let source = &self.sources[contact as usize];
+            let pair = detector.pair(source.world, source.pair);
+            if pair.computed_in > self.seen {
+                let manifold = &pair.manifolds[source.manifold as usize];
+                let mut origin = Origin { row, contact: manifold.row_before.unwrap_or(NO_ROW), points: [NO_ROW; 4] };
+                for (before, point) in origin.points.iter_mut().zip(manifold.points()) {
+                    *before = point.row_before.unwrap_or(NO_ROW);
+                }
+                computed.push(origin);
+                rows_before.push(NO_ROW);
+            } else {
+                rows_before.push(if reshaped { source.row_before.unwrap_or(NO_ROW) } else { row });
+            }
+        }
+        // What was computed touches nothing.
+        if !reshaped && computed.is_empty() {
+            rows_before.clear();
+        }
     }
 
     /// Where the points of each contact begin; returns how many rows they are.

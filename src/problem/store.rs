@@ -36,14 +36,17 @@ impl Prepared {
         }
         for (k, manifold) in pair.manifolds.iter_mut().enumerate() {
             let at = pair.contact as usize + k;
-            let contact = &problem.contacts[self.row_of[at] as usize];
+            let row = self.row_of[at];
+            let contact = &problem.contacts[row as usize];
+            manifold.row_before = Some(row);
             let (tangent_1, tangent_2) = contact.tangents();
             let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
             manifold.color = self.edges[at].color;
             manifold.preload = contact.preload;
             let (first, end) = (contact.first_point as usize, (contact.first_point + contact.point_count) as usize);
             let rows = problem.points[first..end].iter().zip(&problem.impulses[first..end]);
-            for (point, (row, impulse)) in manifold.points_mut().iter_mut().zip(rows) {
+            for ((point, (row, impulse)), at) in manifold.points_mut().iter_mut().zip(rows).zip(contact.first_point..) {
+                point.row_before = Some(at);
                 point.separation = row.separation + contact.preload;
                 point.normal_impulse = impulse.normal;
                 point.friction_impulse = friction(impulse);

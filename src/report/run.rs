@@ -8,7 +8,7 @@ use crate::config::SolverConfig;
 use crate::metrics::{fastest, in_place, rms_speed};
 use crate::scenes::{Group, Scene};
 use crate::simulation::Simulation;
-use crate::stats::{StepStats, median};
+use crate::stats::{KernelTime, StepStats, median};
 use crate::world::{BodyKind, World};
 
 /// Report of one run; its fields are the keys of the JSON object.
@@ -34,6 +34,10 @@ pub struct RunReport {
     pub step_ms: Vec<f64>,
     /// Wall time of each stage, median and least over the steps [ms].
     pub stage_ms: Vec<StageRow>,
+    /// Time of each kernel by the clock of the device, if it was asked for, median and least over the steps [ms].
+    pub kernel_ms: Vec<KernelRow>,
+    /// Bytes a second that the device reads and writes when it copies [B/s], if it was asked for times.
+    pub copy_bandwidth: Option<f64>,
     /// Manifolds of the last step.
     pub manifolds: usize,
     /// Contact points of the last step.
@@ -58,8 +62,10 @@ pub struct RunReport {
     pub dispatches: usize,
     /// Bytes that the kernels of the last step read and wrote.
     pub bytes_moved: u64,
-    /// Bytes that the last step sent to the device and read back.
-    pub bytes_transferred: u64,
+    /// Bytes that the last step sent to the device.
+    pub bytes_up: u64,
+    /// Bytes that the last step read back.
+    pub bytes_down: u64,
     /// Deepest overlap at the end [m].
     pub penetration_max: f64,
     /// Overlap at the end that 95 % of the contacts do not exceed [m].
@@ -89,6 +95,8 @@ pub struct RunReport {
     #[serde(skip)]
     stage_times: Vec<[f64; 5]>,
     #[serde(skip)]
+    kernel_times: Vec<(KernelTime, Vec<f64>)>,
+    #[serde(skip)]
     energy_before: f64,
     #[serde(skip)]
     stands: bool,
@@ -103,6 +111,21 @@ pub struct Standing {
     pub bodies: usize,
     /// Those of them that are in place.
     pub in_place: usize,
+}
+
+/// Time of one kernel over a run [ms].
+#[derive(Clone, Debug, Serialize)]
+pub struct KernelRow {
+    /// Name of the kernel.
+    pub kernel: &'static str,
+    /// Median over the steps that it was in.
+    pub median: f64,
+    /// Least over them.
+    pub min: f64,
+    /// Bytes that it read and wrote in the last step that it was in; 0 if it is not of the plan.
+    pub bytes: u64,
+    /// Bytes a second of that step, as a share of what copying reaches.
+    pub share_of_copying: Option<f64>,
 }
 
 /// Time of one stage over a run [ms].
@@ -130,6 +153,8 @@ impl RunReport {
             config: simulation.config().clone(),
             step_ms: Vec::new(),
             stage_ms: Vec::new(),
+            kernel_ms: Vec::new(),
+            copy_bandwidth: None,
             manifolds: 0,
             points: 0,
             asleep: 0,
@@ -142,7 +167,8 @@ impl RunReport {
             reused: 0.0,
             dispatches: 0,
             bytes_moved: 0,
-            bytes_transferred: 0,
+            bytes_up: 0,
+            bytes_down: 0,
             penetration_max: 0.0,
             penetration_p95: 0.0,
             penetration_mean: 0.0,
@@ -157,6 +183,7 @@ impl RunReport {
             non_finite: 0,
             first_non_finite: None,
             stage_times: Vec::new(),
+            kernel_times: Vec::new(),
             energy_before: energy(&scene.world),
             stands: scene.stands,
         }
@@ -168,6 +195,15 @@ impl RunReport {
         self.steps += 1;
         self.step_ms.push(ms(stats.times.total()));
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
+        for kernel in &stats.kernels {
+            match self.kernel_times.iter_mut().find(|known| known.0.kernel == kernel.kernel) {
+                Some((last, times)) => {
+                    last.clone_from(kernel);
+                    times.push(ms(kernel.time));
+                }
+                None => self.kernel_times.push((kernel.clone(), vec![ms(kernel.time)])),
+            }
+        }
         self.manifolds = stats.manifolds;
         self.points = stats.points;
         self.asleep = stats.asleep;
@@ -180,20 +216,31 @@ impl RunReport {
         self.reused = 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64;
         self.dispatches = stats.dispatches;
         self.bytes_moved = stats.bytes_moved;
-        self.bytes_transferred = stats.bytes_transferred;
+        self.bytes_up = stats.traffic.up;
+        self.bytes_down = stats.traffic.down;
     }
 
     /// Measures how the run ended.
     pub fn measure(&mut self, scene: &Scene, simulation: &mut Simulation) {
+        let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
         let names = StepStats::default().times.stages().map(|s| s.0);
-        self.stage_ms = (0..names.len())
-            .map(|i| {
-                let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
-                let min = times.iter().copied().fold(f64::INFINITY, f64::min);
-                StageRow { stage: names[i], median: median(&times), min }
-            })
-            .filter(|row| row.min.is_finite())
-            .collect();
+        let stage = |(i, stage): (usize, &'static str)| {
+            let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
+            StageRow { stage, median: median(&times), min: least(&times) }
+        };
+        self.stage_ms = names.into_iter().enumerate().map(stage).filter(|row| row.min.is_finite()).collect();
+        let bandwidth = self.copy_bandwidth;
+        let kernel = |(last, times): &(KernelTime, Vec<f64>)| {
+            let share = |bandwidth: f64| last.bytes as f64 / last.time.as_secs_f64() / bandwidth;
+            KernelRow {
+                kernel: last.kernel,
+                median: median(times),
+                min: least(times),
+                bytes: last.bytes,
+                share_of_copying: bandwidth.filter(|_| last.bytes > 0 && !last.time.is_zero()).map(share),
+            }
+        };
+        self.kernel_ms = self.kernel_times.iter().map(kernel).collect();
         let penetration = simulation.penetration();
         let world = &simulation.world;
         let (speed, body) = fastest(world);
@@ -265,6 +312,17 @@ impl RunReport {
         }
         for stage in &self.stage_ms {
             row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
+        }
+        for kernel in &self.kernel_ms {
+            let share = kernel.share_of_copying.map(|s| format!(", {:.1} % of copying", 100.0 * s)).unwrap_or_default();
+            row(
+                &format!("    {}", kernel.kernel),
+                format!("{:.3} median, {:.3} least{share}", kernel.median, kernel.min),
+            );
+        }
+        if self.bytes_up > 0 {
+            let kb = |bytes: u64| bytes as f64 / 1e3;
+            row("last step", format!("{:.1} kB to the device, {:.1} kB back", kb(self.bytes_up), kb(self.bytes_down)));
         }
         row(
             "penetration",

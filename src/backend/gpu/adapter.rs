@@ -163,7 +163,8 @@ pub(super) fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device
     let offered = adapter.limits();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("drystone"),
-        required_features: if exact { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() },
+        required_features: if exact { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
+            | adapter.features() & super::timer::FEATURES,
         // What WebGPU promises everywhere, with buffers as large as they come.
         required_limits: wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,

@@ -2,12 +2,26 @@
 //!
 //! Stays inside the limits that every WebGPU implementation offers (at most 8 storage buffers a kernel, 64 threads a
 //! workgroup, no optional features), except for the size of buffers, which are asked for as large as the adapter has them.
+//!
+//! [`Backend::run`] takes a problem as a value: everything is sent, and everything that the plan changes comes back.
+//! [`Backend::step`] goes on from the rows that the step before left on the device ([`carry`]): what changed is sent, poses and
+//! velocities come back, and the impulses stay until somebody asks.
+//!
+//! A step is one submission and one read-back, and is waited for: detection, with which the next step begins, asks for the
+//! poses of all bodies, so that nothing is left to be done meanwhile.
 
 mod adapter;
+mod buffers;
+mod carry;
 mod exact;
+mod programs;
+mod read_back;
 pub mod shader;
+mod timer;
+mod whole;
 
 pub use adapter::{AdapterChoice, AdapterSummary, adapters};
+pub use carry::CarryParams;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -16,8 +30,15 @@ use super::Backend;
 use crate::error::{Error, Result};
 use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, MomentumRow, PassColors, StepProblem};
-use shader::{BINDINGS, PASS_COLORS, SCRATCH, SCRATCH_ROW, WORKGROUP};
+use crate::problem::carry::Carry;
+use crate::problem::{BodyRow, PassColors, StepProblem};
+use crate::stats::{KernelTime, Traffic};
+use buffers::Buffers;
+use carry::Rows;
+use programs::Programs;
+use read_back::ReadBack;
+use shader::{BINDINGS, Program, SCRATCH, SCRATCH_ROW, WORKGROUP};
+use timer::Timer;
 
 /// Opens the adapter that `choice` finds, for drawing.
 ///
@@ -39,21 +60,33 @@ pub struct Gpu {
     queue: wgpu::Queue,
     summary: AdapterSummary,
     exact: bool,
-    kernels: HashMap<Kernel, CompiledKernel>,
-    /// One buffer a binding, grown when a problem needs it.
-    buffers: Vec<Option<wgpu::Buffer>>,
-    read_back: Option<wgpu::Buffer>,
+    programs: Programs,
+    buffers: Buffers,
+    read_back: ReadBack,
+    timer: Option<Timer>,
+    times: Vec<KernelTime>,
+    traffic: Traffic,
+    /// What the last step left, if the next can go on from it.
+    rows: Option<Rows>,
+    /// Memory that is used again.
+    separations: Vec<f32>,
+    states: Vec<BodyRow>,
     /// First error that the device reported outside a call.
     device_error: Arc<Mutex<Option<String>>>,
 }
 
-struct CompiledKernel {
-    pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    /// Bindings that it uses, ascending.
-    bindings: Vec<u32>,
-    /// Valid until a buffer grows.
-    bind_group: Option<wgpu::BindGroup>,
+/// A program, how many workgroups run it, and where the colors stand that it goes over.
+struct Dispatch {
+    program: Program,
+    workgroups: u32,
+    colors: u32,
+}
+
+impl Dispatch {
+    /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes several.
+    fn over(program: Program, rows: usize) -> Self {
+        Self { program, workgroups: (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535), colors: 0 }
+    }
 }
 
 impl Gpu {
@@ -75,13 +108,19 @@ impl Gpu {
             first_error.lock().expect("no panic holds it").get_or_insert(error.to_string());
         }));
         Ok(Self {
+            programs: Programs::new(device.clone(), exact),
+            buffers: Buffers::new(device.clone(), queue.clone(), summary.name.clone()),
+            timer: None,
+            read_back: ReadBack::new(device.clone(), queue.clone()),
             device,
             queue,
             summary,
             exact,
-            kernels: HashMap::new(),
-            buffers: (0..BINDINGS.len()).map(|_| None).collect(),
-            read_back: None,
+            times: Vec::new(),
+            traffic: Traffic::default(),
+            rows: None,
+            separations: Vec::new(),
+            states: Vec::new(),
             device_error,
         })
     }
@@ -96,174 +135,157 @@ impl Gpu {
         self.exact
     }
 
-    /// Sends the rows; buffers grow where they must.
-    fn upload(&mut self, problem: &StepProblem, pass_colors: &[u8], accelerated: bool) -> Result<()> {
-        let limit = self.device.limits().max_storage_buffer_binding_size;
-        let rows: [&[u8]; BINDINGS.len() - SCRATCH] = [
-            bytemuck::bytes_of(&problem.params),
-            pass_colors,
-            bytemuck::cast_slice(&problem.bodies),
-            bytemuck::cast_slice(&problem.masses),
-            bytemuck::cast_slice(&problem.inertias),
-            bytemuck::cast_slice(&problem.contacts),
-            bytemuck::cast_slice(&problem.points),
-            bytemuck::cast_slice(&problem.impulses),
-            bytemuck::cast_slice(&problem.colors),
-            bytemuck::cast_slice(&problem.joints),
-            bytemuck::cast_slice(&problem.joint_impulses),
-            bytemuck::bytes_of(&problem.convergence),
-            bytemuck::bytes_of(&problem.momentum),
-        ];
-        // Refused before anything is sent.
-        for (name, bytes) in BINDINGS.iter().zip(rows) {
-            if bytes.len() as u64 > limit {
-                let (mib, limit, adapter) = (bytes.len() >> 20, limit >> 20, &self.summary.name);
-                return Err(Error::TooLarge(format!(
-                    "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
-                )));
-            }
+    /// Sends every row, whatever the device has.
+    fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
+        self.check(problem, passes)?;
+        for (binding, bytes) in small_rows_of(problem) {
+            self.buffers.note(binding, &[]);
+            self.buffers.update(binding, bytes);
         }
-        for (binding, size) in (rows.len()..).zip(scratch_sizes(problem, accelerated)) {
-            self.reserve(binding, size, limit);
-        }
-        for (binding, bytes) in rows.into_iter().enumerate() {
-            self.reserve(binding, bytes.len() as u64, limit);
-            if let (Some(buffer), false) = (&self.buffers[binding], bytes.is_empty()) {
-                self.queue.write_buffer(buffer, 0, bytes);
-            }
+        for (binding, bytes) in contact_rows_of(problem) {
+            self.buffers.send(binding, bytes);
         }
         Ok(())
     }
 
-    fn reserve(&mut self, binding: usize, size: u64, limit: u64) {
-        if self.buffers[binding].as_ref().is_some_and(|b| b.size() >= size.max(16)) {
-            return;
+    /// Refuses a problem that is too large, before anything of it is sent.
+    fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
+        for (binding, bytes) in small_rows_of(problem).into_iter().chain(contact_rows_of(problem)) {
+            self.buffers.check(binding, bytes.len())?;
         }
-        let kind = if binding < shader::UNIFORMS { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(BINDINGS[binding]),
-            // Half as much again, so that a growing pile does not mean a new buffer every step.
-            size: (size + size / 2).clamp(size.max(256), limit.max(256)).next_multiple_of(16),
-            usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        self.buffers[binding] = Some(buffer);
-        self.kernels.values_mut().for_each(|k| k.bind_group = None);
+        let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
+        for (binding, size) in ((BINDINGS.len() - SCRATCH) as u32..).zip(scratch_sizes(problem, accelerated)) {
+            self.buffers.check(binding, size)?;
+            self.buffers.reserve(binding, size);
+        }
+        Ok(())
     }
 
-    fn compile(&mut self, kernel: Kernel) -> Result<()> {
-        if let Some(compiled) = self.kernels.get_mut(&kernel) {
-            if compiled.bind_group.is_none() {
-                compiled.bind_group = Some(bind(&self.device, &self.buffers, compiled));
+    /// Some programs and then the passes, ready to be submitted.
+    fn encoded(
+        &mut self,
+        problem: &StepProblem,
+        first: Vec<Dispatch>,
+        passes: &[Pass],
+    ) -> Result<wgpu::CommandEncoder> {
+        let mut all = first;
+        // Apart where each kernel is to be timed.
+        match whole::of(problem, passes).filter(|_| self.timer.is_none()) {
+            Some((program, passes)) => {
+                self.buffers.update(shader::PASSES, bytemuck::cast_slice(&passes));
+                all.push(Dispatch::over(program, 1));
             }
-            return Ok(());
+            None => {
+                let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
+                let (pass_colors, offsets) = color_ranges(passes, stride);
+                self.buffers.update(shader::PASS_COLORS, &pass_colors);
+                let of_pass = |(pass, &colors): (&Pass, &u32)| Dispatch { colors, ..dispatch_of(problem, pass) };
+                all.extend(passes.iter().zip(&offsets).map(of_pass));
+            }
         }
-        let source = shader::source(kernel);
-        let constants = shader::constants(kernel);
-        let reflected = shader::Reflected::new(&source, kernel.name(), &constants)?;
-        let layout = shader::layout(&self.device, &reflected);
-        let module = if self.exact {
-            exact::shader_module(&self.device, &reflected)?
-        } else {
-            self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(kernel.name()),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
+        for dispatch in &all {
+            self.programs.prepare(&dispatch.program, &self.buffers)?;
+        }
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.encode(&mut encoder, &all);
+        Ok(encoder)
+    }
+
+    /// Adds to the times of the kernels what they moved.
+    fn count_bytes(&mut self, problem: &StepProblem, passes: &[Pass]) {
+        for time in &mut self.times {
+            let own = passes.iter().filter(|pass| pass.kernel.name() == time.kernel);
+            time.bytes = own.map(|pass| pass.bytes_moved(problem)).sum();
+        }
+    }
+
+    /// Bytes a second that the device reads and writes when it copies a large buffer: the limit of every sweep.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub fn copy_bandwidth(&mut self) -> Result<f64> {
+        // Larger than caches are, where the adapter has such buffers.
+        let size = (self.device.limits().max_storage_buffer_binding_size).min(256 << 20);
+        let buffer = || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("bandwidth"),
+                size,
+                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
             })
         };
-        let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(kernel.name()),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.name()),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(kernel.name()),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                // In exact mode they are part of the SPIR-V already.
-                constants: if self.exact { &[] } else { &constants },
-                ..Default::default()
-            },
-            cache: None,
-        });
-        let mut compiled = CompiledKernel { pipeline, layout, bindings: reflected.bindings, bind_group: None };
-        compiled.bind_group = Some(bind(&self.device, &self.buffers, &compiled));
-        self.kernels.insert(kernel, compiled);
-        Ok(())
+        let (from, to) = (buffer(), buffer());
+        let mut seconds = |copies: u32| -> Result<f64> {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
+            let start = std::time::Instant::now();
+            self.finish(encoder, &mut [])?;
+            Ok(start.elapsed().as_secs_f64())
+        };
+        // The difference leaves out what a submission costs.
+        seconds(1)?;
+        let (few, many) = (seconds(2)?, seconds(10)?);
+        Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))
     }
 
-    fn encode(&self, problem: &StepProblem, passes: &[Pass], offsets: &[u32]) -> wgpu::CommandEncoder {
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, all: &[Dispatch]) {
         let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        let mut last = None;
-        for (pass, &offset) in passes.iter().zip(offsets) {
-            let kernel = &self.kernels[&pass.kernel];
-            if last != Some(pass.kernel) {
-                compute.set_pipeline(&kernel.pipeline);
-                last = Some(pass.kernel);
+        self.timer.iter_mut().for_each(Timer::begin);
+        for run in all.chunk_by(|a, b| a.program == b.program) {
+            if let Some(timer) = &mut self.timer {
+                timer.before(&mut compute, &run[0].program);
             }
-            let dynamic: &[u32] = if kernel.bindings.contains(&PASS_COLORS) { &[offset] } else { &[] };
-            compute.set_bind_group(0, kernel.bind_group.as_ref(), dynamic);
-            compute.dispatch_workgroups(workgroups(problem, pass), 1, 1);
+            let compiled = self.programs.get(&run[0].program);
+            compute.set_pipeline(&compiled.pipeline);
+            for dispatch in run {
+                let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };
+                compute.set_bind_group(0, &compiled.bind_group, offsets);
+                compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
+            }
         }
-        drop(compute);
-        encoder
+        if let Some(timer) = &mut self.timer {
+            timer.end(&mut compute);
+        }
     }
 
-    /// Copies what the plan changed back and waits for it.
-    fn finish(&mut self, problem: &mut StepProblem, mut encoder: wgpu::CommandEncoder) -> Result<()> {
-        let mut changed: [(u32, &mut [u8]); 5] = [
-            (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
-            (shader::IMPULSES, bytemuck::cast_slice_mut(&mut problem.impulses)),
-            (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
-            (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
-            (shader::MOMENTUM, bytemuck::bytes_of_mut(&mut problem.momentum)),
-        ];
-        let size = changed.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
-        if self.read_back.as_ref().is_none_or(|b| b.size() < size) {
-            self.read_back = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("read back"),
-                size: (size + size / 2).next_multiple_of(16),
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }));
+    /// Submits, brings the `wanted` rows back, and waits for it.
+    fn finish(&mut self, mut encoder: wgpu::CommandEncoder, wanted: &mut [(u32, &mut [u8])]) -> Result<()> {
+        let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
+        let read = self.read_back.submit(encoder, &self.buffers, wanted, times);
+        if let Some(message) = self.device_error.lock().expect("no panic holds it").take() {
+            return Err(Error::Adapter(format!("{}: {message}", self.summary.name)));
         }
-        let read_back = self.read_back.as_ref().expect("made above");
-        let mut at = 0;
-        for (binding, rows) in &changed {
-            let bytes = rows.len() as u64;
-            if let (Some(buffer), true) = (&self.buffers[*binding as usize], bytes > 0) {
-                encoder.copy_buffer_to_buffer(buffer, 0, read_back, at, bytes);
-                at += bytes;
-            }
-        }
-        self.queue.submit([encoder.finish()]);
-        let slice = read_back.slice(..size);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
-        let lost = |e: &dyn std::fmt::Display| Error::Adapter(format!("the device was lost: {e}"));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-        self.check_device()?;
-        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
-        {
-            let mapped = slice.get_mapped_range().map_err(|e| lost(&e))?;
-            let mut rest = &mapped[..];
-            for (_, rows) in &mut changed {
-                let (own, others) = rest.split_at(rows.len());
-                rows.copy_from_slice(own);
-                rest = others;
-            }
-        }
-        read_back.unmap();
+        let ticks = read.map_err(|e| Error::Adapter(format!("the device was lost: {e}")))?;
+        self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
+        let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
+        self.traffic = Traffic { up: self.buffers.take_sent(), down };
         Ok(())
     }
 
-    fn check_device(&self) -> Result<()> {
-        match self.device_error.lock().expect("no panic holds it").take() {
-            Some(message) => Err(Error::Adapter(format!("{}: {message}", self.summary.name))),
-            None => Ok(()),
+    /// Runs a step whose rows stay on the device, and brings back what moved.
+    fn follow(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+        let first = match self.rows.take().filter(|_| carry.on_device) {
+            Some(before) => {
+                self.check(problem, passes)?;
+                self.carry_over(problem, carry, before)?
+            }
+            None => {
+                self.send_all(problem, passes)?;
+                Vec::new()
+            }
+        };
+        let encoder = self.encoded(problem, first, passes)?;
+        self.finish(encoder, &mut moved_rows_of(problem))?;
+        self.count_bytes(problem, passes);
+        for (binding, bytes) in moved_rows_of(problem) {
+            self.buffers.note(binding, bytes);
         }
+        // The next step begins with begin_bodies.
+        self.states.clear();
+        self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
+        self.buffers.note(shader::BODIES, bytemuck::cast_slice(&self.states));
+        self.rows = Some(Rows::of(problem, carry));
+        Ok(())
     }
 }
 
@@ -277,51 +299,87 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let (pass_colors, offsets) = color_ranges(passes, stride);
-        let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
-        self.upload(problem, &pass_colors, accelerated)?;
-        for pass in passes {
-            self.compile(pass.kernel)?;
-        }
-        let encoder = self.encode(problem, passes, &offsets);
-        self.finish(problem, encoder)
+        self.rows = None;
+        self.send_all(problem, passes)?;
+        let encoder = self.encoded(problem, Vec::new(), passes)?;
+        let mut impulses = std::mem::take(&mut problem.impulses);
+        let mut wanted = moved_rows_of(problem);
+        wanted.push((shader::IMPULSES, bytemuck::cast_slice_mut(&mut impulses)));
+        let finished = self.finish(encoder, &mut wanted);
+        problem.impulses = impulses;
+        finished
     }
 
-    fn bytes_transferred(&self, problem: &StepProblem) -> u64 {
-        let down = size_of_val(&problem.bodies[..])
-            + size_of_val(&problem.impulses[..])
-            + size_of_val(&problem.joint_impulses[..])
-            + size_of::<ConvergenceRow>()
-            + size_of::<MomentumRow>();
-        let up = down
-            + size_of_val(&problem.masses[..])
-            + size_of_val(&problem.inertias[..])
-            + size_of_val(&problem.contacts[..])
-            + size_of_val(&problem.points[..])
-            + size_of_val(&problem.joints[..])
-            + size_of_val(&problem.colors[..]);
-        (up + down) as u64
+    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+        self.follow(problem, passes, carry)
+    }
+
+    fn keeps_rows(&self) -> bool {
+        self.rows.is_some()
+    }
+
+    fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
+        match self.rows {
+            Some(rows) if !rows.fetched => self.fetch_rows(problem, rows),
+            _ => Ok(()),
+        }
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    fn time_kernels(&mut self) -> Result<Option<f64>> {
+        let bandwidth = self.copy_bandwidth()?;
+        self.timer = Timer::new(&self.device, &self.queue);
+        Ok(self.timer.as_ref().map(|_| bandwidth))
+    }
+
+    fn kernel_times(&self) -> &[KernelTime] {
+        &self.times
     }
 }
 
-fn bind(device: &wgpu::Device, buffers: &[Option<wgpu::Buffer>], kernel: &CompiledKernel) -> wgpu::BindGroup {
-    let entry = |&binding: &u32| {
-        let buffer = buffers[binding as usize].as_ref().expect("every buffer is made before a kernel is bound");
-        let size = (binding == PASS_COLORS).then(|| wgpu::BufferSize::new(size_of::<PassColors>() as u64)).flatten();
-        let resource = wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size });
-        wgpu::BindGroupEntry { binding, resource }
-    };
-    let entries: Vec<_> = kernel.bindings.iter().map(entry).collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &kernel.layout, entries: &entries })
+/// Rows of which a step changes little.
+fn small_rows_of(problem: &StepProblem) -> [(u32, &[u8]); 9] {
+    [
+        (shader::PARAMS, bytemuck::bytes_of(&problem.params)),
+        (shader::BODIES, bytemuck::cast_slice(&problem.bodies)),
+        (shader::MASSES, bytemuck::cast_slice(&problem.masses)),
+        (shader::INERTIAS, bytemuck::cast_slice(&problem.inertias)),
+        (shader::COLORS, bytemuck::cast_slice(&problem.colors)),
+        (shader::JOINTS, bytemuck::cast_slice(&problem.joints)),
+        (shader::JOINT_IMPULSES, bytemuck::cast_slice(&problem.joint_impulses)),
+        (shader::CONVERGENCE, bytemuck::bytes_of(&problem.convergence)),
+        (shader::MOMENTUM, bytemuck::bytes_of(&problem.momentum)),
+    ]
+}
+
+/// Rows that follow the contacts: most of a problem.
+fn contact_rows_of(problem: &StepProblem) -> [(u32, &[u8]); 3] {
+    [
+        (shader::CONTACTS, bytemuck::cast_slice(&problem.contacts)),
+        (shader::POINTS, bytemuck::cast_slice(&problem.points)),
+        (shader::IMPULSES, bytemuck::cast_slice(&problem.impulses)),
+    ]
+}
+
+/// Rows that the processor asks for after every step.
+fn moved_rows_of(problem: &mut StepProblem) -> Vec<(u32, &mut [u8])> {
+    vec![
+        (shader::BODIES, bytemuck::cast_slice_mut(&mut problem.bodies)),
+        (shader::JOINT_IMPULSES, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
+        (shader::CONVERGENCE, bytemuck::bytes_of_mut(&mut problem.convergence)),
+        (shader::MOMENTUM, bytemuck::bytes_of_mut(&mut problem.momentum)),
+    ]
 }
 
 /// Bytes of the buffers that stay on the device: all but the first are for accelerated sweeps.
-fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [u64; SCRATCH] {
+fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [usize; SCRATCH] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };
     let sums = size_of::<StepLength<f32>>() * impulses.div_ceil(CHUNK);
-    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums].map(|bytes| bytes as u64)
+    [SCRATCH_ROW * bodies, SCRATCH_ROW * before, SCRATCH_ROW * impulses, sums]
 }
 
 /// The distinct color ranges of the passes, `stride` bytes apart, and where each pass finds its own.
@@ -341,9 +399,8 @@ fn color_ranges(passes: &[Pass], stride: usize) -> (Vec<u8>, Vec<u32>) {
     (bytes, offsets)
 }
 
-/// Workgroups of a pass: one for several colors, which it sweeps in turn; else enough for every row, up to the limit of a
-/// dispatch, beyond which each thread takes several.
-fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
+/// One workgroup sweeps several colors, one after another; else there are enough for every row.
+fn dispatch_of(problem: &StepProblem, pass: &Pass) -> Dispatch {
     let rows = match pass.kernel {
         Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
@@ -355,5 +412,5 @@ fn workgroups(problem: &StepProblem, pass: &Pass) -> u32 {
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     };
-    (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535)
+    Dispatch::over(Program::Pass(pass.kernel), rows)
 }

@@ -1,9 +1,11 @@
 //! From WGSL to what a pipeline needs: a shader is a list of parts, its layout what its entry point uses.
 
+use std::sync::Arc;
+
 use naga::back::spv;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
-use super::exact;
+use super::{exact, whole};
 use crate::config::FrictionRule;
 use crate::error::{Error, Result};
 use crate::kernels::Rules;
@@ -29,6 +31,9 @@ pub const BINDINGS: [&str; 17] = [
     "impulse_steps",
     "lengths",
 ];
+/// The bindings that carry rows from step to step, and that of a plan that one workgroup follows; their numbers follow on.
+pub const CARRY_BINDINGS: [&str; 8] =
+    ["carry", "places", "origins", "contacts_before", "points_before", "impulses_before", "separations", "passes"];
 /// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
 /// sweeps leave for each other.
 pub const SCRATCH: usize = 4;
@@ -36,18 +41,48 @@ pub const SCRATCH: usize = 4;
 pub const SCRATCH_ROW: usize = 32;
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;
+/// The same for all.
+pub const PARAMS: u32 = 0;
 /// The colors of a pass, at an offset of their own for each.
 pub const PASS_COLORS: u32 = 1;
 /// State, read back.
 pub const BODIES: u32 = 2;
-/// Impulses of the points, read back.
+/// Masses.
+pub const MASSES: u32 = 3;
+/// Principal inertia.
+pub const INERTIAS: u32 = 4;
+/// Manifolds.
+pub const CONTACTS: u32 = 5;
+/// Their points.
+pub const POINTS: u32 = 6;
+/// Impulses of the points, read back when somebody asks.
 pub const IMPULSES: u32 = 7;
+/// Where colors begin.
+pub const COLORS: u32 = 8;
+/// Joints.
+pub const JOINTS: u32 = 9;
 /// Impulses of the joints, read back.
 pub const JOINT_IMPULSES: u32 = 10;
 /// Whether the sweeps still move anything, read back.
 pub const CONVERGENCE: u32 = 11;
 /// How far the sweeps extrapolate, read back.
 pub const MOMENTUM: u32 = 12;
+/// What [`CARRY_BINDINGS`] is about, the same for all.
+pub const CARRY: u32 = 17;
+/// Where each contact was.
+pub const PLACES: u32 = 18;
+/// Where the impulses were of those that were computed since.
+pub const ORIGINS: u32 = 19;
+/// Rows of the step before.
+pub const CONTACTS_BEFORE: u32 = 20;
+/// Rows of the step before.
+pub const POINTS_BEFORE: u32 = 21;
+/// Rows of the step before.
+pub const IMPULSES_BEFORE: u32 = 22;
+/// How far the points are apart when the step begins.
+pub const SEPARATIONS: u32 = 23;
+/// The passes of a plan that one workgroup follows.
+pub const PASSES: u32 = 24;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
@@ -58,8 +93,61 @@ macro_rules! part {
     };
 }
 
+/// What a pipeline runs.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Program {
+    /// A kernel of a plan.
+    Pass(Kernel),
+    /// All kernels of a plan, whose passes one workgroup of so many threads follows.
+    Whole(Arc<[Kernel]>, u32),
+    /// Bodies begin a step; before the plan, as the others.
+    BeginBodies,
+    /// Rows of contacts are brought to their places.
+    CarryContacts,
+    /// Contacts begin a step.
+    BeginContacts,
+}
+
+impl Program {
+    /// Those that are not kernels of plans.
+    pub const CARRY: [Self; 3] = [Self::BeginBodies, Self::CarryContacts, Self::BeginContacts];
+
+    /// Name of the shader file and of its entry point.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Pass(kernel) => kernel.name(),
+            Self::Whole(..) => "whole_step",
+            Self::BeginBodies => "begin_bodies",
+            Self::CarryContacts => "carry_contacts",
+            Self::BeginContacts => "begin_contacts",
+        }
+    }
+
+    /// Its WGSL.
+    pub fn source(&self) -> String {
+        let own = match self {
+            Self::Pass(kernel) => return source(*kernel),
+            Self::Whole(kernels, threads) => return whole::source(kernels, *threads),
+            Self::BeginBodies => part!("carry/begin_bodies"),
+            Self::CarryContacts => part!("carry/carry_contacts"),
+            Self::BeginContacts => part!("carry/begin_contacts"),
+        };
+        [part!("lib/types"), part!("lib/math"), part!("carry/bindings"), own].join("\n")
+    }
+
+    /// Its overrides.
+    pub fn constants(&self) -> Vec<(&'static str, f64)> {
+        if let Self::Pass(kernel) = self { constants(*kernel) } else { Vec::new() }
+    }
+}
+
 /// The WGSL of a kernel: the parts it is made of, one after another.
 pub fn source(kernel: Kernel) -> String {
+    [part!("lib/types"), part!("lib/bindings"), part!("lib/math"), &own_source(kernel)].join("\n")
+}
+
+/// What of the WGSL of a kernel is not the same for all.
+pub(super) fn own_source(kernel: Kernel) -> String {
     let own: &[&str] = match kernel {
         Kernel::IntegrateVelocities { .. } => &[part!("integrate_velocities")],
         Kernel::IntegrateGyroscopic => &[part!("integrate_gyroscopic")],
@@ -81,8 +169,7 @@ pub fn source(kernel: Kernel) -> String {
         ],
         Kernel::ApplyRestitution(_) => &[part!("lib/pair"), part!("apply_restitution")],
     };
-    let shared = [part!("lib/types"), part!("lib/bindings"), part!("lib/math")];
-    [&shared[..], own].concat().join("\n")
+    own.join("\n")
 }
 
 /// The overrides of a kernel, as its source has them.

@@ -1,0 +1,37 @@
+// begin_contacts: one thread lets one manifold begin a step: how far its points are apart now, less its preload, which follows
+// from the impulses that it carries. Reads separations, masses. Writes contacts, points, impulses; one thread a manifold.
+// Doubles: Writer::write in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
+
+fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+    let compliance = select(carry.preload.fixed_compliance, carry.preload.movable_compliance, both_movable);
+    let sag = pressed * compliance * reciprocal(mass);
+    // What is borne no more is not held up either.
+    return smaller(before + carry.preload.share * (sag - before), 2.0 * sag);
+}
+
+fn begin_contact(i: u32) {
+    let contact = contacts[i];
+    let end = contact.first_point + contact.point_count;
+    let both_movable = masses[contact.body_a].inv_mass > 0.0 && masses[contact.body_b].inv_mass > 0.0;
+    var pressed = 0.0;
+    var mass = 0.0;
+    for (var k = contact.first_point; k < end; k++) {
+        pressed += impulses[k].normal;
+        mass += points[k].normal_mass;
+    }
+    let preload = preloaded(contact.preload, both_movable, pressed, mass);
+    contacts[i].preload = preload;
+    for (var k = contact.first_point; k < end; k++) { points[k].separation = separations[k] - preload; }
+    for (var k = contact.first_point; k < end + carry.patches; k++) {
+        if carry.preload.warm_start == 1u {
+            impulses[k].peak = 0.0;
+        } else {
+            impulses[k] = Impulse(0.0, 0.0, 0.0, 0.0);
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn begin_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var i = id.x; i < carry.contact_count; i += groups.x * WORKGROUP) { begin_contact(i); }
+}

@@ -1,0 +1,151 @@
+//! The buffers of a device: one for each binding, grown when rows need it, and what of their content is known here.
+
+use super::shader::{BINDINGS, CARRY_BINDINGS};
+use crate::error::{Error, Result};
+
+/// Bytes that are compared, and sent, together.
+const BLOCK: usize = 1024;
+
+/// The buffers of a device.
+pub(super) struct Buffers {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    adapter: String,
+    /// Largest buffer that a kernel can be given [B].
+    limit: u64,
+    slots: Vec<Slot>,
+    /// Grows whenever a binding has another buffer, so that bind groups are no longer valid.
+    pub generation: u64,
+    sent: u64,
+}
+
+#[derive(Default)]
+struct Slot {
+    buffer: Option<wgpu::Buffer>,
+    /// What the buffer begins with, as far as that is known.
+    known: Vec<u8>,
+}
+
+impl Buffers {
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String) -> Self {
+        let slots = (0..BINDINGS.len() + CARRY_BINDINGS.len()).map(|_| Slot::default()).collect();
+        let limit = device.limits().max_storage_buffer_binding_size;
+        Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
+    }
+
+    /// The buffer of a binding.
+    pub fn get(&self, binding: u32) -> &wgpu::Buffer {
+        self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
+    }
+
+    /// Refuses rows that no buffer holds.
+    pub fn check(&self, binding: u32, bytes: usize) -> Result<()> {
+        if bytes as u64 <= self.limit {
+            return Ok(());
+        }
+        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, name(binding));
+        Err(Error::TooLarge(format!(
+            "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
+        )))
+    }
+
+    /// Makes room for `size` bytes; what the buffer held may be lost.
+    pub fn reserve(&mut self, binding: u32, size: usize) {
+        let size = size as u64;
+        let slot = &mut self.slots[binding as usize];
+        if slot.buffer.as_ref().is_some_and(|b| b.size() >= size.max(16)) {
+            return;
+        }
+        slot.known.clear();
+        slot.buffer = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name(binding)),
+            // Half as much again, so that a growing pile does not mean a new buffer every step.
+            size: (size + size / 2).clamp(size.max(256), self.limit.max(256)).next_multiple_of(16),
+            usage: wgpu::BufferUsages::UNIFORM
+                | wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_DST
+                | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        }));
+        self.generation += 1;
+    }
+
+    /// Makes room for `bytes` after the first `kept` bytes of a buffer, and sends them there.
+    pub fn append(&mut self, binding: u32, kept: usize, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        let before = self.slots[binding as usize].buffer.clone();
+        self.reserve(binding, kept + bytes.len());
+        if let Some(before) = before.filter(|b| b != self.get(binding)) {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.copy_buffer_to_buffer(&before, 0, self.get(binding), 0, kept as u64);
+            self.queue.submit([encoder.finish()]);
+        }
+        self.write(binding, kept, bytes);
+    }
+
+    /// Sends rows that begin at the byte `at`.
+    pub fn write(&mut self, binding: u32, at: usize, bytes: &[u8]) {
+        self.queue.write_buffer(self.get(binding), at as u64, bytes);
+        self.sent += bytes.len() as u64;
+    }
+
+    /// Bytes sent since this was last asked.
+    pub fn take_sent(&mut self) -> u64 {
+        std::mem::take(&mut self.sent)
+    }
+
+    /// Sends all rows of a binding.
+    pub fn send(&mut self, binding: u32, bytes: &[u8]) {
+        self.reserve(binding, bytes.len());
+        if !bytes.is_empty() {
+            self.write(binding, 0, bytes);
+        }
+    }
+
+    /// Sends those rows of a binding that the device does not have yet.
+    pub fn update(&mut self, binding: u32, bytes: &[u8]) {
+        self.reserve(binding, bytes.len());
+        let mut known = std::mem::take(&mut self.slots[binding as usize].known);
+        let same = |at: usize| {
+            let end = (at + BLOCK).min(bytes.len());
+            known.get(at..end) == Some(&bytes[at..end])
+        };
+        let mut begin = None;
+        for at in (0..bytes.len()).step_by(BLOCK) {
+            match (same(at), begin) {
+                (false, None) => begin = Some(at),
+                (true, Some(from)) => {
+                    self.write(binding, from, &bytes[from..at]);
+                    begin = None;
+                }
+                _ => {}
+            }
+        }
+        if let Some(from) = begin {
+            self.write(binding, from, &bytes[from..]);
+        }
+        known.clear();
+        known.extend_from_slice(bytes);
+        self.slots[binding as usize].known = known;
+    }
+
+    /// Notes what a buffer holds: nothing that is known, if `bytes` are none.
+    pub fn note(&mut self, binding: u32, bytes: &[u8]) {
+        let known = &mut self.slots[binding as usize].known;
+        known.clear();
+        known.extend_from_slice(bytes);
+    }
+
+    /// Exchanges the buffers of two bindings.
+    pub fn swap(&mut self, a: u32, b: u32) {
+        self.slots.swap(a as usize, b as usize);
+        self.generation += 1;
+    }
+}
+
+fn name(binding: u32) -> &'static str {
+    let binding = binding as usize;
+    BINDINGS.get(binding).copied().unwrap_or_else(|| CARRY_BINDINGS[binding - BINDINGS.len()])
+}

@@ -1,0 +1,76 @@
+//! From the buffers of a device to memory, through one buffer that both can reach.
+
+use super::buffers::Buffers;
+
+/// A buffer that the device writes and the processor reads.
+///
+/// One is enough: every read-back is waited for before the next submission, since the next step begins with the poses.
+pub(super) struct ReadBack {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    staging: Option<wgpu::Buffer>,
+}
+
+/// Why nothing could be read.
+pub(super) type Lost = Box<dyn std::fmt::Display>;
+
+impl ReadBack {
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self { device, queue, staging: None }
+    }
+
+    /// Submits what is encoded, with copies of the `wanted` bindings and of `more` bytes of another buffer at its end, waits, and
+    /// writes what was copied to `wanted`; returns the rest as numbers.
+    pub fn submit(
+        &mut self,
+        mut encoder: wgpu::CommandEncoder,
+        buffers: &Buffers,
+        wanted: &mut [(u32, &mut [u8])],
+        more: Option<(&wgpu::Buffer, u64)>,
+    ) -> Result<Vec<u64>, Lost> {
+        let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
+        // What is copied into numbers begins where they may.
+        let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
+        if self.staging.as_ref().is_none_or(|b| b.size() < size) {
+            self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read back"),
+                size: (size + size / 2).next_multiple_of(16).max(16),
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        let staging = self.staging.as_ref().expect("made above");
+        let mut at = 0;
+        for (binding, rows) in wanted.iter().filter(|w| !w.1.is_empty()) {
+            encoder.copy_buffer_to_buffer(buffers.get(*binding), 0, staging, at, rows.len() as u64);
+            at += rows.len() as u64;
+        }
+        if let Some((buffer, bytes)) = more {
+            encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
+        }
+        self.queue.submit([encoder.finish()]);
+        let lost = |e: &dyn std::fmt::Display| -> Lost { Box::new(e.to_string()) };
+        if size == 0 {
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
+            return Ok(Vec::new());
+        }
+        let slice = staging.slice(..size);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
+        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
+        let numbers;
+        {
+            let mapped = slice.get_mapped_range().map_err(|e| lost(&e))?;
+            let mut rest = &mapped[..];
+            for (_, rows) in wanted {
+                let (own, others) = rest.split_at(rows.len());
+                rows.copy_from_slice(own);
+                rest = others;
+            }
+            numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
+        }
+        staging.unmap();
+        Ok(numbers)
+    }
+}

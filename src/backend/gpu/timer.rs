@@ -1,0 +1,89 @@
+//! How long each program takes, by the device's own clock, where it has one that can be asked inside a pass.
+//!
+//! Only when asked for: the software adapter ends what it is doing at every timestamp, and a step of a tower of ten took 2.6
+//! times as long with them.
+
+use std::time::Duration;
+
+use super::shader::Program;
+use crate::stats::KernelTime;
+
+/// What the adapter must have for it.
+pub(super) const FEATURES: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+
+/// Runs of one program that are timed in one submission: one less than the queries that a set can have.
+const MOST: u32 = 4095;
+
+/// Timestamps of one submission.
+pub(super) struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    /// Length of a tick [ns].
+    period: f32,
+    /// Name of the program of each run.
+    runs: Vec<&'static str>,
+}
+
+impl Timer {
+    /// None if the device has no such clock.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Self> {
+        if !device.features().contains(FEATURES) {
+            return None;
+        }
+        let queries = device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("times"),
+            ty: wgpu::QueryType::Timestamp,
+            count: MOST + 1,
+        });
+        let resolved = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times"),
+            size: u64::from(MOST + 1) * wgpu::QUERY_SIZE as u64,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        Some(Self { queries, resolved, period: queue.get_timestamp_period(), runs: Vec::new() })
+    }
+
+    /// Forgets the last submission.
+    pub fn begin(&mut self) {
+        self.runs.clear();
+    }
+
+    /// Notes the time before a run of `program`. Of a submission with more runs than there are queries the first are timed.
+    pub fn before(&mut self, pass: &mut wgpu::ComputePass, program: &Program) {
+        if self.runs.len() < MOST as usize {
+            pass.write_timestamp(&self.queries, self.runs.len() as u32);
+            self.runs.push(program.name());
+        }
+    }
+
+    /// Notes the time after the last run.
+    pub fn end(&self, pass: &mut wgpu::ComputePass) {
+        pass.write_timestamp(&self.queries, self.runs.len() as u32);
+    }
+
+    /// Brings the times to a buffer that can be copied from; gives it, and how many bytes of it there are.
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) -> Option<(&wgpu::Buffer, u64)> {
+        if self.runs.is_empty() {
+            return None;
+        }
+        let count = self.runs.len() as u32 + 1;
+        encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+        Some((&self.resolved, u64::from(count) * wgpu::QUERY_SIZE as u64))
+    }
+
+    /// Time of each program, in the order in which they first ran, from what was read back.
+    pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
+        let mut times: Vec<KernelTime> = Vec::new();
+        for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)) {
+            let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(self.period);
+            let time = Duration::from_nanos(nanoseconds as u64);
+            match times.iter_mut().find(|t| t.kernel == kernel) {
+                Some(known) => known.time += time,
+                None => times.push(KernelTime { kernel, time, bytes: 0 }),
+            }
+        }
+        times
+    }
+}

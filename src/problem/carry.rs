@@ -1,0 +1,71 @@
+//! How the rows of contacts follow from those of the step before, for a backend that keeps them on a device.
+//!
+//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels: the
+//! device moves them to the places of the next step by a map. Only the rows of manifolds that were computed since are sent,
+//! with the places that their impulses had, and how far the surfaces of all others are apart now.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::math::{reciprocal, smaller};
+
+/// What a backend has to know to go on from its own rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Carry {
+    /// Whether the device has the rows of the step before, and they alone have its impulses and preloads. Else the problem
+    /// is complete, and nothing else here counts.
+    pub on_device: bool,
+    /// Row in the step before of each contact, [`NO_ROW`] for one that was computed since; empty if every row is in its place.
+    pub rows_before: Vec<u32>,
+    /// Those that were computed since, ascending.
+    pub computed: Vec<Origin>,
+    /// Whether more than the separations of reused points follows the bodies: the velocity of an approach, the slip.
+    pub approach: bool,
+    /// What preloads follow from.
+    pub preload: Preload,
+}
+
+/// No row at all.
+pub const NO_ROW: u32 = u32::MAX;
+
+/// Where the impulses of a contact that was computed anew were in the step before; [`NO_ROW`] for nowhere. 24 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct Origin {
+    /// Its row now.
+    pub row: u32,
+    /// Its row then.
+    pub contact: u32,
+    /// Where each of its points was in `points` and `impulses`.
+    pub points: [u32; 4],
+}
+
+/// What the preloads of a step follow from, 16 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Preload {
+    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move [s].
+    pub movable_compliance: f32,
+    /// The same of contacts with bodies that cannot [s].
+    pub fixed_compliance: f32,
+    /// Share of what is missing that preloads gain in this step.
+    pub share: f32,
+    /// 1 if impulses are carried over, 0 if every step begins without.
+    pub warm_start: u32,
+}
+
+/// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
+const LARGEST_PRELOAD: f32 = 2.0;
+
+/// How much a contact is preloaded that was so by `before`, when its points of `mass` together were `pressed` by their normal
+/// impulses: a contact of two bodies that can move, or of one that cannot with one that can. Double of the function of the same
+/// name in `shaders/begin_contacts.wgsl`.
+///
+/// At rest its springs are compressed by what it bears: the overlap of a soft contact, springs side by side. That much its
+/// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are
+/// for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
+pub(super) fn preloaded(by: &Preload, before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+    let compliance = if both_movable { by.movable_compliance } else { by.fixed_compliance };
+    let sag = pressed * compliance * reciprocal(mass);
+    // What is borne no more is not held up either.
+    smaller(before + by.share * (sag - before), LARGEST_PRELOAD * sag)
+}

@@ -1,0 +1,235 @@
+//! Rows that stay on a device from step to step: the reference's to the last bit when somebody asks, and hardly anything
+//! travels.
+
+mod common;
+
+use common::gpu::gpu;
+use drystone::compare::Difference;
+use drystone::plan::Pass;
+use drystone::problem::carry::Carry;
+use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
+use drystone::stats::Traffic;
+use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem};
+
+fn simulation(scene: &Scene, config: &SolverConfig, backend: Box<dyn Backend>) -> Simulation {
+    Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings")
+}
+
+fn pile(n: usize) -> Scene {
+    Scene::find("pile", &[format!("n={n}")]).expect("a scene of the catalogue")
+}
+
+/// Everything that a step leaves behind, as bytes.
+fn rows(problem: &StepProblem) -> [&[u8]; 5] {
+    [
+        bytemuck::cast_slice(&problem.bodies),
+        bytemuck::cast_slice(&problem.contacts),
+        bytemuck::cast_slice(&problem.points),
+        bytemuck::cast_slice(&problem.impulses),
+        bytemuck::cast_slice(&problem.joint_impulses),
+    ]
+}
+
+/// The reference and a GPU in exact mode on the same scene; none where there is no such GPU.
+fn both(scene: &Scene, config: &SolverConfig) -> Option<[Simulation; 2]> {
+    let gpu = gpu(true).filter(drystone::Gpu::is_exact)?;
+    Some([simulation(scene, config, Box::new(Reference::<f32>::new())), simulation(scene, config, Box::new(gpu))])
+}
+
+fn assert_together([ours, theirs]: &[Simulation; 2], what: &str) {
+    let apart = Difference::between(&ours.world, &theirs.world);
+    assert_eq!(apart.bodies, 0, "{what}: {apart:?}");
+}
+
+fn assert_same(both: &mut [Simulation; 2], what: &str) {
+    assert_together(both, what);
+    let [ours, theirs] = both;
+    let (ours, theirs) = (ours.problem(), theirs.problem());
+    assert_eq!(rows(ours), rows(theirs), "{what}");
+}
+
+#[test]
+fn what_is_asked_for_has_the_bits_of_the_reference() {
+    let scene = pile(100);
+    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    let (mut computed, mut reused) = (0, 0);
+    for step in 1..=120 {
+        let stats = both.each_mut().map(|s| s.step(scene.dt).expect("a step"));
+        computed += stats[1].computed;
+        reused += stats[1].pairs - stats[1].computed;
+        let what = format!("step {step}");
+        // Asked for seldom, so that rows stay for several steps.
+        match step % 12 {
+            0 => assert_same(&mut both, &what),
+            4 => {
+                let pairs = both.each_mut().map(|s| s.pairs().map(|pair| format!("{pair:?}")).collect::<Vec<_>>());
+                assert_eq!(pairs[0], pairs[1], "{what}");
+            }
+            // Detections between two steps.
+            7 => {
+                let deepest = both.each_mut().map(|s| s.penetration().max);
+                assert_eq!(deepest[0].to_bits(), deepest[1].to_bits(), "{what}");
+            }
+            // A step that is assembled and not run.
+            9 => drop(both.each_mut().map(|s| s.next_problem(scene.dt).0.contacts.len())),
+            _ => {}
+        }
+    }
+    assert!(computed > 100 && reused > 1000, "{computed} computed, {reused} reused: hardly a test");
+}
+
+#[test]
+fn what_somebody_changes_between_two_steps_reaches_the_device() {
+    let scene = pile(60);
+    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    for step in 1..=100 {
+        for simulation in &mut both {
+            match step {
+                40 => simulation.world.bodies[30].linear_velocity.y += 3.0,
+                50 => simulation.world.bodies[40].position.y += 0.01,
+                60 => simulation.world.bodies[20].force.x = 1e4,
+                70 => simulation.world.gravity.x = 2.0,
+                80 => simulation.set_config(SolverConfig { substeps: 4, ..SolverConfig::default() }).expect("good"),
+                90 => {
+                    simulation.set_config(SolverConfig { warm_start: false, ..SolverConfig::default() }).expect("good")
+                }
+                _ => {}
+            }
+            simulation.step(scene.dt).expect("a step");
+        }
+        if step % 10 == 3 {
+            assert_same(&mut both, &format!("step {step}"));
+        }
+    }
+}
+
+#[test]
+fn islands_fall_asleep_and_wake_with_their_impulses() {
+    let mut scene = pile(60);
+    // Touches nothing, so that there is something to do while all others sleep.
+    scene.world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1e3, 1e3, 0.0));
+    let config = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
+    let Some(mut both) = both(&scene, &config) else { return };
+    let mut fewest = [usize::MAX; 2];
+    for step in 1..=420 {
+        for simulation in &mut both {
+            if step == 400 {
+                simulation.world.bodies[30].linear_velocity.y += 2.0;
+            }
+            let stats = simulation.step(scene.dt).expect("a step");
+            let phase = usize::from(step >= 400);
+            fewest[phase] = fewest[phase].min(if step > 200 { stats.manifolds } else { usize::MAX });
+        }
+        assert_together(&both, &format!("step {step}"));
+    }
+    println!("{fewest:?} manifolds at least, before and after something is pushed");
+    assert!(fewest[0] < fewest[1], "nothing slept, or nothing woke: {fewest:?}");
+    assert_same(&mut both, "at the end");
+}
+
+#[test]
+fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
+    let scene = pile(60);
+    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    for step in 1..=60 {
+        if step == 40 {
+            both[1].set_backend(Box::new(Reference::<f32>::new()));
+        }
+        both.iter_mut().for_each(|s| drop(s.step(scene.dt).expect("a step")));
+    }
+    assert_same(&mut both, "at the end");
+}
+
+/// A GPU whose map of rows has a mistake.
+struct Confused(drystone::Gpu);
+
+impl Backend for Confused {
+    fn name(&self) -> &'static str {
+        "confused"
+    }
+    fn adapter(&self) -> String {
+        self.0.adapter()
+    }
+    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+        self.0.run(problem, passes)
+    }
+    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+        let mut carry = carry.clone();
+        if carry.rows_before.len() > 1 {
+            carry.rows_before.swap(0, 1);
+        }
+        self.0.step(problem, passes, &carry)
+    }
+    fn keeps_rows(&self) -> bool {
+        self.0.keeps_rows()
+    }
+    fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
+        self.0.fetch(problem)
+    }
+}
+
+#[test]
+fn two_rows_in_each_others_places_are_found() {
+    let scene = pile(60);
+    let Some([mut ours, _]) = both(&scene, &SolverConfig::default()) else { return };
+    let Some(gpu) = gpu(true) else { return };
+    let mut theirs = simulation(&scene, &SolverConfig::default(), Box::new(Confused(gpu)));
+    for _ in 0..80 {
+        ours.step(scene.dt).expect("a step");
+        theirs.step(scene.dt).expect("a step");
+    }
+    assert_ne!(rows(ours.problem()), rows(theirs.problem()));
+}
+
+/// What each of the last steps of a scene moved to the device and back, and the simulation.
+fn traffic_of(scene: &Scene, steps: u32, last: u32) -> Option<(Vec<Traffic>, Simulation)> {
+    let mut simulation = simulation(scene, &SolverConfig::default(), Box::new(gpu(false)?));
+    let mut all: Vec<_> = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
+    Some((all.split_off((steps - last) as usize), simulation))
+}
+
+/// Bytes of all rows of a problem.
+fn all_rows(problem: &StepProblem) -> usize {
+    rows(problem).map(<[u8]>::len).iter().sum::<usize>() + size_of_val(&problem.masses[..])
+}
+
+/// What comes back from every step.
+fn moved(problem: &StepProblem) -> u64 {
+    (size_of_val(&problem.bodies[..]) + size_of::<ConvergenceRow>() + size_of::<MomentumRow>()) as u64
+}
+
+#[test]
+fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() {
+    let scene = pile(200);
+    let Some((first, mut simulation)) = traffic_of(&scene, 1, 1) else { return };
+    assert!(first[0].up as usize >= all_rows(simulation.problem()), "{first:?}");
+    let Some((settled, mut simulation)) = traffic_of(&scene, 400, 10) else { return };
+    let problem = simulation.problem();
+    let separations = size_of_val(&problem.points[..]) / size_of::<PointRow>() * size_of::<f32>();
+    let least = settled.iter().map(|t| t.up).min().expect("ten steps") as usize;
+    let (all, contacts) = (all_rows(problem), problem.contacts.len());
+    println!("{contacts} manifolds: {least} B up of {all} B of rows, {separations} B of them separations");
+    // Nothing but separations and the words of the carry itself.
+    assert!((separations..separations + 512).contains(&least), "{settled:?}");
+    assert!(settled.iter().all(|t| t.down == moved(problem)), "{settled:?}");
+    assert!(least * 20 < all);
+}
+
+#[test]
+fn a_falling_pile_sends_what_was_computed_and_where_the_rest_was() {
+    let scene = pile(200);
+    let mut steps = 0;
+    let Some((_, mut simulation)) = traffic_of(&scene, 60, 1) else { return };
+    for _ in 0..30 {
+        let stats = simulation.step(scene.dt).expect("a step");
+        let (manifolds, points) = (stats.manifolds, stats.points);
+        // A place and separations for all, rows and an origin for those that were computed.
+        let computed =
+            stats.computed * (size_of::<ContactRow>() + 4 * (size_of::<PointRow>() + size_of::<ImpulseRow>()) + 24);
+        let most = manifolds * 8 + points * 4 + computed + 1024;
+        assert!(stats.traffic.up as usize <= most, "{:?} of {most}: {stats:?}", stats.traffic);
+        assert_eq!(stats.traffic.down as usize, simulation.world.bodies.len() * size_of::<BodyRow>() + 32);
+        steps += usize::from(stats.computed > 0 && stats.computed < stats.pairs);
+    }
+    assert!(steps > 10, "in {steps} steps only some were computed");
+}
