@@ -4,7 +4,7 @@
 //! workgroup, no optional features), except for the size of buffers, which are asked for as large as the adapter has them.
 //!
 //! [`Backend::run`] takes a problem as a value: everything is sent, and everything that the plan changes comes back.
-//! [`Backend::step`] goes on from the rows that the step before left on the device ([`carry`]): what changed is sent, poses and
+//! [`Backend::step`] goes on from the rows that the step before left on the device (`carry.rs`): what changed is sent, poses and
 //! velocities come back, and the impulses stay until somebody asks.
 //!
 //! A step is one submission and one read-back, and is waited for: detection, with which the next step begins, asks for the
@@ -183,6 +183,7 @@ impl Gpu {
                 all.extend(passes.iter().zip(&offsets).map(of_pass));
             }
         }
+        self.traffic.dispatches = all.len();
         for dispatch in &all {
             self.programs.prepare(&dispatch.program, &self.buffers)?;
         }
@@ -258,7 +259,7 @@ impl Gpu {
         let ticks = read.map_err(|e| Error::Adapter(format!("the device was lost: {e}")))?;
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
-        self.traffic = Traffic { up: self.buffers.take_sent(), down };
+        self.traffic = Traffic { up: self.buffers.take_sent(), down, ..self.traffic };
         Ok(())
     }
 
