@@ -225,11 +225,14 @@ mod tests {
         assert!((150.0..500.0).contains(&operations()), "{}", operations());
     }
 
+    // How much of the peak is reached says nothing on a machine that has other things to do.
     #[test]
-    fn a_sweep_reaches_less_than_the_peak_of_its_threads() {
+    fn every_limit_is_measured_for_every_number_of_threads() {
         let rows = limits(200, &[1, 2], 3, &mut || ()).expect("a measurement");
+        assert_eq!(rows.iter().map(|r| r.threads).collect::<Vec<_>>(), [1, 2]);
         for row in rows {
-            assert!(row.points > 500 && row.sweeps > 0.0 && row.of_peak() < 1.0, "{row:?}");
+            assert!(row.points > 500 && row.sweeps > 0.0 && row.peak > 0.0, "{row:?}");
+            assert_eq!(row.of_peak(), row.sweeps * row.operations / row.peak);
             assert!(row.triads.iter().all(|t| t.1 > 0.0), "{row:?}");
         }
     }
