@@ -350,7 +350,10 @@ fn a_scene_is_found_by_the_path_of_its_file_and_named_after_it() {
 #[test]
 fn what_is_neither_a_scene_nor_a_file_is_met_with_the_scenes_there_are() {
     let line = Scene::find("piles", &[]).expect_err("no scene").to_string();
-    assert!(line.starts_with("\"piles\" is neither a scene (pile, pyramid, tower, wall, drop, "), "{line}");
+    assert!(
+        line.starts_with("\"piles\" is neither a scene (pile, pyramid, many-pyramids, tower, wall, drop, "),
+        "{line}"
+    );
     assert!(line.ends_with(") nor a scene file"), "{line}");
     assert!(matches!(Scene::find("piles.json", &[]), Err(Error::File { .. })));
 }
