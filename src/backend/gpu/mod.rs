@@ -161,16 +161,17 @@ impl Gpu {
         Ok(())
     }
 
-    /// Some programs and then the passes, ready to be submitted.
+    /// Some programs and then the passes, ready to be submitted; the passes of a small world `together`, in one dispatch.
     fn encoded(
         &mut self,
         problem: &StepProblem,
         first: Vec<Dispatch>,
         passes: &[Pass],
+        together: bool,
     ) -> Result<wgpu::CommandEncoder> {
         let mut all = first;
         // Apart where each kernel is to be timed.
-        match whole::of(problem, passes).filter(|_| self.timer.is_none()) {
+        match whole::of(problem, passes).filter(|_| together && self.timer.is_none()) {
             Some((program, passes)) => {
                 self.buffers.update(shader::PASSES, bytemuck::cast_slice(&passes));
                 all.push(Dispatch::over(program, 1));
@@ -275,7 +276,7 @@ impl Gpu {
                 Vec::new()
             }
         };
-        let encoder = self.encoded(problem, first, passes)?;
+        let encoder = self.encoded(problem, first, passes, true)?;
         self.finish(encoder, &mut moved_rows_of(problem))?;
         self.count_bytes(problem, passes);
         for (binding, bytes) in moved_rows_of(problem) {
@@ -302,7 +303,7 @@ impl Backend for Gpu {
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
         self.rows = None;
         self.send_all(problem, passes)?;
-        let encoder = self.encoded(problem, Vec::new(), passes)?;
+        let encoder = self.encoded(problem, Vec::new(), passes, false)?;
         let mut impulses = std::mem::take(&mut problem.impulses);
         let mut wanted = moved_rows_of(problem);
         wanted.push((shader::IMPULSES, bytemuck::cast_slice_mut(&mut impulses)));
