@@ -243,7 +243,13 @@ impl SolverConfig {
         let table = |config: &Self| toml::Table::try_from(config).expect("a config is a table");
         let usual = table(&Self::default());
         let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-        table(self).into_iter().filter(differs).map(|(key, value)| format!("{key}={value}")).collect()
+        let text = |(key, value): (String, toml::Value)| match value {
+            toml::Value::String(word) => format!("{key}={word}"),
+            // As it was written, without what f64 sees of its rounding.
+            toml::Value::Float(x) => format!("{key}={}", x as f32),
+            value => format!("{key}={value}"),
+        };
+        table(self).into_iter().filter(differs).map(text).collect()
     }
 
     /// Changes one setting, written `key=value` as in TOML; bare words need no quotes.

@@ -15,6 +15,8 @@ mod solve;
 #[cfg(feature = "view")]
 mod view;
 
+pub use report::SurveyArgs;
+
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;

@@ -144,8 +144,11 @@ fn solved(
     SolveReport::new(problem, &settings, None)
 }
 
-/// Steps of catalogue scenes, then the files of a folder by their names.
-fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
+/// Contact problems: steps of catalogue scenes, then the `.contacts` files of a folder by their names.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
     let mut problems = Vec::new();
     for (name, parameters, step) in STEPS {
         let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();

@@ -1,6 +1,7 @@
 //! What runs came to: one run for people and programs, its motion, and pages made from many runs.
 
 pub mod bench;
+mod clock;
 mod convergence;
 pub mod front;
 pub mod hard_cases;
@@ -10,7 +11,7 @@ mod run;
 mod solve;
 mod trajectory;
 
-pub use convergence::convergence;
+pub use convergence::{convergence, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{RunReport, StageRow, Standing};
 pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};

@@ -1,6 +1,6 @@
 //! What one solve of a contact problem came to, sweep by sweep.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::Serialize;
 
@@ -10,6 +10,8 @@ use crate::contacts::ContactProblem;
 use crate::error::Result;
 use crate::residuals::{Measure, Residuals};
 use crate::solver::{Order, Solver};
+
+use super::clock::Clock;
 
 /// Errors `e_vel` whose sweeps are reported.
 const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
@@ -113,11 +115,12 @@ impl SolveReport {
             reached: ERRORS.map(|e_vel| Reached { e_vel, sweeps: None, ms: None }).to_vec(),
             curve: Vec::new(),
         };
+        let clock = Clock::of(name);
         let mut time = Duration::ZERO;
         for sweep in 1..=sweeps {
-            let begin = Instant::now();
+            let begin = clock.now();
             solver.advance(1)?;
-            time += begin.elapsed();
+            time += clock.now() - begin;
             let ms = time.as_secs_f64() * 1e3;
             let residuals = measure.of(&solver.impulses(), &solver.velocities());
             let e_vel = residuals.e_vel;

@@ -7,8 +7,9 @@ use super::parts::{centered, floor, unit_box};
 use super::random::SplitMix64;
 use crate::world::{Body, Shape, World};
 
-/// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
-pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
+/// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls; every other
+/// one has `ratio` times the density.
+pub(super) fn pile(n: usize, jitter: f64, seed: u64, ratio: f32) -> Scene {
     const PITCH: f64 = 1.2;
     const CLEARANCE: f64 = 0.7;
     const LOWEST: f64 = 0.65;
@@ -27,14 +28,14 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64) -> Scene {
     }
 
     let mut random = SplitMix64::new(seed);
-    let body = unit_box();
+    let bodies = [unit_box(), unit_box().density(1000.0 * ratio)];
     for i in 0..n {
         let (column, row, layer) = (i % side, i / side % side, i / (side * side));
         let shift = if layer % 2 == 0 { SHIFT } else { -SHIFT };
         let x = centered(column, side) * PITCH + shift + jitter * random.symmetric();
         let y = layer as f64 * PITCH + LOWEST + jitter * random.symmetric();
         let z = centered(row, side) * PITCH + shift + jitter * random.symmetric();
-        let body = body.clone().position(x as f32, y as f32, z as f32).rotation(small_turn(&mut random));
+        let body = bodies[i % 2].clone().position(x as f32, y as f32, z as f32).rotation(small_turn(&mut random));
         world.add(body);
     }
     let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
@@ -148,9 +149,14 @@ mod tests {
 
     #[test]
     fn no_two_bodies_overlap_at_the_start() {
-        for scene in
-            [pile(1000, 0.03, 1), pile(500, 0.04, 7), pyramid(6), many_pyramids(5, 3), tower(5, 0.2, 1.0), wall(6, 4)]
-        {
+        for scene in [
+            pile(1000, 0.03, 1, 1.0),
+            pile(500, 0.04, 7, 1.0),
+            pyramid(6),
+            many_pyramids(5, 3),
+            tower(5, 0.2, 1.0),
+            wall(6, 4),
+        ] {
             no_two_overlap(&scene);
         }
     }
@@ -163,13 +169,13 @@ mod tests {
 
     #[test]
     fn the_same_parameters_give_the_same_bits() {
-        assert_eq!(bits(&pile(300, 0.03, 5)), bits(&pile(300, 0.03, 5)));
-        assert_ne!(bits(&pile(300, 0.03, 5)), bits(&pile(300, 0.03, 6)));
+        assert_eq!(bits(&pile(300, 0.03, 5, 1.0)), bits(&pile(300, 0.03, 5, 1.0)));
+        assert_ne!(bits(&pile(300, 0.03, 5, 1.0)), bits(&pile(300, 0.03, 6, 1.0)));
     }
 
     #[test]
     fn the_bits_of_a_pile_are_pinned() {
-        let hash = bits(&pile(1000, 0.03, 1))
+        let hash = bits(&pile(1000, 0.03, 1, 1.0))
             .iter()
             .fold(0xcbf2_9ce4_8422_2325_u64, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
         assert_eq!(hash, 0x9dc1_022d_d8b0_f206, "{hash:#x}");
@@ -177,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_pile_is_turned_and_shifted_no_further_than_promised() {
-        let scene = pile(500, 0.0, 3);
+        let scene = pile(500, 0.0, 3, 1.0);
         let boxes: Vec<_> = scene.world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic).collect();
         assert!(boxes.iter().all(|b| b.rotation.is_normalized() && b.rotation.to_axis_angle().1 <= 0.08));
         assert!(boxes.iter().any(|b| b.rotation.to_axis_angle().1 > 0.07));
@@ -189,7 +195,7 @@ mod tests {
     #[test]
     fn piles_of_every_size_have_all_their_boxes_inside_the_container() {
         for n in [1, 2, 3, 7, 64, 100, 5000] {
-            let scene = pile(n, 0.03, 1);
+            let scene = pile(n, 0.03, 1, 1.0);
             assert_eq!((scene.world.dynamic_count(), scene.escaped(&scene.world)), (n, 0));
         }
     }

@@ -17,8 +17,9 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
             Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
+            Parameter::real("ratio", 1.0, (1e-6, 1e6), "density of every other box relative to the others"),
         ],
-        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64)),
+        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64, v[3] as f32)),
     },
     Entry {
         name: "pyramid",

@@ -8,8 +8,10 @@
 mod box3d;
 mod entrant;
 mod rapier;
+mod team;
 
 pub use entrant::{Engine, Entrant};
+pub use team::team;
 
 use drystone::Result;
 use drystone::maze::{Game, Map};

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{SystemTime, UNIX_EPOCH};
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
-use drystone::report::front::{Row, blocks, race};
+use drystone::cli::SurveyArgs;
+use drystone::report::front::{Origin, Row, blocks, race, scene};
 use drystone::{Error, Result, Scene};
-use drystone_peers::{Engine, Entrant};
+use drystone_peers::{Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs scenes with drystone, Rapier and Box3D, each at its defaults and at the settings asked for.
@@ -16,8 +16,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// They step in turns. Time is the median over blocks of 10 steps, in brackets its quartiles; ratio is that to the first row in
 /// the same blocks. Times and overlaps are of the second half of a run.
 #[derive(Parser)]
-#[command(max_term_width = 110)]
+#[command(max_term_width = 110, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
     /// Scenes: names of the catalogue, as tower or tower:n=20,top_ratio=100, and paths of scene files.
     #[arg(required = true)]
     scenes: Vec<String>,
@@ -42,6 +44,12 @@ struct Args {
     /// Write all rows as CSV.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// The report of `drystone report`, with Rapier and Box3D on the same pictures.
+    Report(SurveyArgs),
 }
 
 /// A contact frequency relative to the substep rate, or an engine's own.
@@ -80,14 +88,7 @@ impl Args {
     }
 
     fn scene(&self, text: &str) -> Result<Scene> {
-        let known = |name: &str| drystone::scenes::CATALOGUE.iter().any(|e| e.name == name);
-        let mut scene = match text.split_once(':') {
-            Some((name, parameters)) if known(name) => {
-                Scene::find(name, &parameters.split(',').map(str::to_owned).collect::<Vec<_>>())?
-            }
-            _ => Scene::find(text, &[])?,
-        };
-        scene.name = text.to_owned();
+        let mut scene = scene(text)?;
         scene.steps = self.steps.unwrap_or(scene.steps);
         Ok(scene)
     }
@@ -99,8 +100,7 @@ impl Args {
             .use_current_thread()
             .build_global()
             .map_err(Error::input)?;
-        // Names this run: seconds since 1970.
-        let run = SystemTime::now().duration_since(UNIX_EPOCH).map_err(Error::input)?.as_secs().to_string();
+        let origin = Origin::here(None);
         // Every scene is read before the first is run.
         let scenes = self.scenes.iter().map(|text| self.scene(text)).collect::<Result<Vec<_>>>()?;
         let mut all = Vec::new();
@@ -111,7 +111,7 @@ impl Args {
                 ProgressStyle::with_template("{msg} {bar:40} {percent} %  {eta} left").expect("a fixed template");
             let bar = ProgressBar::new(contenders.len() as u64 * u64::from(blocks(scene.steps))).with_style(style);
             bar.set_message(scene.name.clone());
-            let rows = race(scene, &mut contenders, &run, &mut || bar.inc(1))?;
+            let rows = race(scene, &mut contenders, &origin, &mut || bar.inc(1))?;
             bar.finish_and_clear();
             print_table(scene, &rows);
             all.extend(rows);
@@ -170,7 +170,12 @@ fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
 }
 
 fn main() -> ExitCode {
-    match Args::parse().run() {
+    let args = Args::parse();
+    let done = match &args.command {
+        Some(Command::Report(survey)) => survey.run(&[&|scene, extent| team(scene, extent, survey.threads())]),
+        None => args.run(),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             eprintln!("drystone-peers: {}", e.to_string().replace(char::is_control, " "));

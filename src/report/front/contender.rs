@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::Backend;
 use crate::backend::cpu::{Cpu, Reference};
 use crate::backend::gpu::{AdapterChoice, Gpu};
-use crate::config::{FrictionRule, SolverConfig};
+use crate::config::{FrictionRule, Method, SolverConfig};
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
@@ -24,6 +24,18 @@ pub trait Contender {
 
     /// The world after the last step: the bodies of the scene in their order, with their poses and velocities.
     fn world(&mut self) -> &World;
+}
+
+/// Who takes part in a scene, with each of their settings.
+pub type Team<'a> = dyn Fn(&Scene, Extent) -> Result<Vec<Box<dyn Contender>>> + 'a;
+
+/// How much is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// The main settings.
+    Quick,
+    /// All of them.
+    Full,
 }
 
 /// An engine and its settings, as text and numbers.
@@ -53,9 +65,9 @@ impl Setting {
             backend: backend.into(),
             substeps: config.substeps,
             sweeps: config.iterations,
-            method: "plain".into(),
+            method: if config.method == Method::Plain { "plain" } else { "accelerated" }.into(),
             friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
-            more: config.unusual(&["substeps", "iterations", "friction"]).join(" "),
+            more: unusual(config).join(" "),
         }
     }
 
@@ -70,6 +82,17 @@ impl Setting {
         }
         label
     }
+}
+
+/// What a setting has no place for. As many relax sweeps as biased ones are what is expected.
+fn unusual(config: &SolverConfig) -> Vec<String> {
+    let said = ["substeps", "iterations", "method", "friction"];
+    let mut more = config.unusual(&said);
+    more.retain(|text| !text.starts_with("relax="));
+    if config.relax != config.iterations {
+        more.push(format!("relax={}", config.relax));
+    }
+    more
 }
 
 /// Drystone itself.
@@ -121,5 +144,7 @@ mod tests {
         config.set("contact_frequency=0.25").unwrap();
         config.set("relax=2").unwrap();
         assert_eq!(Setting::drystone("cpu", &config).more, "contact_frequency=0.25 relax=2");
+        config.set("iterations=2").unwrap();
+        assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x2 box contact_frequency=0.25");
     }
 }

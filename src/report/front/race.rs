@@ -1,14 +1,14 @@
 //! Contenders step one scene in turns, so that whatever slows the machine down meets all of them, and are scored by what
 //! they get wrong.
 
-use std::time::Instant;
-
 use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
+use super::origin::Origin;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::metrics::{Penetration, drift, in_place_count, rms_speed};
+use crate::report::clock::Clock;
 use crate::scenes::Scene;
 use crate::stats::quantile;
 use crate::world::World;
@@ -23,8 +23,14 @@ pub struct Row {
     pub scene: String,
     /// Hash of what is in it: rows may be compared only if it is the same.
     pub hash: String,
-    /// Names the run: rows may be put in a ratio only if it is the same.
+    /// Names the run by when it began: rows may be put in a ratio only if it is the same.
     pub run: String,
+    /// Fingerprint of the program that ran.
+    pub build: String,
+    /// Commit that it was built from.
+    pub commit: String,
+    /// What it ran on.
+    pub machine: String,
     /// Threads.
     pub threads: usize,
     /// Dynamic bodies.
@@ -45,7 +51,10 @@ pub struct Row {
     pub friction: String,
     /// What else is not at its default.
     pub more: String,
-    /// Wall time of a step, median over the blocks [ms].
+    /// What times are of: `processor` time of the process where one thread does everything, `wall` time with several threads and
+    /// on a GPU.
+    pub clock: String,
+    /// Time of a step, median over the blocks [ms].
     pub ms: f64,
     /// Its lower and upper quartile [ms].
     pub ms_low: f64,
@@ -84,6 +93,20 @@ impl Row {
         Setting { engine, backend, substeps, sweeps, method, friction, more }
     }
 
+    /// How long it took relative to another row.
+    ///
+    /// # Errors
+    /// The other row is of another run or another scene: such times say nothing about each other.
+    pub fn time_ratio(&self, other: &Self) -> Result<f64> {
+        for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
+            if own != others {
+                let names = [self, other].map(|row| format!("{} on {}", row.setting().label(), row.scene));
+                return Err(Error::input(format!("no ratio of {} to {}: {what} {own}, {others}", names[0], names[1])));
+            }
+        }
+        Ok(self.ratio / other.ratio)
+    }
+
     /// Whether everything that should stand does, and all numbers are finite.
     pub fn holds(&self) -> bool {
         self.finite && self.in_place.is_none_or(|n| n == self.bodies)
@@ -100,27 +123,29 @@ struct Lane {
     finite: bool,
 }
 
-/// Runs all contenders over the steps of `scene`; the rows are in their order. `run` names this race, `after_block` is called
-/// after every block of every contender, [`blocks`] times a contender.
+/// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called after
+/// every block of every contender, [`blocks`] times a contender.
 ///
 /// # Errors
 /// A contender gave up.
 pub fn race(
     scene: &Scene,
     contenders: &mut [Box<dyn Contender + '_>],
-    run: &str,
+    origin: &Origin,
     after_block: &mut dyn FnMut(),
 ) -> Result<Vec<Row>> {
     let blocks = blocks(scene.steps);
+    let run = Origin::now();
     let mut lanes: Vec<_> = contenders.iter().map(|_| Lane { finite: true, ..Lane::default() }).collect();
     for block in 0..blocks {
         for (contender, lane) in contenders.iter_mut().zip(&mut lanes) {
             if lane.finite {
-                let begin = Instant::now();
+                let clock = Clock::of(&contender.setting().backend);
+                let begin = clock.now();
                 for _ in 0..BLOCK {
                     contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
                 }
-                let ms = begin.elapsed().as_secs_f64() * 1e3 / f64::from(BLOCK);
+                let ms = (clock.now() - begin).as_secs_f64() * 1e3 / f64::from(BLOCK);
                 let world = contender.world();
                 lane.finite = world.first_non_finite().is_none();
                 if lane.finite && 2 * block >= blocks {
@@ -137,7 +162,7 @@ pub fn race(
     Ok(contenders
         .iter_mut()
         .zip(lanes)
-        .map(|(c, lane)| row(scene, c.setting(), c.world(), &lane, &first, run))
+        .map(|(c, lane)| row(scene, c.setting(), c.world(), &lane, &first, origin, &run))
         .collect())
 }
 
@@ -146,20 +171,29 @@ pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(2)
 }
 
-fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64], run: &str) -> Row {
+/// Steps that a race over the scene takes.
+pub(super) fn steps(scene: &Scene) -> u32 {
+    blocks(scene.steps) * BLOCK
+}
+
+fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64], origin: &Origin, run: &str) -> Row {
     let ratios: Vec<f64> = lane.ms.iter().zip(first).map(|(ms, first)| ms / first).collect();
     let [ms_low, ms, ms_high] = [0.25, 0.5, 0.75].map(|q| quantile(&lane.ms, q));
     let [ratio_low, ratio, ratio_high] = [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q));
     let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
     let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
+    let clock = Clock::of(&setting.backend).name().into();
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {
         scene: scene.name.clone(),
         hash: scene.content_hash(),
         run: run.into(),
-        threads: rayon::current_num_threads(),
+        build: origin.build.clone(),
+        commit: origin.commit.clone(),
+        machine: origin.machine.clone(),
+        threads: origin.threads,
         bodies: scene.world.dynamic_count(),
-        steps: blocks(scene.steps) * BLOCK,
+        steps: steps(scene),
         engine,
         backend,
         substeps,
@@ -167,6 +201,7 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
         method,
         friction,
         more,
+        clock,
         ms,
         ms_low,
         ms_high,
