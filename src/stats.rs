@@ -27,7 +27,7 @@ pub struct StepStats {
     pub sweeps: u32,
     /// Sweeps that the plan held, where the settings have a tolerance; else 0.
     pub planned_sweeps: u32,
-    /// Dispatches of the plan.
+    /// Passes of the plan: dispatches, where a device does not follow all of it in one (`traffic`).
     pub dispatches: usize,
     /// Bytes that the kernels of the plan read and write.
     pub bytes_moved: u64,
@@ -57,6 +57,8 @@ pub struct Traffic {
     pub up: u64,
     /// Bytes read back.
     pub down: u64,
+    /// Dispatches, those included that bring rows to their places; 0 without a device.
+    pub dispatches: usize,
 }
 
 /// Wall time of each stage of a step.

@@ -46,14 +46,13 @@ fn says(plan: &StepPlan, word: &str) -> bool {
 fn the_plan_of_a_tower_reads_as_the_step_is_told() {
     let scene = Scene::find("tower", &[]).expect("the scene");
     let (plan, ..) = planned(scene.world, SolverConfig::default());
-    // Three colors between boxes, one more than a chain needs, as greedy coloring goes, and one for the floor. All are
-    // small, so that one workgroup sweeps them.
-    let first = "integrate_velocities\nwarm_start(disc friction) over colors 0..4\n";
+    // Two colors between boxes, as a chain needs, and one for the floor. All are small, so that one workgroup sweeps them.
+    let first = "integrate_velocities\nwarm_start(disc friction) over colors 0..3\n";
     let later = "integrate_velocities(carry)\n";
     let sweeps = "\
-solve_contacts(biased) over colors 0..4
+solve_contacts(biased) over colors 0..3
 integrate_positions
-solve_contacts(disc friction) over colors 0..4
+solve_contacts(disc friction) over colors 0..3
 ";
     assert_eq!(plan.to_string(), [first, sweeps, &[later, sweeps].concat().repeat(7)].concat());
 }
@@ -65,8 +64,8 @@ fn settings_are_in_the_plan() {
     let (plan, ..) = planned(scene.world, config);
     let expected = "\
 integrate_velocities
-warm_start(disc friction) over colors 0, 1, 2, 3
-solve_contacts(biased, disc friction) over colors 0, 1, 2, 3, 0, 1, 2, 3
+warm_start(disc friction) over colors 0, 1, 2
+solve_contacts(biased, disc friction) over colors 0, 1, 2, 0, 1, 2
 integrate_positions
 ";
     assert_eq!(plan.to_string(), expected);

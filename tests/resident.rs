@@ -216,6 +216,17 @@ fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() 
 }
 
 #[test]
+fn a_small_world_is_one_dispatch_after_those_that_carry_its_rows() {
+    let scene = Scene::find("tower", &[]).expect("a scene of the catalogue");
+    let Some((settled, simulation)) = traffic_of(&scene, 100, 1) else { return };
+    assert!(simulation.plan().passes.len() > 20);
+    // begin_bodies and begin_contacts; carry_contacts where a manifold was computed.
+    assert!((3..=4).contains(&settled[0].dispatches), "{settled:?}");
+    let Some((settled, simulation)) = traffic_of(&pile(400), 2, 1) else { return };
+    assert!(settled[0].dispatches > simulation.plan().passes.len());
+}
+
+#[test]
 fn a_falling_pile_sends_what_was_computed_and_where_the_rest_was() {
     let scene = pile(200);
     let mut steps = 0;

@@ -87,6 +87,9 @@ impl Arena {
             self.found.clear();
             let found = &mut self.found;
             self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+            // In the order of the bodies in memory, in which every later stage then goes over them.
+            found.iter_mut().for_each(|pair| *pair = key(pair.0, pair.1));
+            found.sort_unstable();
             self.moved.extend(0..self.colliders.len() as u32);
             self.find_unbounded(now);
         } else {

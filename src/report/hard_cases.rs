@@ -19,7 +19,7 @@ const COLUMNS: [(Preset, Numbers); 6] = [
 
 /// Whether a case is run in that column: what takes minutes on the CPU takes hours with many substeps or in a software adapter.
 fn is_run(case: &Case, (preset, numbers): (Preset, Numbers)) -> bool {
-    !case.long || numbers == Numbers::Cpu && preset != Preset::Reference
+    !case.long || numbers == Numbers::Cpu && preset.config().substeps <= Preset::Balanced.config().substeps
 }
 
 /// Runs that the page takes.

@@ -214,7 +214,7 @@ impl RunReport {
         self.colors = stats.colors;
         self.overflow = self.overflow.max(stats.overflow);
         self.reused = 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64;
-        self.dispatches = stats.dispatches;
+        self.dispatches = if stats.traffic.dispatches > 0 { stats.traffic.dispatches } else { stats.dispatches };
         self.bytes_moved = stats.bytes_moved;
         self.bytes_up = stats.traffic.up;
         self.bytes_down = stats.traffic.down;
@@ -322,7 +322,8 @@ impl RunReport {
         }
         if self.bytes_up > 0 {
             let kb = |bytes: u64| bytes as f64 / 1e3;
-            row("last step", format!("{:.1} kB to the device, {:.1} kB back", kb(self.bytes_up), kb(self.bytes_down)));
+            let (up, down) = (kb(self.bytes_up), kb(self.bytes_down));
+            row("last step", format!("{up:.1} kB to the device, {down:.1} kB back, {} dispatches", self.dispatches));
         }
         row(
             "penetration",

@@ -4,7 +4,7 @@
 //! workgroup, no optional features), except for the size of buffers, which are asked for as large as the adapter has them.
 //!
 //! [`Backend::run`] takes a problem as a value: everything is sent, and everything that the plan changes comes back.
-//! [`Backend::step`] goes on from the rows that the step before left on the device ([`carry`]): what changed is sent, poses and
+//! [`Backend::step`] goes on from the rows that the step before left on the device (`carry.rs`): what changed is sent, poses and
 //! velocities come back, and the impulses stay until somebody asks.
 //!
 //! A step is one submission and one read-back, and is waited for: detection, with which the next step begins, asks for the
@@ -161,16 +161,17 @@ impl Gpu {
         Ok(())
     }
 
-    /// Some programs and then the passes, ready to be submitted.
+    /// Some programs and then the passes, ready to be submitted; the passes of a small world `together`, in one dispatch.
     fn encoded(
         &mut self,
         problem: &StepProblem,
         first: Vec<Dispatch>,
         passes: &[Pass],
+        together: bool,
     ) -> Result<wgpu::CommandEncoder> {
         let mut all = first;
         // Apart where each kernel is to be timed.
-        match whole::of(problem, passes).filter(|_| self.timer.is_none()) {
+        match whole::of(problem, passes).filter(|_| together && self.timer.is_none()) {
             Some((program, passes)) => {
                 self.buffers.update(shader::PASSES, bytemuck::cast_slice(&passes));
                 all.push(Dispatch::over(program, 1));
@@ -183,6 +184,7 @@ impl Gpu {
                 all.extend(passes.iter().zip(&offsets).map(of_pass));
             }
         }
+        self.traffic.dispatches = all.len();
         for dispatch in &all {
             self.programs.prepare(&dispatch.program, &self.buffers)?;
         }
@@ -258,7 +260,7 @@ impl Gpu {
         let ticks = read.map_err(|e| Error::Adapter(format!("the device was lost: {e}")))?;
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
-        self.traffic = Traffic { up: self.buffers.take_sent(), down };
+        self.traffic = Traffic { up: self.buffers.take_sent(), down, ..self.traffic };
         Ok(())
     }
 
@@ -274,7 +276,7 @@ impl Gpu {
                 Vec::new()
             }
         };
-        let encoder = self.encoded(problem, first, passes)?;
+        let encoder = self.encoded(problem, first, passes, true)?;
         self.finish(encoder, &mut moved_rows_of(problem))?;
         self.count_bytes(problem, passes);
         for (binding, bytes) in moved_rows_of(problem) {
@@ -301,7 +303,7 @@ impl Backend for Gpu {
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
         self.rows = None;
         self.send_all(problem, passes)?;
-        let encoder = self.encoded(problem, Vec::new(), passes)?;
+        let encoder = self.encoded(problem, Vec::new(), passes, false)?;
         let mut impulses = std::mem::take(&mut problem.impulses);
         let mut wanted = moved_rows_of(problem);
         wanted.push((shader::IMPULSES, bytemuck::cast_slice_mut(&mut impulses)));
