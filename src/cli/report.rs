@@ -48,7 +48,7 @@ pub struct SurveyArgs {
     /// Directory for index.html, speed-against-error.svg, scenes.csv and problems.csv.
     #[arg(long, default_value = "report")]
     out: PathBuf,
-    /// Fewer scenes and settings: two minutes.
+    /// Fewer scenes and settings: within two minutes.
     #[arg(long)]
     quick: bool,
     /// Only this scene, as tower or tower:n=20,top_ratio=100, or the path of a file; may be given several times.
