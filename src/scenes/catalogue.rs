@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn an_unknown_parameter_lists_the_known_ones() {
-        assert_eq!(refusal("pile", "count=3"), "pile: unknown parameter \"count\"; known: n, jitter, seed");
+        assert_eq!(refusal("pile", "count=3"), "pile: unknown parameter \"count\"; known: n, jitter, seed, ratio");
         assert_eq!(refusal("drop", "n=3"), "drop: unknown parameter \"n\"; known: height");
     }
 

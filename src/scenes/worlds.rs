@@ -16,13 +16,13 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// As [`Scene::find`]; no world, more than four million bodies, or nothing of that name that is a whole number.
+    /// As [`Scene::find`]; no world, more than four million dynamic bodies, or nothing of that name that is a whole number.
     pub fn find_worlds(name_or_path: &str, parameters: &[String], count: usize, vary: Option<&str>) -> Result<Self> {
         let mut all = Self::find(name_or_path, parameters)?;
-        let each = all.world.bodies.len();
+        let each = all.world.dynamic_count();
         if count == 0 || each.saturating_mul(count) as f64 > MOST_BODIES {
             return Err(Error::input(format!(
-                "{count} worlds of {each} bodies: must be at least one world, and at most {MOST_BODIES} bodies in all"
+                "{count} worlds of {each} dynamic bodies: must be at least one world, and at most {MOST_BODIES} such bodies in all"
             )));
         }
         let first = all.clone();
