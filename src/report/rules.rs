@@ -175,7 +175,8 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
     }
     report.page.push_str(
         "\nWithout a bias, what the first sweeps leave over stays for good. Baumgarte's takes it away and shakes the tower with what \
-         it puts in. The soft contact sinks by the amount that its stiffness says, and rests.\n",
+         it puts in. The soft contact sinks by the amount that its stiffness says, comes up again as the load \
+         is taken for lasting (`preload_rate`; the energy added is that of lifting the tower by what it had sunk), and rests.\n",
     );
     let axes = Axes { title: "Deepest overlap in a tower of 10 boxes", x: "time s", y: "overlap mm", log_y: true };
     report.picture("stabilization.svg", svg(&axes, &lines));
