@@ -2,6 +2,7 @@
 
 use crate::collide::{Detector, Pair};
 use crate::config::SolverConfig;
+use crate::stats::largest;
 use crate::world::{Body, BodyKind, World};
 
 /// Overlap over all touching pairs.
@@ -25,12 +26,7 @@ impl Penetration {
 
     /// Of the manifolds of `pairs`; a manifold that is apart counts as zero.
     pub fn of<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> Self {
-        let deepest = |m: &crate::collide::Manifold| {
-            m.points()
-                .iter()
-                .map(|p| f64::from(-p.separation))
-                .fold(0.0, |x: f64, y| if y > x || y.is_nan() { y } else { x })
-        };
+        let deepest = |m: &crate::collide::Manifold| largest(0.0, m.points().iter().map(|p| f64::from(-p.separation)));
         let mut depths: Vec<f64> = pairs.into_iter().flat_map(|p| &p.manifolds).map(deepest).collect();
         // NaN sorts last, so that it spoils the largest.
         depths.sort_by(f64::total_cmp);
@@ -81,7 +77,7 @@ pub fn in_place(before: &Body, after: &Body) -> bool {
 pub fn drift(before: &World, after: &World) -> f64 {
     let moved = |(was, is): (&Body, &Body)| (is.center_of_mass() - was.center_of_mass()).as_dvec3();
     let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);
-    dynamic.map(moved).map(|d| d.x.hypot(d.z)).fold(0.0, |x, y| if y > x || y.is_nan() { y } else { x })
+    largest(0.0, dynamic.map(moved).map(|d| d.x.hypot(d.z)))
 }
 
 /// Dynamic bodies of `after` that are in place, see [`in_place`].

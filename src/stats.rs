@@ -102,6 +102,11 @@ pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
     result
 }
 
+/// The largest of `from` and some numbers; NaN if any of these is, so that it spoils a check instead of passing unseen.
+pub fn largest(from: f64, values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(from, |x, y| if y > x || y.is_nan() { y } else { x })
+}
+
 /// The middle of some numbers, the mean of the two middle ones if they are even in number; NaN for none.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)

@@ -67,12 +67,12 @@ const LEAST_BODIES: usize = 500;
 pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Result<(Box<dyn Backend>, String)> {
     let cpu = |why: String| -> (Box<dyn Backend>, String) { (Box::new(Cpu::new()), why) };
     match choice {
-        BackendChoice::Reference => Ok((Box::new(Reference::<f32>::new()), "reference: asked for".into())),
+        BackendChoice::Reference => Ok((Numbers::Reference.open(exact)?, "reference: asked for".into())),
         BackendChoice::Cpu => Ok(cpu("cpu: asked for".into())),
         BackendChoice::Gpu => {
-            let gpu = Gpu::new(AdapterChoice::Best, exact)?;
+            let gpu = Numbers::Gpu.open(exact)?;
             let why = format!("gpu: asked for; {}", gpu.adapter());
-            Ok((Box::new(gpu), why))
+            Ok((gpu, why))
         }
         BackendChoice::Auto if dynamic_bodies < LEAST_BODIES => {
             Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU is not tried below {LEAST_BODIES}")))

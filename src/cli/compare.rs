@@ -31,7 +31,7 @@ impl CompareArgs {
             return Err(Error::input(format!("--backends: two are compared, {} were given", self.backends.len())));
         };
         let (scene, config) = self.scene.load()?;
-        self.scene.set_threads(0);
+        self.scene.set_threads(BackendChoice::Auto);
         let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.exact));
         let bodies = scene.world.dynamic_count();
         let mut named = [String::new(), String::new()];

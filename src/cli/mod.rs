@@ -23,6 +23,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::backend::BackendChoice;
 use crate::config::{Method, SolverConfig};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
@@ -139,6 +140,17 @@ struct SceneArgs {
     json: bool,
 }
 
+/// What runs the sweeps of one scene.
+#[derive(Args)]
+struct BackendArgs {
+    /// What runs the sweeps.
+    #[arg(long = "backend", value_name = "BACKEND", value_enum, default_value_t)]
+    choice: BackendChoice,
+    /// Ask the GPU for the reference's results to the last bit.
+    #[arg(long)]
+    exact: bool,
+}
+
 /// What is run for its result may sleep; what is run for a comparison may not.
 #[derive(Args)]
 struct SleepArgs {
@@ -193,8 +205,9 @@ impl SceneArgs {
         Ok((scene, config))
     }
 
-    /// Sets the number of threads, once for the process; 0 keeps one a core, or `unless_told`.
-    fn set_threads(&self, unless_told: usize) {
+    /// Sets the number of threads, once for the process: one a core unless told, and one for the reference.
+    fn set_threads(&self, backend: BackendChoice) {
+        let unless_told = usize::from(backend == BackendChoice::Reference);
         let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
         // Fails only if it was set before, which nothing does.
         // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.

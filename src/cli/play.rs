@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{print, print_json};
-use crate::backend::{BackendChoice, choose};
+use super::{BackendArgs, print, print_json};
+use crate::backend::choose;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::files;
@@ -46,12 +46,8 @@ struct MazeArgs {
     /// Print one JSON object, with the ball's track.
     #[arg(long, requires = "script")]
     json: bool,
-    /// What runs the sweeps.
-    #[arg(long, value_enum, default_value_t)]
-    backend: BackendChoice,
-    /// Ask the GPU for the reference's results to the last bit.
-    #[arg(long)]
-    exact: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Any setting of the solver, as key=value; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -70,7 +66,7 @@ impl MazeArgs {
         let map = Map::find(&self.board)?;
         let mut config = SolverConfig::default();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
-        let begin = |map, config| Game::new(map, config, choose(self.backend, 1, self.exact)?.0);
+        let begin = |map, config| Game::new(map, config, choose(self.backend.choice, 1, self.backend.exact)?.0);
         if let Some(path) = &self.script {
             let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
             let script = Script::parse(&path.display().to_string(), &text)?;
@@ -111,7 +107,7 @@ impl MazeArgs {
     #[cfg(feature = "view")]
     fn window(&self, map: Map, config: SolverConfig) -> Result<()> {
         use crate::view::{Labyrinth, window};
-        window::run(Box::new(Labyrinth::new(map, config, self.backend)?))
+        window::run(Box::new(Labyrinth::new(map, config, self.backend.choice)?))
     }
 
     #[cfg(not(feature = "view"))]

@@ -62,7 +62,7 @@ impl RenderArgs {
     fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
         let (scene, mut config) = args.load()?;
         self.sleep.apply(&mut config);
-        args.set_threads(usize::from(self.backend == BackendChoice::Reference));
+        args.set_threads(self.backend);
         let png = out.extension().is_some_and(|e| e == "png");
         let frames = self.frames.unwrap_or(if png { 1 } else { 60 });
         if png && frames > 1 {

@@ -6,8 +6,8 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
-use crate::backend::{BackendChoice, choose};
+use super::{BackendArgs, SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
+use crate::backend::choose;
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
 use crate::scenes::Scene;
@@ -18,12 +18,8 @@ use crate::simulation::Simulation;
 pub struct RunArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// What runs the sweeps.
-    #[arg(long, value_enum, default_value_t)]
-    backend: BackendChoice,
-    /// Ask the GPU for the reference's results to the last bit.
-    #[arg(long)]
-    exact: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Take the time of each kernel by the clock of the GPU; a software adapter is slower with it.
     #[arg(long)]
     kernel_times: bool,
@@ -86,8 +82,8 @@ impl RunArgs {
         let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
-        self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
-        let (mut backend, why) = choose(self.backend, scene.world.dynamic_count(), self.exact)?;
+        self.scene.set_threads(self.backend.choice);
+        let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         eprintln!("{why}");
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };

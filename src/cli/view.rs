@@ -2,8 +2,7 @@
 
 use clap::Args;
 
-use super::{SceneArgs, SleepArgs};
-use crate::backend::BackendChoice;
+use super::{BackendArgs, SceneArgs, SleepArgs};
 use crate::error::Result;
 use crate::view::{ColorBy, Live, window};
 
@@ -12,12 +11,8 @@ use crate::view::{ColorBy, Live, window};
 pub struct ViewArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// What runs the sweeps.
-    #[arg(long, value_enum, default_value_t)]
-    backend: BackendChoice,
-    /// Ask the GPU for the reference's results to the last bit.
-    #[arg(long)]
-    exact: bool,
+    #[command(flatten)]
+    backend: BackendArgs,
     #[command(flatten)]
     sleep: SleepArgs,
     /// What bodies are colored by.
@@ -30,7 +25,7 @@ impl ViewArgs {
     pub fn run(&self) -> Result<()> {
         let (scene, mut config) = self.scene.load()?;
         self.sleep.apply(&mut config);
-        self.scene.set_threads(usize::from(self.backend == BackendChoice::Reference));
-        window::run(Box::new(Live::new(scene, config, self.backend, self.exact, self.color)?))
+        self.scene.set_threads(self.backend.choice);
+        window::run(Box::new(Live::new(scene, config, self.backend.choice, self.backend.exact, self.color)?))
     }
 }

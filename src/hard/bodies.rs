@@ -10,7 +10,11 @@ use crate::error::Result;
 use crate::metrics;
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
+use crate::stats::largest;
 use crate::world::{BallJoint, Body, MassProperties, Shape, World};
+
+/// Less than anything.
+const LEAST: f64 = f64::NEG_INFINITY;
 
 fn floor(friction: f32) -> World {
     let mut world = World::new();
@@ -30,9 +34,9 @@ fn energy(world: &World) -> f64 {
     world.kinetic_energy() + world.potential_energy()
 }
 
-/// Largest of the values; NaN counts as largest.
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(f64::NEG_INFINITY, |x, y| if y > x || y.is_nan() { y } else { x })
+/// By how much a value is off an exact one, relative.
+fn off(value: f64, exact: f64) -> f64 {
+    (value / exact - 1.0).abs()
 }
 
 /// What `measure` says after each of `steps` steps.
@@ -69,8 +73,8 @@ pub(super) fn heavy_chain(setup: &Setup) -> Result<Vec<Check>> {
     let mut gained = f64::NEG_INFINITY;
     for _ in 0..600 {
         simulation.step(DT)?;
-        gap = largest([gap, simulation.world.joint_gap().into()]);
-        gained = largest([gained, energy(&simulation.world) - before]);
+        gap = largest(gap, [simulation.world.joint_gap().into()]);
+        gained = largest(gained, [energy(&simulation.world) - before]);
     }
     Ok(vec![
         Check::at_most("largest gap of a joint over the length of a link", gap / 0.5, 0.01),
@@ -87,14 +91,14 @@ pub(super) fn spinning_rod(setup: &Setup) -> Result<Vec<Check>> {
     let mut free = weightless();
     free.add(rod.clone().velocity(Vec3::ZERO, Vec3::new(1.0, 1000.0, 0.0)));
     let before = free.kinetic_energy();
-    let drift = largest(watch(&mut setup.simulation(free)?, 600, |w| (w.kinetic_energy() / before - 1.0).abs())?);
+    let drift = largest(LEAST, watch(&mut setup.simulation(free)?, 600, |w| off(w.kinetic_energy(), before))?);
 
     let mut lying = floor(0.5);
     let turn = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     lying.add(rod.rotation(turn).position(0.0, 2.0 * radius, 0.0).velocity(Vec3::ZERO, 1000.0 * Vec3::X));
     let before = energy(&lying);
     let mut simulation = setup.simulation(lying)?;
-    let gained = largest(watch(&mut simulation, 600, energy)?) / before - 1.0;
+    let gained = largest(LEAST, watch(&mut simulation, 600, energy)?) / before - 1.0;
     Ok(vec![
         Check::at_most("free: change of energy in 10 s, relative", drift, 1e-3),
         Check::at_most("on a floor: energy gained, relative", gained, 1e-3),
@@ -109,7 +113,7 @@ pub(super) fn overlaps(setup: &Setup) -> Result<Vec<Check>> {
         world.add(cube(0.0, 0.0));
         world.add(cube(0.0, 1.0 - share));
         let mut simulation = setup.simulation(world)?;
-        let speed = largest(watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
+        let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
         checks.push(Check::at_most(
             format!("{:.0} %: speed at any time over the push limit", 100.0 * share),
             speed / f64::from(setup.config.push_limit),
@@ -136,7 +140,7 @@ pub(super) fn no_direction(setup: &Setup) -> Result<Vec<Check>> {
         let (before, limit) = (energy(&world), f64::from(setup.config.push_limit));
         let most = f64::from(world.bodies.iter().map(|b| b.mass.mass).sum::<f32>()) * 0.5 * limit * limit;
         let mut simulation = setup.simulation(world)?;
-        let gained = largest(watch(&mut simulation, 300, energy)?) - before;
+        let gained = largest(LEAST, watch(&mut simulation, 300, energy)?) - before;
         checks.push(Check::at_most(
             format!("{what}: energy gained over what the push limit allows"),
             gained / most,
@@ -164,7 +168,7 @@ pub(super) fn nearly_parallel(setup: &Setup) -> Result<Vec<Check>> {
         for _ in 0..540 {
             simulation.step(DT)?;
         }
-        let fastest = largest(watch(&mut simulation, 60, metrics::rms_speed)?);
+        let fastest = largest(LEAST, watch(&mut simulation, 60, metrics::rms_speed)?);
         checks.push(Check::at_most(format!("{what}: rms speed in the tenth second [mm/s]"), 1e3 * fastest, 1.0));
         Ok(())
     };
@@ -196,11 +200,11 @@ pub(super) fn no_inertia(setup: &Setup) -> Result<Vec<Check>> {
     world.add(wall(Body::kinematic().velocity(-0.1 * Vec3::X, Vec3::ZERO)));
     let before = world.clone();
     let mut simulation = setup.simulation(world)?;
-    let speed = largest(watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
+    let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
     let moved = still.iter().map(|&i| before.bodies[i].position.distance(simulation.world.bodies[i].position).into());
     Ok(vec![
         Check::at_most("bodies that are no numbers", is_broken(&simulation.world), 0.0),
-        Check::at_most("way of what lies still [mm]", 1e3 * largest(moved), 1.0),
+        Check::at_most("way of what lies still [mm]", 1e3 * largest(LEAST, moved), 1.0),
         Check::at_most("speed at any time [m/s]", speed, 0.1),
     ])
 }
@@ -230,7 +234,7 @@ pub(super) fn painleve(setup: &Setup) -> Result<Vec<Check>> {
             format!("mu {mu}, {degrees} degrees, tip to {}", if way > 0.0 { "its middle" } else { "the outside" });
         checks.push(Check::at_most(
             format!("{what}: most energy gained in a step, relative"),
-            largest(grown) / before,
+            largest(LEAST, grown) / before,
             1e-3,
         ));
         checks.push(Check::at_most(format!("{what}: bodies that are no numbers"), is_broken(&simulation.world), 0.0));
@@ -260,7 +264,6 @@ impl Tumble {
         world.add(Body::dynamic().mass_properties(mass).velocity(Vec3::ZERO, Vec3::new(first, 10.0, 0.0)));
         let (energy, momentum) = (world.kinetic_energy(), world.angular_momentum().length());
         let mut simulation = simulation(world)?;
-        let off = |value: f64, exact: f64| (value / exact - 1.0).abs();
         let mut tumble = Self { flips: Vec::new(), energy: 0.0, momentum: 0.0 };
         let mut before = 10.0;
         for step in 1..=1200 {
@@ -273,8 +276,8 @@ impl Tumble {
                 tumble.flips.push((f64::from(step) - spin / (spin - before)) / 60.0);
             }
             before = spin;
-            tumble.energy = largest([tumble.energy, off(world.kinetic_energy(), energy)]);
-            tumble.momentum = largest([tumble.momentum, off(world.angular_momentum().length(), momentum)]);
+            tumble.energy = largest(tumble.energy, [off(world.kinetic_energy(), energy)]);
+            tumble.momentum = largest(tumble.momentum, [off(world.angular_momentum().length(), momentum)]);
         }
         Ok(tumble)
     }
@@ -306,7 +309,6 @@ pub(super) fn flip(setup: &Setup) -> Result<Vec<Check>> {
     let slow = Tumble::new(0.01, |world| setup.simulation(world))?;
     let first = slow.flips.first().copied().unwrap_or(f64::NAN);
     let fast = Tumble::new(1.0, |world| setup.simulation(world))?;
-    let off = |value: f64, exact: f64| (value / exact - 1.0).abs();
     Ok(vec![
         Check::at_most("spin (0.01, 10, 0): first flip, relative error", off(first, 0.5 * flip_time(0.01)), 0.005),
         Check::at_most("spin (0.01, 10, 0): energy in 20 s, relative error", slow.energy, 1e-5),
@@ -376,6 +378,6 @@ pub(super) fn release(setup: &Setup) -> Result<Vec<Check>> {
         simulation.step(DT)?;
     }
     simulation.world.bodies[top].position = Vec3::new(50.0, 0.5, 0.0);
-    let highest = largest(watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
+    let highest = largest(LEAST, watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
     Ok(vec![Check::at_most("rise of the ball under the load above its place [mm]", 1e3 * (highest - 1.5), 5.0)])
 }

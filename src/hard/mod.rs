@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::metrics;
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
+use crate::stats::largest;
 use crate::world::World;
 
 pub use bodies::{Tumble, flip_time, rolling_error};
@@ -82,17 +83,21 @@ impl Setup<'_> {
     /// Runs a world at 60 steps a second and says what became of it.
     fn outcome(&self, world: World, steps: u32) -> Result<Outcome> {
         let mut simulation = self.simulation(world.clone())?;
-        let mut outcome = Outcome { deepest: 0.0, ..Outcome::of(&world, &simulation) };
-        let mut deepest = 0.0_f64;
+        let mut deepest = 0.0;
         for step in 1..=steps {
             simulation.step(DT)?;
-            if step % 30 == 0 || step == steps {
-                outcome = Outcome::of(&world, &simulation);
-                deepest = deepest.max(outcome.at_rest);
+            if step % 30 == 0 && step < steps {
+                deepest = largest(deepest, [simulation.penetration().max]);
             }
         }
-        outcome.deepest = deepest;
-        Ok(outcome)
+        let (now, at_rest) = (&simulation.world, simulation.penetration().max);
+        Ok(Outcome {
+            fallen: (world.dynamic_count() - metrics::in_place_count(&world, now)) as f64,
+            drift: metrics::drift(&world, now),
+            rms: metrics::rms_speed(now),
+            deepest: largest(deepest, [at_rest]),
+            at_rest,
+        })
     }
 }
 
@@ -115,18 +120,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    fn of(before: &World, simulation: &Simulation) -> Self {
-        let world = &simulation.world;
-        let at_rest = simulation.penetration().max;
-        Self {
-            fallen: (before.dynamic_count() - metrics::in_place_count(before, world)) as f64,
-            drift: metrics::drift(before, world),
-            rms: metrics::rms_speed(world),
-            deepest: at_rest,
-            at_rest,
-        }
-    }
-
     /// That every body is in place.
     fn stands(&self, what: impl std::fmt::Display) -> Check {
         Check::at_most(format!("{what}: bodies out of place"), self.fallen, 0.0)

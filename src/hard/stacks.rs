@@ -8,6 +8,7 @@ use crate::load::Load;
 use crate::residuals::Measure;
 use crate::scenes::Scene;
 use crate::solver::{Order, Solver};
+use crate::stats::largest;
 use crate::world::{Body, Shape, World};
 
 /// Sweeps over a saved step, a power of two.
@@ -112,7 +113,7 @@ fn asymmetry<'a>(pairs: impl Iterator<Item = &'a Pair> + Clone, side: usize) -> 
         let mean = images.iter().sum::<f64>() / images.len() as f64;
         (forces[i] / mean - 1.0).abs()
     });
-    (points, worst.fold(0.0, |x, y| if y > x || y.is_nan() { y } else { x }))
+    (points, largest(0.0, worst))
 }
 
 /// By how much e_vel grows most as plain sweeps in f64 double, over the first step of a world, and what is left of it.
@@ -128,7 +129,7 @@ fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
     for power in 0..SWEEPS.ilog2() {
         let e = error(1 << power)?;
         // Below that it is rounding.
-        growth = growth.max(if e < 1e-12 { 0.0 } else { e / before });
+        growth = largest(growth, [if e < 1e-12 { 0.0 } else { e / before }]);
         before = e;
     }
     Ok((growth, before))

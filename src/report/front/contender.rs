@@ -2,9 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::backend::Backend;
-use crate::backend::cpu::{Cpu, Reference};
-use crate::backend::gpu::{AdapterChoice, Gpu};
+use crate::backend::Numbers;
 use crate::config::{FrictionRule, Method, SolverConfig};
 use crate::error::{Error, Result};
 use crate::scenes::Scene;
@@ -108,13 +106,13 @@ impl Drystone {
     /// # Errors
     /// No such backend, no adapter, or settings that contradict each other.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
-        let runs: Box<dyn Backend> = match backend {
-            "reference" => Box::new(Reference::<f32>::new()),
-            "cpu" => Box::new(Cpu::new()),
-            "gpu" => Box::new(Gpu::new(AdapterChoice::Best, false)?),
+        let runs = match backend {
+            "reference" => Numbers::Reference,
+            "cpu" => Numbers::Cpu,
+            "gpu" => Numbers::Gpu,
             other => return Err(Error::input(format!("backend {other:?}: must be reference, cpu or gpu"))),
         };
-        let simulation = Simulation::new(scene.world.clone(), config.clone(), runs)?;
+        let simulation = Simulation::new(scene.world.clone(), config.clone(), runs.open(false)?)?;
         Ok(Self { simulation, backend: backend.into(), dt: scene.dt })
     }
 }
