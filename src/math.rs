@@ -35,6 +35,16 @@ pub trait Lane:
     fn mask(value: bool) -> Self::Mask;
     /// `if_true` where the mask holds; arguments in WGSL's order.
     fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
+    /// The larger of two; `b` if they are equal or either is NaN.
+    #[inline(always)]
+    fn larger(a: Self, b: Self) -> Self {
+        Self::select(b, a, a.gt(b))
+    }
+    /// The smaller of two; `b` if they are equal or either is NaN.
+    #[inline(always)]
+    fn smaller(a: Self, b: Self) -> Self {
+        Self::select(b, a, b.gt(a))
+    }
     /// 1/sqrt(x) for normal positive x. In `f32` exactly as the shader does it, about 1 ulp off.
     fn inverse_sqrt(self) -> Self;
 }
@@ -140,13 +150,13 @@ fn polynomial<L: Lane>(s: L, c: [f64; 6]) -> L {
 /// The larger of two; `b` if they are equal or either is NaN.
 #[inline(always)]
 pub fn larger<L: Lane>(a: L, b: L) -> L {
-    L::select(b, a, a.gt(b))
+    L::larger(a, b)
 }
 
 /// The smaller of two; `b` if they are equal or either is NaN.
 #[inline(always)]
 pub fn smaller<L: Lane>(a: L, b: L) -> L {
-    L::select(b, a, b.gt(a))
+    L::smaller(a, b)
 }
 
 /// 1/x, of either sign.
@@ -290,6 +300,12 @@ pub fn quat_mul<L: Lane>(a: Quat<L>, b: Quat<L>) -> Quat<L> {
 pub fn turned<L: Lane>(q: Quat<L>, r: Vec3<L>) -> Vec3<L> {
     let t = cross3(q.axis, r);
     (t * q.w + cross3(q.axis, t)) * L::constant(2.0)
+}
+
+/// The same rotation backwards.
+#[inline(always)]
+pub fn conjugate<L: Lane>(q: Quat<L>) -> Quat<L> {
+    Quat { axis: vec3(-q.axis.x, -q.axis.y, -q.axis.z), w: q.w }
 }
 
 /// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns

@@ -2,7 +2,7 @@
 //! G M⁻¹ Gᵀ, in f64 where they are written over a lane.
 
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::kernels::contact::current_separation;
+use drystone::kernels::contact::NormalMovement;
 use drystone::kernels::joint::joint_column;
 use drystone::kernels::pair::relative_velocity;
 use drystone::kernels::{Body, Contact, Mass, Pair, Point, Rules, Sym3};
@@ -75,7 +75,7 @@ impl Case {
     fn separation(&self, pair: &Pair<f64>) -> f64 {
         let contact = Contact { normal: lane(self.normal), ..Contact::default() };
         let point = Point { r_a: lane(self.r[0]), r_b: lane(self.r[1]), separation: 0.125, ..Point::default() };
-        current_separation(Rules::default(), pair, &contact, &point)
+        NormalMovement::of(Rules::default(), pair, &contact).current_separation(&point)
     }
 }
 

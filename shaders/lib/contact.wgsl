@@ -3,16 +3,25 @@
 override ACCUMULATED: bool = true;
 override ROUND: bool = true;
 
-// Separation now: what it was when the step began, and what the bodies moved since.
-fn current_separation(pair: ptr<function, Pair>, contact: Contact, point: Point) -> f32 {
-    var arm_a = point.r_a;
-    var arm_b = point.r_b;
+// How two bodies moved along a normal since the step began: a separation is linear in the arms.
+struct NormalMovement { shift: f32, turn_a: vec3f, turn_b: vec3f }
+
+fn normal_movement(pair: ptr<function, Pair>, contact: Contact) -> NormalMovement {
+    let turn_a = turned(conjugate((*pair).a.dq), contact.normal);
+    let turn_b = turned(conjugate((*pair).b.dq), contact.normal);
+    var shift = dot3((*pair).b.dp - (*pair).a.dp, contact.normal);
     // A round surface turns under its contact: what is carried along is the centre of its curvature.
     if ROUND {
-        arm_a -= contact.normal * contact.radius_a;
-        arm_b += contact.normal * contact.radius_b;
+        shift = shift + contact.radius_a * dot3(turn_a, contact.normal);
+        shift = shift + contact.radius_b * dot3(turn_b, contact.normal);
     }
-    return point.separation + dot3(relative_movement(pair, arm_a, arm_b), contact.normal);
+    return NormalMovement(shift, turn_a, turn_b);
+}
+
+// Separation now: what it was when the step began, and what the bodies moved since.
+fn current_separation(movement: NormalMovement, point: Point) -> f32 {
+    let by_turning = dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a);
+    return point.separation + (movement.shift + by_turning);
 }
 
 fn pair_softness(pair: ptr<function, Pair>) -> Softness {
@@ -26,8 +35,8 @@ fn clamp_normal(sum: f32, correction: f32) -> f32 {
     return sum + larger(correction, 0.0);
 }
 
-fn solve_normal(pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, impulse: ptr<function, Impulse>) {
-    let s = current_separation(pair, contact, point);
+fn solve_normal(pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
+    let s = current_separation(movement, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, 0.0), -softness.push_limit);

@@ -43,6 +43,9 @@ fn turned(q: vec4f, r: vec3f) -> vec3f {
     return (t * q.w + cross3(axis, t)) * 2.0;
 }
 
+// The same rotation backwards.
+fn conjugate(q: vec4f) -> vec4f { return vec4f(-q.xyz, q.w); }
+
 // The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
 // by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
 fn exp_rotation(r: vec3f) -> vec4f {

@@ -2,9 +2,10 @@
 
 fn sweep_normals(pair: ptr<function, Pair>, contact: Contact) {
     let softness = pair_softness(pair);
+    let movement = normal_movement(pair, contact);
     for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
         var impulse = impulses[k];
-        solve_normal(pair, contact, points[k], softness, &impulse);
+        solve_normal(pair, contact, points[k], softness, movement, &impulse);
         impulses[k] = impulse;
     }
 }

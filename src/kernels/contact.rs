@@ -6,21 +6,45 @@
 
 use super::Rules;
 use super::friction::{solve_friction, solve_twist};
-use super::pair::{apply_impulse, note_correction, relative_movement, relative_velocity};
+use super::pair::{apply_impulse, note_correction, relative_velocity};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
-use crate::math::{Lane, cross3, dot3, larger, smaller};
+use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, smaller, turned};
 
-/// Separation now: what it was when the step began, and what the bodies moved since.
-#[inline(always)]
-pub fn current_separation<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<L>, point: &Point<L>) -> L {
-    let (mut arm_a, mut arm_b) = (point.r_a, point.r_b);
-    // A round surface turns under its contact: what is carried along is the centre of its curvature.
-    if rules.round {
-        arm_a -= contact.normal * contact.radius_a;
-        arm_b += contact.normal * contact.radius_b;
+/// How two bodies moved along a normal since the step began: a separation is linear in the arms.
+///
+/// Where body b is rotated by q, its arm r moves by n . (q r - r) = (q⁻¹ n - n) . r along the normal n.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NormalMovement<L> {
+    /// Of the centre of b relative to that of a.
+    shift: L,
+    /// Of an arm of a, per length.
+    turn_a: Vec3<L>,
+    /// Of an arm of b, per length.
+    turn_b: Vec3<L>,
+}
+
+impl<L: Lane> NormalMovement<L> {
+    /// Double of `normal_movement`.
+    #[inline(always)]
+    pub fn of(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> Self {
+        let turn_a = turned(conjugate(pair.a.dq), contact.normal);
+        let turn_b = turned(conjugate(pair.b.dq), contact.normal);
+        let mut shift = dot3(pair.b.dp - pair.a.dp, contact.normal);
+        // A round surface turns under its contact: what is carried along is the centre of its curvature.
+        if rules.round {
+            shift = shift + contact.radius_a * dot3(turn_a, contact.normal);
+            shift = shift + contact.radius_b * dot3(turn_b, contact.normal);
+        }
+        Self { shift, turn_a, turn_b }
     }
-    point.separation + dot3(relative_movement(pair, arm_a, arm_b), contact.normal)
+
+    /// Separation now: what it was when the step began, and what the bodies moved since.
+    #[inline(always)]
+    pub fn current_separation(&self, point: &Point<L>) -> L {
+        let by_turning = dot3(self.turn_b, point.r_b) - dot3(self.turn_a, point.r_a);
+        point.separation + (self.shift + by_turning)
+    }
 }
 
 #[inline(always)]
@@ -53,13 +77,14 @@ fn solve_normal<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     softness: &SoftnessOf<L>,
+    movement: &NormalMovement<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
     impulse: &mut Impulse<L>,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let s = current_separation(rules, pair, contact, point);
+    let s = movement.current_separation(point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s.gt(zero);
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, zero), -softness.push_limit);
@@ -122,13 +147,14 @@ pub fn solve_contact<L: Lane>(
 ) {
     let has_friction = rules.friction != FrictionRule::None;
     let softness = pair_softness(params, pair);
+    let movement = NormalMovement::of(rules, pair, contact);
     let contact_points = rules.contact_points(points.len());
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {
             sweep_friction(rules, params, pair, contact, points, impulses);
         }
         for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
-            solve_normal(rules, params, &softness, pair, contact, point, impulse);
+            solve_normal(rules, params, &softness, &movement, pair, contact, point, impulse);
         }
         if has_friction && !rules.friction_first {
             sweep_friction(rules, params, pair, contact, points, impulses);

@@ -1,23 +1,27 @@
-//! Contacts in groups of eight lanes: from the rows of a problem, and back.
+//! Contacts in groups of sixteen lanes: from the rows of a problem, and back.
 
 #![allow(unsafe_code)]
 
 use super::crew::Crew;
-use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
+use super::sweep::place;
+use super::wide::{Lanes, Portable, WIDTH, Wide};
 use crate::kernels::Step;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
 use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
-/// Eight contacts of one color with as many points each.
+/// Sixteen contacts of one color with as many points each.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Group {
-    pub body_a: [u32; 8],
-    pub body_b: [u32; 8],
+    /// Where the states of the bodies are, and which of them can move, a bit a lane.
+    pub places_a: [u32; WIDTH],
+    pub places_b: [u32; WIDTH],
+    pub movable_a: u16,
+    pub movable_b: u16,
     /// Rows of the problem that the lanes hold; `NO_ROW` where there is none.
-    rows: [u32; 8],
-    pub contact: [Row8; 10],
+    rows: [u32; WIDTH],
+    pub contact: [Wide; 10],
     /// Where its points begin, in `points` and `impulses`.
     pub first_point: u32,
     /// Points, the patch included.
@@ -32,8 +36,8 @@ pub(super) struct Groups {
     pub all: Vec<Group>,
     /// Where the groups of each color begin.
     pub colors: Vec<u32>,
-    pub points: Vec<[Row8; 12]>,
-    pub impulses: Vec<[Row8; 4]>,
+    pub points: Vec<[Wide; 12]>,
+    pub impulses: Vec<[Wide; 4]>,
     /// What accelerated sweeps leave for each other, kept from one run to the next.
     steps: Vec<Step<Portable>>,
 }
@@ -43,8 +47,8 @@ impl Groups {
     pub fn load(&mut self, problem: &StepProblem, crew: &Crew) {
         self.deal(problem);
         let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
-        self.points.resize(count, [Row8::default(); 12]);
-        self.impulses.resize(count, [Row8::default(); 4]);
+        self.points.resize(count, [Wide::default(); 12]);
+        self.impulses.resize(count, [Wide::default(); 4]);
         let (points, impulses) = (Shared::new(&mut self.points), Shared::new(&mut self.impulses));
         let (len, all) = (self.all.len(), Shared::new(&mut self.all));
         crew.spread(0..len, &|range| {
@@ -120,19 +124,19 @@ impl Groups {
         let mut next_point = 0;
         for color in problem.contact_colors() {
             self.colors.push(self.all.len() as u32);
-            let mut open = [[NO_ROW; 8]; 4];
+            let mut open = [[NO_ROW; WIDTH]; 4];
             let mut filled = [0; 4];
-            let mut close = |rows: &mut [u32; 8], points: u32| {
+            let mut close = |rows: &mut [u32; WIDTH], points: u32| {
                 self.all.push(Group { rows: *rows, first_point: next_point, points, ..Group::default() });
                 next_point += points;
-                *rows = [NO_ROW; 8];
+                *rows = [NO_ROW; WIDTH];
             };
             for row in problem.rows_of(&(color..color + 1)) {
                 let count = problem.contacts[row].point_count;
                 let (rows, filled) = (&mut open[count as usize - 1], &mut filled[count as usize - 1]);
                 rows[*filled] = row as u32;
                 *filled += 1;
-                if *filled == 8 {
+                if *filled == WIDTH {
                     close(rows, count + patch);
                     *filled = 0;
                 }
@@ -147,13 +151,17 @@ impl Groups {
 
 impl Group {
     /// Lanes without a contact hold one of nobody with nobody: a body more than the problem has.
-    fn fill(&mut self, problem: &StepProblem, points: &mut [[Row8; 12]], impulses: &mut [[Row8; 4]]) {
+    fn fill(&mut self, problem: &StepProblem, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
         let nobody = problem.bodies.len() as u32;
         let nothing = ContactRow { body_a: nobody, body_b: nobody, first_point: NO_ROW, ..ContactRow::default() };
         let (no_point, no_impulse) = (PointRow::default(), ImpulseRow::default());
-        for lane in 0..8 {
+        for lane in 0..WIDTH {
             let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);
-            (self.body_a[lane], self.body_b[lane]) = (c.body_a, c.body_b);
+            let (a, b) = (c.body_a as usize, c.body_b as usize);
+            assert!(a.max(b) <= problem.bodies.len(), "a contact of a body that there is not");
+            (self.places_a[lane], self.places_b[lane]) = (place(a), place(b));
+            let movable = |body: usize| u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
+            (self.movable_a, self.movable_b) = (self.movable_a | movable(a), self.movable_b | movable(b));
             let ([nx, ny, nz], [tx, ty, tz]) = (c.normal, c.tangent);
             let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
             set_lane(&mut self.contact, lane, &header);
@@ -166,15 +174,15 @@ impl Group {
     }
 }
 
-/// The normal and the tangents of eight impulses.
-fn components(impulse: &[Row8; 4]) -> Vec3<Portable> {
+/// The normal and the tangents of sixteen impulses.
+fn components(impulse: &[Wide; 4]) -> Vec3<Portable> {
     let [normal, tangent_1, tangent_2, _] = impulse.each_ref().map(Portable::load);
     vec3(normal, tangent_1, tangent_2)
 }
 
 /// Writes one lane of some rows.
 #[inline(always)]
-fn set_lane<const N: usize>(rows: &mut [Row8; N], lane: usize, values: &[f32; N]) {
+fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
     for (row, value) in rows.iter_mut().zip(values) {
         row.0[lane] = *value;
     }

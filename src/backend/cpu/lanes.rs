@@ -1,7 +1,7 @@
-//! The kernels over eight lanes and all threads: eight constraints of one color at a time.
+//! The kernels over sixteen lanes and all threads: sixteen contacts of one color at a time.
 //!
 //! The same kernel text as the reference, over another lane type, so the results are the reference's to the last bit.
-//! Contacts of one color and one number of points stand in groups of eight, lane by lane; what does not fill a group is
+//! Contacts of one color and one number of points stand in groups of sixteen, lane by lane; what does not fill a group is
 //! filled up with contacts of nothing with nothing. The instruction set is chosen at run time. Color order makes the
 //! order inside a pass irrelevant, so a pass can be cut into as many tasks as there are threads.
 
@@ -11,9 +11,9 @@ use super::super::Backend;
 use super::begin_sweep;
 use super::crew::Crew;
 use super::groups::Groups;
-use super::lane8::Row8;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_velocities, load_mass, velocity_row};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_velocities, velocity_row};
+use super::wide::{Row8, WIDTH, Wide};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
 use crate::kernels::joint::{solve_joint, warm_start_joint};
@@ -21,16 +21,13 @@ use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, step_length
 use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
 use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, StepProblem};
+use crate::problem::{BodyRow, ConvergenceRow, MassRow, StepProblem};
 
 /// The backend of the processor.
 pub struct Cpu {
     instructions: InstructionSet,
     bodies: Vec<State>,
-    masses: Vec<Row8>,
     accelerations: Vec<Row8>,
-    /// v . w . without the impulses of the substep.
-    free: Vec<Row8>,
     groups: Groups,
     convergence: ConvergenceRow,
     inertias: Vec<Inertia<f32>>,
@@ -64,9 +61,7 @@ impl Cpu {
         Self {
             instructions,
             bodies: Vec::new(),
-            masses: Vec::new(),
             accelerations: Vec::new(),
-            free: Vec::new(),
             groups: Groups::default(),
             convergence: ConvergenceRow::default(),
             inertias: Vec::new(),
@@ -80,28 +75,21 @@ impl Cpu {
     }
 
     fn load(&mut self, problem: &StepProblem, crew: &Crew) {
-        let rows8 = |row: &crate::problem::BodyRow| {
-            let all: &[f32; 16] = bytemuck::cast_ref(row);
-            let half = |at: usize| Row8(std::array::from_fn(|i| all[at + i]));
-            State { velocity: half(0), movement: half(8) }
+        let state = |(body, mass): (&BodyRow, &MassRow)| {
+            let (body, mass): (&[f32; 16], &[f32; 12]) = (bytemuck::cast_ref(body), bytemuck::cast_ref(mass));
+            let row = |from: &[f32]| Row8(std::array::from_fn(|i| from[i]));
+            State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]), free: Row8::default() }
         };
         self.bodies.clear();
-        self.bodies.extend(problem.bodies.iter().map(rows8));
+        self.bodies.extend(problem.bodies.iter().zip(&problem.masses).map(state));
         // One more that nothing moves, for lanes without a contact, and some to fill the last group of bodies.
-        self.bodies.resize((problem.bodies.len() + 1).next_multiple_of(8), State::default());
-        self.masses.clear();
-        self.masses.extend(problem.masses.iter().map(|row| {
-            let all: &[f32; 12] = bytemuck::cast_ref(row);
-            Row8(std::array::from_fn(|i| all[i]))
-        }));
-        self.masses.resize(self.bodies.len(), Row8::default());
+        self.bodies.resize((problem.bodies.len() + 1).next_multiple_of(WIDTH), State::default());
         self.accelerations.clear();
         self.accelerations.extend(problem.masses.iter().map(|row| {
             let [x, y, z] = row.acceleration;
             Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0])
         }));
         self.accelerations.resize(self.bodies.len(), Row8::default());
-        self.free.resize(self.bodies.len(), Row8::default());
         self.inertias.clear();
         self.inertias.extend(problem.inertias.iter().map(Inertia::load));
         self.joints.clear();
@@ -136,15 +124,15 @@ impl Cpu {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::ClearImpulses => {
                 for impulse in &mut self.groups.impulses {
-                    impulse[..3].fill(Row8::default());
+                    impulse[..3].fill(Wide::default());
                 }
             }
             Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
-                let groups = 0..self.bodies.len() / 8;
+                let groups = 0..self.bodies.len() / WIDTH;
                 let (kernel, params) = (pass.kernel, &problem.params);
-                let (bodies, free) = (Shared::new(&mut self.bodies), Shared::new(&mut self.free));
+                let bodies = Shared::new(&mut self.bodies);
                 let (instructions, accelerations) = (self.instructions, &self.accelerations);
-                let work = BodyWork { kernel, params, bodies, free, accelerations };
+                let work = BodyWork { kernel, params, bodies, accelerations };
                 crew.spread(groups, &|range| work.run(instructions, range));
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
@@ -158,7 +146,6 @@ impl Cpu {
                         kernel: pass.kernel,
                         params: &problem.params,
                         bodies: Shared::new(&mut self.bodies),
-                        masses: &self.masses,
                         groups: &self.groups.all,
                         points: &self.groups.points,
                         impulses: Shared::new(&mut self.groups.impulses),
@@ -173,11 +160,11 @@ impl Cpu {
                 for (row, inertia) in problem.inertias.iter().zip(&self.inertias) {
                     let i = row.body as usize;
                     let mut body = self.bodies[i].load();
-                    let [vx, vy, vz, _, wx, wy, wz, _] = self.free[i].0;
+                    let [vx, vy, vz, _, wx, wy, wz, _] = self.bodies[i].free.0;
                     let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
                     integrate_gyroscopic(&params, inertia, &mut body, &mut free);
                     self.bodies[i].store_velocity(&body);
-                    self.free[i] = velocity_row(free.v, free.w);
+                    self.bodies[i].free = velocity_row(free.v, free.w);
                 }
             }
             Kernel::Extrapolate { first, measured } => {
@@ -236,8 +223,8 @@ impl Cpu {
             let mut pair = Pair {
                 a: self.bodies[a].load(),
                 b: self.bodies[b].load(),
-                mass_a: load_mass(&self.masses[a]),
-                mass_b: load_mass(&self.masses[b]),
+                mass_a: self.bodies[a].load_mass(),
+                mass_b: self.bodies[b].load_mass(),
                 moving: 0.0,
             };
             kernel(&params, &mut pair, &self.joints[i], &mut self.joint_impulses[i]);
@@ -260,11 +247,11 @@ impl Backend for Cpu {
     fn adapter(&self) -> String {
         let threads = rayon::current_num_threads();
         let plural = if threads == 1 { "" } else { "s" };
-        format!("{threads} thread{plural}, 8 lanes, {}", self.instructions.name())
+        format!("{threads} thread{plural}, {WIDTH} lanes, {}", self.instructions.name())
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        let widest = problem.bodies.len().max(problem.contacts.len()).div_ceil(8);
+        let widest = problem.bodies.len().max(problem.contacts.len()).div_ceil(WIDTH);
         Crew::lead(widest, |crew| {
             self.load(problem, crew);
             for pass in passes {

@@ -1,13 +1,13 @@
-//! The CPU backends: the reference, one constraint at a time, and the same kernels over eight lanes and all threads.
+//! The CPU backends: the reference, one constraint at a time, and the same kernels over sixteen lanes and all threads.
 
 mod crew;
 mod groups;
-mod lane8;
 mod lanes;
 mod peak;
 mod reference;
 mod shared;
 mod sweep;
+mod wide;
 
 pub use lanes::Cpu;
 pub use peak::multiply_and_add;

@@ -2,8 +2,8 @@
 
 #![allow(unsafe_code)]
 
-use super::lane8::{Lane8, Portable};
 use super::sweep::InstructionSet;
+use super::wide::{Lanes, Portable, WIDTH};
 
 /// Chains of each kind, so that every unit of the processor always has one that waits for nothing.
 const CHAINS: usize = 6;
@@ -16,18 +16,27 @@ pub fn multiply_and_add(rounds: usize) -> u64 {
         // SAFETY: `InstructionSet::best` asked the processor.
         #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx2 => unsafe { chains_avx2(rounds) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => unsafe { chains_avx512(rounds) },
     }
-    (rounds * 2 * CHAINS * 8) as u64
+    (rounds * 2 * CHAINS * WIDTH) as u64
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn chains_avx2(rounds: usize) {
-    chains::<super::lane8::avx2::Avx2>(rounds);
+    chains::<super::wide::Avx2>(rounds);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn chains_avx512(rounds: usize) {
+    chains::<super::wide::Avx512>(rounds);
 }
 
 #[inline(always)]
-fn chains<L: Lane8>(rounds: usize) {
+fn chains<L: Lanes>(rounds: usize) {
     let (factor, summand) = (std::hint::black_box(L::constant(0.999_999)), std::hint::black_box(L::constant(1e-3)));
     let (mut products, mut sums) = ([L::constant(1.0); CHAINS], [L::constant(1.0); CHAINS]);
     for _ in 0..rounds {

@@ -16,7 +16,7 @@ pub struct Shared<'a, T> {
     borrowed: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: a `Shared` only hands out elements through `write` and `read`, whose callers promise that nobody writes an element
+// SAFETY: a `Shared` only hands out elements through functions whose callers promise that nobody writes an element
 // that another thread uses.
 unsafe impl<T: Send> Send for Shared<'_, T> {}
 unsafe impl<T: Send> Sync for Shared<'_, T> {}
@@ -27,14 +27,10 @@ impl<'a, T: Copy> Shared<'a, T> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), borrowed: PhantomData }
     }
 
-    /// Reads one element.
-    ///
-    /// # Safety
-    /// No other thread writes it meanwhile.
+    /// Where the first element is. Reading and writing through it asks the same as the functions below.
     #[inline(always)]
-    pub unsafe fn read(&self, i: usize) -> T {
-        assert!(i < self.len);
-        unsafe { *self.start.add(i) }
+    pub fn as_ptr(&self) -> *mut T {
+        self.start
     }
 
     /// Some elements, to write in place.

@@ -1,4 +1,4 @@
-//! The inner loops of the lanes: what one task does to some groups of eight.
+//! The inner loops of the lanes: what one task does to some groups of sixteen.
 
 #![allow(unsafe_code)]
 
@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::groups::Group;
-use super::lane8::{Lane8, Portable, Row8};
 use super::shared::Shared;
+use super::wide::{Lanes, Portable, Row8, WIDTH, Wide, lanes};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
 use crate::kernels::momentum::extrapolated;
@@ -16,11 +16,23 @@ use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{Params, Softness};
 
-/// Velocities of a body, and its movement: v . w . and dp . dq.
+/// All that the passes of a step know of a body: two lines of the cache.
 #[derive(Clone, Copy, Default)]
+#[repr(C, align(128))]
 pub(super) struct State {
+    /// v . w .
     pub velocity: Row8,
+    /// dp . dq
     pub movement: Row8,
+    /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz .
+    pub mass: Row8,
+    /// v . w . without the impulses of the substep.
+    pub free: Row8,
+}
+
+/// Where a body's state begins, in units of 8 bytes.
+pub(super) fn place(body: usize) -> u32 {
+    u32::try_from(body * size_of::<State>() / 8).expect("fewer than 268 million bodies")
 }
 
 impl State {
@@ -35,6 +47,13 @@ impl State {
         }
     }
 
+    /// Its masses.
+    pub fn load_mass(&self) -> Mass<f32> {
+        let [xx, xy, xz, inv_mass, yy, yz, zz, _] = self.mass.0;
+        let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
+        Mass { inv_inertia, inv_mass, acceleration: Vec3::default() }
+    }
+
     /// Takes over the velocities.
     pub fn store_velocity(&mut self, body: &Body<f32>) {
         self.velocity = velocity_row(body.v, body.w);
@@ -46,52 +65,6 @@ pub(super) fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
     Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0])
 }
 
-/// The masses that a row of eight numbers holds.
-pub(super) fn load_mass(row: &Row8) -> Mass<f32> {
-    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = row.0;
-    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
-}
-
-/// An array of eight, without a closure: a closure would be compiled for the plain instruction set.
-macro_rules! eight {
-    ($lane:ident => $value:expr) => {
-        [
-            {
-                let $lane = 0;
-                $value
-            },
-            {
-                let $lane = 1;
-                $value
-            },
-            {
-                let $lane = 2;
-                $value
-            },
-            {
-                let $lane = 3;
-                $value
-            },
-            {
-                let $lane = 4;
-                $value
-            },
-            {
-                let $lane = 5;
-                $value
-            },
-            {
-                let $lane = 6;
-                $value
-            },
-            {
-                let $lane = 7;
-                $value
-            },
-        ]
-    };
-}
-
 /// What a processor can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum InstructionSet {
@@ -100,14 +73,22 @@ pub(super) enum InstructionSet {
     /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::best`] makes it, after it has asked.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// Sixteen numbers in one register; the same holds.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl InstructionSet {
     /// The best that this processor has.
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
+        {
+            if std::arch::is_x86_feature_detected!("avx512f") && std::env::var("DRY").is_err() {
+                return Self::Avx512;
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                return Self::Avx2;
+            }
         }
         Self::Portable
     }
@@ -118,6 +99,8 @@ impl InstructionSet {
             Self::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => "AVX2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => "AVX-512",
         }
     }
 }
@@ -130,6 +113,9 @@ macro_rules! enter {
             // SAFETY: `InstructionSet::best` asked the processor.
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 => unsafe { $self.run_avx2($range) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx512 => unsafe { $self.run_avx512($range) },
         }
     };
 }
@@ -139,12 +125,11 @@ pub(super) struct BodyWork<'a> {
     pub kernel: Kernel,
     pub params: &'a Params,
     pub bodies: Shared<'a, State>,
-    pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
 }
 
 impl BodyWork<'_> {
-    /// Does groups of eight bodies; no other task has the same.
+    /// Does groups of sixteen bodies; no other task has the same.
     pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
         enter!(self, instructions, groups)
     }
@@ -152,38 +137,43 @@ impl BodyWork<'_> {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn run_avx2(&self, groups: Range<usize>) {
-        self.run_on::<super::lane8::avx2::Avx2>(groups);
+        self.run_on::<super::wide::Avx2>(groups);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn run_avx512(&self, groups: Range<usize>) {
+        self.run_on::<super::wide::Avx512>(groups);
     }
 
     #[inline(always)]
-    fn run_on<L: Lane8>(&self, groups: Range<usize>) {
+    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
         let params = wide_params::<L>(self.params);
         for group in groups {
-            let bodies: [usize; 8] = eight!(lane => 8 * group + lane);
+            let range = WIDTH * group..WIDTH * (group + 1);
             // SAFETY: tasks have different groups, and so different bodies.
-            let states = unsafe { read_states(&self.bodies, bodies) };
-            let mut body = wide_body::<L>(&states);
+            let states = unsafe { self.bodies.slice(range.clone()) };
+            // SAFETY: there are sixteen.
+            let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
             if let Kernel::IntegrateVelocities { carry } = self.kernel {
-                let [x, y, z, ..] = L::transposed(eight!(lane => L::load(&self.accelerations[bodies[lane]])));
+                let accelerations = &self.accelerations[range];
+                // SAFETY: rows are a quarter of a state.
+                let [x, y, z, ..] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORS.map(|place| place / 4)) };
                 let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
                 // SAFETY: as above.
-                let rows = unsafe { self.free.slice(bodies[0]..bodies[0] + 8) };
-                let [vx, vy, vz, _, wx, wy, wz, _] = L::transposed(eight!(lane => L::load(&rows[lane])));
-                let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+                let mut free = unsafe { wide_free::<L>(states.as_ptr(), &NEIGHBORS) };
                 integrate_velocities(carry, &params, &mass, &mut body, &mut free);
-                let (v, w, zero) = (free.v, free.w, L::constant(0.0));
-                let freed = L::transposed([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero]);
-                for (row, lane) in rows.iter_mut().zip(freed) {
-                    *row = lane.store();
+                for (state, free) in states.iter_mut().zip(velocity_rows(free.v, free.w)) {
+                    state.free = free;
                 }
             } else {
                 integrate_positions(&params, &mut body);
+                for (state, movement) in states.iter_mut().zip(movement_rows(&body)) {
+                    state.movement = movement;
+                }
             }
-            let (velocities, movements) = (velocity_rows(&body), movement_rows(&body));
-            for (lane, &i) in bodies.iter().enumerate() {
-                let state = State { velocity: velocities[lane].store(), movement: movements[lane].store() };
-                // SAFETY: as above.
-                unsafe { self.bodies.write(i, state) };
+            for (state, velocity) in states.iter_mut().zip(velocity_rows(body.v, body.w)) {
+                state.velocity = velocity;
             }
         }
     }
@@ -215,10 +205,9 @@ pub(super) struct ContactWork<'a> {
     pub kernel: Kernel,
     pub params: &'a Params,
     pub bodies: Shared<'a, State>,
-    pub masses: &'a [Row8],
     pub groups: &'a [Group],
-    pub points: &'a [[Row8; 12]],
-    pub impulses: Shared<'a, [Row8; 4]>,
+    pub points: &'a [[Wide; 12]],
+    pub impulses: Shared<'a, [Wide; 4]>,
     /// Set if a correction was above the tolerance.
     pub moving: &'a AtomicBool,
 }
@@ -232,11 +221,17 @@ impl ContactWork<'_> {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn run_avx2(&self, groups: Range<usize>) {
-        self.run_on::<super::lane8::avx2::Avx2>(groups);
+        self.run_on::<super::wide::Avx2>(groups);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn run_avx512(&self, groups: Range<usize>) {
+        self.run_on::<super::wide::Avx512>(groups);
     }
 
     #[inline(always)]
-    fn run_on<L: Lane8>(&self, groups: Range<usize>) {
+    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
         let params = wide_params::<L>(self.params);
         for group in groups {
             self.sweep::<L>(&params, &self.groups[group]);
@@ -244,17 +239,19 @@ impl ContactWork<'_> {
     }
 
     #[inline(always)]
-    fn sweep<L: Lane8>(&self, params: &StepParams<L>, group: &Group) {
-        let (a, b): ([usize; 8], [usize; 8]) =
-            (eight!(lane => group.body_a[lane] as usize), eight!(lane => group.body_b[lane] as usize));
-        // SAFETY: a body that this color writes is in this group only; the others nobody writes.
-        let (state_a, state_b) = unsafe { (read_states(&self.bodies, a), read_states(&self.bodies, b)) };
-        let mut pair = Pair {
-            a: wide_body::<L>(&state_a),
-            b: wide_body::<L>(&state_b),
-            mass_a: wide_mass::<L>(self.masses, a),
-            mass_b: wide_mass::<L>(self.masses, b),
-            moving: L::constant(0.0),
+    fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &Group) {
+        let (a, b) = (&group.places_a, &group.places_b);
+        let states = self.bodies.as_ptr();
+        // SAFETY: `Groups::load` asked whether the bodies are there. One that this color writes is in this group only, and the
+        // others nobody writes.
+        let mut pair = unsafe {
+            Pair {
+                a: wide_body::<L>(states, a),
+                b: wide_body::<L>(states, b),
+                mass_a: wide_mass::<L>(states, a),
+                mass_b: wide_mass::<L>(states, b),
+                moving: L::constant(0.0),
+            }
         };
         let rules = self.kernel.rules().unwrap_or_default();
         let rows = group.first_point as usize..(group.first_point + group.points) as usize;
@@ -271,69 +268,91 @@ impl ContactWork<'_> {
             Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, contact, points, impulses),
             _ => restitute_contact(rules, params, &mut pair, contact, points, impulses),
         }
-        self.store_velocities(a, &pair.a, &state_a, &pair.mass_a);
-        self.store_velocities(b, &pair.b, &state_b, &pair.mass_b);
+        // SAFETY: as above.
+        unsafe {
+            store_velocities(states, a, group.movable_a, &pair.a);
+            store_velocities(states, b, group.movable_b, &pair.b);
+        }
         if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
             self.moving.store(true, Ordering::Relaxed);
         }
     }
+}
 
-    /// Writes the bodies that can move.
-    #[inline(always)]
-    fn store_velocities<L: Lane8>(&self, bodies: [usize; 8], body: &Body<L>, states: &[State; 8], mass: &Mass<L>) {
-        let rows = velocity_rows(body);
-        let inv_mass = mass.inv_mass.store();
-        for (lane, &i) in bodies.iter().enumerate() {
-            if inv_mass.0[lane] > 0.0 {
-                let state = State { velocity: rows[lane].store(), ..states[lane] };
-                // SAFETY: in one color a body that can move is in one lane of one group.
-                unsafe { self.bodies.write(i, state) };
-            }
+/// The places of sixteen bodies that stand beside each other.
+const NEIGHBORS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<State>() / 8) as u32);
+
+/// # Safety
+/// The states are there, and nobody writes them meanwhile; the same below.
+#[inline(always)]
+unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Body<L> {
+    // SAFETY: the caller's promise.
+    let (velocity, movement) = unsafe {
+        (L::gathered(&raw const (*states).velocity, places), L::gathered(&raw const (*states).movement, places))
+    };
+    let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (velocity, movement);
+    Body { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz), dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
+}
+
+/// # Safety
+/// As above.
+#[inline(always)]
+unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
+    // SAFETY: the caller's promise.
+    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = unsafe { L::gathered(&raw const (*states).mass, places) };
+    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
+}
+
+/// # Safety
+/// As above.
+#[inline(always)]
+unsafe fn wide_free<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Free<L> {
+    // SAFETY: the caller's promise.
+    let [vx, vy, vz, _, wx, wy, wz, _] = unsafe { L::gathered(&raw const (*states).free, places) };
+    Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) }
+}
+
+/// Writes the velocities of those that can move, a bit each.
+///
+/// # Safety
+/// The states are there, and nobody else uses those that can move meanwhile.
+#[inline(always)]
+unsafe fn store_velocities<L: Lanes>(states: *mut State, places: &[u32; WIDTH], movable: u16, body: &Body<L>) {
+    if movable == 0 {
+        return;
+    }
+    let rows = velocity_rows(body.v, body.w);
+    for lane in 0..WIDTH {
+        // Almost always all of them.
+        if movable == u16::MAX || movable & (1 << lane) != 0 {
+            // SAFETY: the caller's promise.
+            unsafe {
+                (&raw mut (*states).velocity).cast::<u64>().add(places[lane] as usize).cast::<Row8>().write(rows[lane])
+            };
         }
     }
 }
 
-/// # Safety
-/// Nobody writes these bodies meanwhile.
 #[inline(always)]
-unsafe fn read_states(bodies: &Shared<State>, indices: [usize; 8]) -> [State; 8] {
-    // SAFETY: the caller's promise.
-    unsafe { eight!(lane => bodies.read(indices[lane])) }
+fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
+    let zero = L::constant(0.0);
+    L::scattered([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero])
 }
 
 #[inline(always)]
-fn wide_body<L: Lane8>(states: &[State; 8]) -> Body<L> {
-    let [vx, vy, vz, _, wx, wy, wz, _] = L::transposed(eight!(lane => L::load(&states[lane].velocity)));
-    let [px, py, pz, _, qx, qy, qz, qw] = L::transposed(eight!(lane => L::load(&states[lane].movement)));
-    Body { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz), dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
-}
-
-#[inline(always)]
-fn velocity_rows<L: Lane8>(body: &Body<L>) -> [L; 8] {
-    let (v, w, zero) = (body.v, body.w, L::constant(0.0));
-    L::transposed([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero])
-}
-
-#[inline(always)]
-fn movement_rows<L: Lane8>(body: &Body<L>) -> [L; 8] {
+fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
     let (p, q) = (body.dp, body.dq);
-    L::transposed([p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w])
+    L::scattered([p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w])
 }
 
-#[inline(always)]
-fn wide_mass<L: Lane8>(masses: &[Row8], bodies: [usize; 8]) -> Mass<L> {
-    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = L::transposed(eight!(lane => L::load(&masses[bodies[lane]])));
-    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
-}
-
-/// Rows of eight as rows of lanes, in the same order.
+/// Rows of sixteen as rows of lanes, in the same order.
 ///
 /// # Safety
 /// `T` is `repr(C)` and holds `N` lanes and nothing else.
 #[inline(always)]
-unsafe fn as_lanes<T, const N: usize>(rows: &[[Row8; N]]) -> &[T] {
-    const { assert!(size_of::<T>() == size_of::<[Row8; N]>() && align_of::<T>() <= align_of::<Row8>()) };
-    // SAFETY: the caller's promise; a lane is eight numbers.
+unsafe fn as_lanes<T, const N: usize>(rows: &[[Wide; N]]) -> &[T] {
+    const { assert!(size_of::<T>() == size_of::<[Wide; N]>() && align_of::<T>() <= align_of::<Wide>()) };
+    // SAFETY: the caller's promise; a lane is sixteen numbers.
     unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len()) }
 }
 
@@ -342,15 +361,15 @@ unsafe fn as_lanes<T, const N: usize>(rows: &[[Row8; N]]) -> &[T] {
 /// # Safety
 /// As above.
 #[inline(always)]
-unsafe fn as_lanes_mut<T, const N: usize>(rows: &mut [[Row8; N]]) -> &mut [T] {
-    const { assert!(size_of::<T>() == size_of::<[Row8; N]>() && align_of::<T>() <= align_of::<Row8>()) };
+unsafe fn as_lanes_mut<T, const N: usize>(rows: &mut [[Wide; N]]) -> &mut [T] {
+    const { assert!(size_of::<T>() == size_of::<[Wide; N]>() && align_of::<T>() <= align_of::<Wide>()) };
     // SAFETY: as above.
     unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len()) }
 }
 
 /// Once a task, so that closures do no harm.
 #[inline(always)]
-fn wide_params<L: Lane8>(p: &Params) -> StepParams<L> {
+fn wide_params<L: Lanes>(p: &Params) -> StepParams<L> {
     let c = |x: f32| L::constant(x.into());
     let softness = |s: &Softness| SoftnessOf {
         bias_rate: c(s.bias_rate),

@@ -1,0 +1,186 @@
+//! Sixteen numbers in two AVX2 registers. Only for use inside functions that enable `avx2`, which
+//! [`super::super::sweep`] enters after it has asked the processor.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
+use crate::math::Lane;
+
+/// Two registers.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct Avx2([__m256; 2]);
+
+// SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has been
+// detected; loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes.
+
+impl Default for Avx2 {
+    #[inline(always)]
+    fn default() -> Self {
+        Self::constant(0.0)
+    }
+}
+
+impl PartialEq for Avx2 {
+    fn eq(&self, o: &Self) -> bool {
+        self.store() == o.store()
+    }
+}
+
+impl Add for Avx2 {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self(unsafe { [_mm256_add_ps(self.0[0], o.0[0]), _mm256_add_ps(self.0[1], o.0[1])] })
+    }
+}
+
+impl Sub for Avx2 {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self(unsafe { [_mm256_sub_ps(self.0[0], o.0[0]), _mm256_sub_ps(self.0[1], o.0[1])] })
+    }
+}
+
+impl Mul for Avx2 {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self(unsafe { [_mm256_mul_ps(self.0[0], o.0[0]), _mm256_mul_ps(self.0[1], o.0[1])] })
+    }
+}
+
+impl Neg for Avx2 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(unsafe {
+            let sign = _mm256_set1_ps(-0.0);
+            [_mm256_xor_ps(self.0[0], sign), _mm256_xor_ps(self.0[1], sign)]
+        })
+    }
+}
+
+impl Lane for Avx2 {
+    type Mask = [__m256; 2];
+    #[inline(always)]
+    fn constant(x: f64) -> Self {
+        Self([unsafe { _mm256_set1_ps(x as f32) }; 2])
+    }
+    #[inline(always)]
+    fn gt(self, o: Self) -> Self::Mask {
+        unsafe { [_mm256_cmp_ps::<_CMP_GT_OQ>(self.0[0], o.0[0]), _mm256_cmp_ps::<_CMP_GT_OQ>(self.0[1], o.0[1])] }
+    }
+    #[inline(always)]
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        unsafe { [_mm256_and_ps(a[0], b[0]), _mm256_and_ps(a[1], b[1])] }
+    }
+    #[inline(always)]
+    fn mask(value: bool) -> Self::Mask {
+        [unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(if value { -1 } else { 0 })) }; 2]
+    }
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self {
+        let (f, t) = (if_false.0, if_true.0);
+        Self(unsafe { [_mm256_blendv_ps(f[0], t[0], mask[0]), _mm256_blendv_ps(f[1], t[1], mask[1])] })
+    }
+    #[inline(always)]
+    fn larger(a: Self, b: Self) -> Self {
+        Self(unsafe { [_mm256_max_ps(a.0[0], b.0[0]), _mm256_max_ps(a.0[1], b.0[1])] })
+    }
+    #[inline(always)]
+    fn smaller(a: Self, b: Self) -> Self {
+        Self(unsafe { [_mm256_min_ps(a.0[0], b.0[0]), _mm256_min_ps(a.0[1], b.0[1])] })
+    }
+    #[inline(always)]
+    fn inverse_sqrt(self) -> Self {
+        let half_x = Self::constant(0.5) * self;
+        let three_halves = Self::constant(1.5);
+        let mut y = Self([guess(self.0[0]), guess(self.0[1])]);
+        y = y * (three_halves - half_x * y * y);
+        y = y * (three_halves - half_x * y * y);
+        y = y * (three_halves - half_x * y * y);
+        y
+    }
+}
+
+/// Where Newton's method begins.
+#[inline(always)]
+fn guess(x: __m256) -> __m256 {
+    unsafe {
+        let half_bits = _mm256_srli_epi32::<1>(_mm256_castps_si256(x));
+        _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(0x5f37_5a86), half_bits))
+    }
+}
+
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn load(from: &Wide) -> Self {
+        Self(unsafe { [_mm256_load_ps(from.0.as_ptr()), _mm256_load_ps(from.0.as_ptr().add(8))] })
+    }
+    #[inline(always)]
+    fn store(self) -> Wide {
+        let mut to = Wide::default();
+        unsafe {
+            _mm256_store_ps(to.0.as_mut_ptr(), self.0[0]);
+            _mm256_store_ps(to.0.as_mut_ptr().add(8), self.0[1]);
+        }
+        to
+    }
+    #[inline(always)]
+    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
+        let r: [__m256; WIDTH] = lanes!(lane => unsafe { _mm256_load_ps(row_at(rows, places[lane]).cast()) });
+        let s = transposed([r[8], r[9], r[10], r[11], r[12], r[13], r[14], r[15]]);
+        let r = transposed([r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]]);
+        [
+            Self([r[0], s[0]]),
+            Self([r[1], s[1]]),
+            Self([r[2], s[2]]),
+            Self([r[3], s[3]]),
+            Self([r[4], s[4]]),
+            Self([r[5], s[5]]),
+            Self([r[6], s[6]]),
+            Self([r[7], s[7]]),
+        ]
+    }
+    #[inline(always)]
+    fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
+        let r = transposed([c[0].0[0], c[1].0[0], c[2].0[0], c[3].0[0], c[4].0[0], c[5].0[0], c[6].0[0], c[7].0[0]]);
+        let s = transposed([c[0].0[1], c[1].0[1], c[2].0[1], c[3].0[1], c[4].0[1], c[5].0[1], c[6].0[1], c[7].0[1]]);
+        let mut rows = [Row8::default(); WIDTH];
+        for i in 0..8 {
+            unsafe {
+                _mm256_store_ps(rows[i].0.as_mut_ptr(), r[i]);
+                _mm256_store_ps(rows[i + 8].0.as_mut_ptr(), s[i]);
+            }
+        }
+        rows
+    }
+}
+
+/// Rows become columns.
+#[inline(always)]
+fn transposed(r: [__m256; 8]) -> [__m256; 8] {
+    unsafe {
+        let (a0, a1) = (_mm256_unpacklo_ps(r[0], r[1]), _mm256_unpackhi_ps(r[0], r[1]));
+        let (a2, a3) = (_mm256_unpacklo_ps(r[2], r[3]), _mm256_unpackhi_ps(r[2], r[3]));
+        let (a4, a5) = (_mm256_unpacklo_ps(r[4], r[5]), _mm256_unpackhi_ps(r[4], r[5]));
+        let (a6, a7) = (_mm256_unpacklo_ps(r[6], r[7]), _mm256_unpackhi_ps(r[6], r[7]));
+        let (b0, b1) = (_mm256_shuffle_ps::<0x44>(a0, a2), _mm256_shuffle_ps::<0xee>(a0, a2));
+        let (b2, b3) = (_mm256_shuffle_ps::<0x44>(a1, a3), _mm256_shuffle_ps::<0xee>(a1, a3));
+        let (b4, b5) = (_mm256_shuffle_ps::<0x44>(a4, a6), _mm256_shuffle_ps::<0xee>(a4, a6));
+        let (b6, b7) = (_mm256_shuffle_ps::<0x44>(a5, a7), _mm256_shuffle_ps::<0xee>(a5, a7));
+        [
+            _mm256_permute2f128_ps::<0x20>(b0, b4),
+            _mm256_permute2f128_ps::<0x20>(b1, b5),
+            _mm256_permute2f128_ps::<0x20>(b2, b6),
+            _mm256_permute2f128_ps::<0x20>(b3, b7),
+            _mm256_permute2f128_ps::<0x31>(b0, b4),
+            _mm256_permute2f128_ps::<0x31>(b1, b5),
+            _mm256_permute2f128_ps::<0x31>(b2, b6),
+            _mm256_permute2f128_ps::<0x31>(b3, b7),
+        ]
+    }
+}

@@ -1,0 +1,191 @@
+//! Sixteen numbers in one AVX-512 register. Only for use inside functions that enable `avx512f`, which
+//! [`super::super::sweep`] enters after it has asked the processor.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
+use crate::math::Lane;
+
+/// One register.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub struct Avx512(__m512);
+
+// SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has been
+// detected; loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
+
+impl Default for Avx512 {
+    #[inline(always)]
+    fn default() -> Self {
+        Self::constant(0.0)
+    }
+}
+
+impl PartialEq for Avx512 {
+    fn eq(&self, o: &Self) -> bool {
+        self.store() == o.store()
+    }
+}
+
+impl Add for Avx512 {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self(unsafe { _mm512_add_ps(self.0, o.0) })
+    }
+}
+
+impl Sub for Avx512 {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self(unsafe { _mm512_sub_ps(self.0, o.0) })
+    }
+}
+
+impl Mul for Avx512 {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self(unsafe { _mm512_mul_ps(self.0, o.0) })
+    }
+}
+
+impl Neg for Avx512 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(unsafe {
+            let sign = _mm512_set1_epi32(i32::MIN);
+            _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(self.0), sign))
+        })
+    }
+}
+
+impl Lane for Avx512 {
+    type Mask = __mmask16;
+    #[inline(always)]
+    fn constant(x: f64) -> Self {
+        Self(unsafe { _mm512_set1_ps(x as f32) })
+    }
+    #[inline(always)]
+    fn gt(self, o: Self) -> __mmask16 {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, o.0) }
+    }
+    #[inline(always)]
+    fn and(a: __mmask16, b: __mmask16) -> __mmask16 {
+        a & b
+    }
+    #[inline(always)]
+    fn mask(value: bool) -> __mmask16 {
+        if value { __mmask16::MAX } else { 0 }
+    }
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, mask: __mmask16) -> Self {
+        Self(unsafe { _mm512_mask_blend_ps(mask, if_false.0, if_true.0) })
+    }
+    #[inline(always)]
+    fn larger(a: Self, b: Self) -> Self {
+        Self(unsafe { _mm512_max_ps(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn smaller(a: Self, b: Self) -> Self {
+        Self(unsafe { _mm512_min_ps(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn inverse_sqrt(self) -> Self {
+        let half_x = Self::constant(0.5) * self;
+        let three_halves = Self::constant(1.5);
+        let mut y = unsafe {
+            let half_bits = _mm512_srli_epi32::<1>(_mm512_castps_si512(self.0));
+            Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(0x5f37_5a86), half_bits)))
+        };
+        y = y * (three_halves - half_x * y * y);
+        y = y * (three_halves - half_x * y * y);
+        y = y * (three_halves - half_x * y * y);
+        y
+    }
+}
+
+impl Lanes for Avx512 {
+    #[inline(always)]
+    fn load(from: &Wide) -> Self {
+        Self(unsafe { _mm512_load_ps(from.0.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self) -> Wide {
+        let mut to = Wide::default();
+        unsafe { _mm512_store_ps(to.0.as_mut_ptr(), self.0) };
+        to
+    }
+    #[inline(always)]
+    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
+        let r: [*const Row8; WIDTH] = lanes!(lane => unsafe { row_at(rows, places[lane]) });
+        // Quarters of a register never meet before the last line, so the rows that are four apart share one.
+        let [b0, b1, b2, b3] = transposed([both(r[0], r[4]), both(r[1], r[5]), both(r[2], r[6]), both(r[3], r[7])]);
+        let [b4, b5, b6, b7] =
+            transposed([both(r[8], r[12]), both(r[9], r[13]), both(r[10], r[14]), both(r[11], r[15])]);
+        unsafe {
+            [
+                Self(_mm512_shuffle_f32x4::<0x88>(b0, b4)),
+                Self(_mm512_shuffle_f32x4::<0x88>(b1, b5)),
+                Self(_mm512_shuffle_f32x4::<0x88>(b2, b6)),
+                Self(_mm512_shuffle_f32x4::<0x88>(b3, b7)),
+                Self(_mm512_shuffle_f32x4::<0xdd>(b0, b4)),
+                Self(_mm512_shuffle_f32x4::<0xdd>(b1, b5)),
+                Self(_mm512_shuffle_f32x4::<0xdd>(b2, b6)),
+                Self(_mm512_shuffle_f32x4::<0xdd>(b3, b7)),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
+        // Quarter q of the i-th is the first half of row 4 q + i, or the second.
+        let first = transposed([c[0].0, c[1].0, c[2].0, c[3].0]);
+        let second = transposed([c[4].0, c[5].0, c[6].0, c[7].0]);
+        let mut rows = [Row8::default(); WIDTH];
+        for i in 0..4 {
+            unsafe {
+                let low = _mm512_shuffle_f32x4::<0x44>(first[i], second[i]);
+                let high = _mm512_shuffle_f32x4::<0xee>(first[i], second[i]);
+                // From quarters f0 f1 s0 s1 to f0 s0 f1 s1.
+                let (low, high) = (_mm512_shuffle_f32x4::<0xd8>(low, low), _mm512_shuffle_f32x4::<0xd8>(high, high));
+                _mm256_store_ps(rows[i].0.as_mut_ptr(), _mm512_castps512_ps256(low));
+                _mm256_store_ps(rows[i + 4].0.as_mut_ptr(), upper(low));
+                _mm256_store_ps(rows[i + 8].0.as_mut_ptr(), _mm512_castps512_ps256(high));
+                _mm256_store_ps(rows[i + 12].0.as_mut_ptr(), upper(high));
+            }
+        }
+        rows
+    }
+}
+
+/// Two rows in one register.
+#[inline(always)]
+fn both(low: *const Row8, high: *const Row8) -> __m512 {
+    unsafe {
+        let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_load_ps(low.cast())));
+        _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_load_ps(high.cast()))))
+    }
+}
+
+#[inline(always)]
+fn upper(x: __m512) -> __m256 {
+    unsafe { _mm256_castpd_ps(_mm512_extractf64x4_pd::<1>(_mm512_castps_pd(x))) }
+}
+
+/// Rows become columns, in each quarter of four registers.
+#[inline(always)]
+fn transposed(r: [__m512; 4]) -> [__m512; 4] {
+    unsafe {
+        let (a0, a1) = (_mm512_unpacklo_ps(r[0], r[1]), _mm512_unpackhi_ps(r[0], r[1]));
+        let (a2, a3) = (_mm512_unpacklo_ps(r[2], r[3]), _mm512_unpackhi_ps(r[2], r[3]));
+        [
+            _mm512_shuffle_ps::<0x44>(a0, a2),
+            _mm512_shuffle_ps::<0xee>(a0, a2),
+            _mm512_shuffle_ps::<0x44>(a1, a3),
+            _mm512_shuffle_ps::<0xee>(a1, a3),
+        ]
+    }
+}
