@@ -12,16 +12,14 @@ fn normal_movement(pair: ptr<function, Pair>, contact: Contact) -> NormalMovemen
     var shift = dot3((*pair).b.dp - (*pair).a.dp, contact.normal);
     // A round surface turns under its contact: what is carried along is the centre of its curvature.
     if ROUND {
-        shift = shift + contact.radius_a * dot3(turn_a, contact.normal);
-        shift = shift + contact.radius_b * dot3(turn_b, contact.normal);
+        shift = shift + contact.radius_a * dot3(turn_a, contact.normal) + contact.radius_b * dot3(turn_b, contact.normal);
     }
     return NormalMovement(shift, turn_a, turn_b);
 }
 
 // Separation now: what it was when the step began, and what the bodies moved since.
 fn current_separation(movement: NormalMovement, point: Point) -> f32 {
-    let by_turning = dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a);
-    return point.separation + (movement.shift + by_turning);
+    return point.separation + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }
 
 fn pair_softness(pair: ptr<function, Pair>) -> Softness {

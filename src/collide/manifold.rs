@@ -2,8 +2,6 @@
 
 use glam::Vec3;
 
-use super::narrow::Motion;
-
 /// Most points that a manifold keeps.
 pub const MAX_POINTS: usize = 4;
 
@@ -80,12 +78,6 @@ impl Manifold {
     /// Its points.
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]
-    }
-
-    /// Separation of one of its points when its bodies moved since it was computed [m].
-    pub fn separation(&self, point: &ManifoldPoint, motion: &Motion) -> f32 {
-        let (core_a, core_b) = (self.normal * self.radius_a, self.normal * self.radius_b);
-        point.computed_separation + motion.along(self.normal, point.r_a - core_a, point.r_b + core_b)
     }
 
     /// Its points, to write impulses and separations into.

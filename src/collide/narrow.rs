@@ -8,6 +8,8 @@ use parry3d::shape::{SharedShape, TypedShape};
 
 use super::manifold::{Manifold, ManifoldPoint};
 use super::query::{Found, convex_contact};
+use crate::kernels::contact::NormalMovement;
+use crate::math;
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -79,9 +81,12 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// How far the arm `r_b` of b moved away from the arm `r_a` of a, along `normal` [m].
-    pub fn along(&self, normal: Vec3, r_a: Vec3, r_b: Vec3) -> f32 {
-        (self.drift + turned_arm(self.turn_b, r_b) - turned_arm(self.turn_a, r_a)).dot(normal)
+    /// What that is along the normal of a contact.
+    pub fn along(&self, normal: [f32; 3], radii: [f32; 2]) -> NormalMovement<f32> {
+        let quat = |turn: Quat| math::Quat::load(turn.to_array());
+        let (normal, drift) = (math::Vec3::load(normal), math::Vec3::load(self.drift.to_array()));
+        let movement = NormalMovement::new(normal, drift, quat(self.turn_a), quat(self.turn_b));
+        if radii == [0.0; 2] { movement } else { movement.round(normal, radii[0], radii[1]) }
     }
 }
 
@@ -314,12 +319,6 @@ fn candidate(
         features: u64::from(p.fid1.0) << 32 | u64::from(p.fid2.0),
         ..ManifoldPoint::default()
     })
-}
-
-/// How far the rotation moves the arm.
-fn turned_arm(q: Quat, r: Vec3) -> Vec3 {
-    let t = q.xyz().cross(r);
-    2.0 * (t * q.w + q.xyz().cross(t))
 }
 
 /// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) [m].

@@ -9,7 +9,7 @@ use super::friction::{solve_friction, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
-use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, smaller, turned};
+use crate::math::{Lane, Quat, Vec3, conjugate, cross3, dot3, larger, smaller, turned};
 
 /// How two bodies moved along a normal since the step began: a separation is linear in the arms.
 ///
@@ -25,26 +25,39 @@ pub struct NormalMovement<L> {
 }
 
 impl<L: Lane> NormalMovement<L> {
-    /// Double of `normal_movement`.
+    /// Along `normal`, where the centre of b moved by `drift` as seen from that of a and each body turned.
     #[inline(always)]
-    pub fn of(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> Self {
-        let turn_a = turned(conjugate(pair.a.dq), contact.normal);
-        let turn_b = turned(conjugate(pair.b.dq), contact.normal);
-        let mut shift = dot3(pair.b.dp - pair.a.dp, contact.normal);
-        // A round surface turns under its contact: what is carried along is the centre of its curvature.
-        if rules.round {
-            shift = shift + contact.radius_a * dot3(turn_a, contact.normal);
-            shift = shift + contact.radius_b * dot3(turn_b, contact.normal);
-        }
-        Self { shift, turn_a, turn_b }
+    pub fn new(normal: Vec3<L>, drift: Vec3<L>, turn_a: Quat<L>, turn_b: Quat<L>) -> Self {
+        let shift = dot3(drift, normal);
+        Self { shift, turn_a: turned(conjugate(turn_a), normal), turn_b: turned(conjugate(turn_b), normal) }
     }
 
-    /// Separation now: what it was when the step began, and what the bodies moved since.
+    /// The same for surfaces with these radii of curvature: a round surface turns under its contact, and what is carried
+    /// along is the centre of its curvature.
     #[inline(always)]
-    pub fn current_separation(&self, point: &Point<L>) -> L {
-        let by_turning = dot3(self.turn_b, point.r_b) - dot3(self.turn_a, point.r_a);
-        point.separation + (self.shift + by_turning)
+    pub fn round(self, normal: Vec3<L>, radius_a: L, radius_b: L) -> Self {
+        let shift = self.shift + radius_a * dot3(self.turn_a, normal) + radius_b * dot3(self.turn_b, normal);
+        Self { shift, ..self }
     }
+
+    /// Double of `normal_movement`.
+    #[inline(always)]
+    fn of(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> Self {
+        let movement = Self::new(contact.normal, pair.b.dp - pair.a.dp, pair.a.dq, pair.b.dq);
+        if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
+    }
+
+    /// How far the arm r_b of b moved away from the arm r_a of a.
+    #[inline(always)]
+    pub fn between(&self, r_a: Vec3<L>, r_b: Vec3<L>) -> L {
+        self.shift + (dot3(self.turn_b, r_b) - dot3(self.turn_a, r_a))
+    }
+}
+
+/// Separation now: what it was when the step began, and what the bodies moved since.
+#[inline(always)]
+pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, point: &Point<L>) -> L {
+    point.separation + movement.between(point.r_a, point.r_b)
 }
 
 #[inline(always)]
@@ -84,7 +97,7 @@ fn solve_normal<L: Lane>(
     impulse: &mut Impulse<L>,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let s = movement.current_separation(point);
+    let s = current_separation(movement, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s.gt(zero);
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, zero), -softness.push_limit);

@@ -12,6 +12,7 @@ use super::effective::{EffectiveMass, InverseMass};
 use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{Detector, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
+use crate::math;
 use crate::world::World;
 
 /// Where a contact comes from.
@@ -77,6 +78,14 @@ impl Chunk<'_> {
     }
 }
 
+/// What the pair of a contact says to its rows.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    /// Whether its manifolds were computed since the rows were written.
+    is_new: bool,
+    motion: Motion,
+}
+
 /// Contacts that one task writes at most.
 const CHUNK: usize = 256;
 
@@ -108,37 +117,36 @@ impl Writer<'_> {
             rayon::join(|| self.write(first), || self.write(second));
             return;
         }
-        // Headers first: they depend on nothing but their manifold, so the waits for memory overlap.
-        for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
+        // What is far away in memory first: these reads wait for nothing, and so for each other only.
+        let mut found = [Found::default(); CHUNK];
+        for (found, &contact) in found.iter_mut().zip(chunk.order) {
             let source = &self.sources[contact as usize];
             let pair = self.detector.pair(source.world, source.pair);
-            if pair.computed_in > self.seen {
-                self.write_header(row, pair, &pair.manifolds[source.manifold as usize]);
-            } else if let (Some(before), Some(from)) = (self.before, source.row_before) {
-                *row = ContactRow { first_point: row.first_point, ..before.contacts[from as usize] };
-            }
+            *found = Found { is_new: pair.computed_in > self.seen, motion: *pair.motion() };
         }
         let patch = usize::from(self.patches);
         let mut next = 0;
-        for (row, &contact) in chunk.contacts.iter_mut().zip(chunk.order) {
+        for ((row, &contact), found) in chunk.contacts.iter_mut().zip(chunk.order).zip(&found) {
             let source = &self.sources[contact as usize];
-            let pair = self.detector.pair(source.world, source.pair);
             let own = next..next + source.points as usize + patch;
             next = own.end;
             let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);
             let computed = &mut chunk.computed[own.clone()];
-            if pair.computed_in > self.seen {
+            if found.is_new {
+                let pair = self.detector.pair(source.world, source.pair);
                 let manifold = &pair.manifolds[source.manifold as usize];
-                self.write_points(row, manifold, pair.motion(), points, impulses, computed);
+                self.write_header(row, pair, manifold);
+                self.write_points(row, manifold, &found.motion, points, impulses, computed);
             } else {
                 if let (Some(before), Some(from)) = (self.before, source.row_before) {
-                    let from = before.contacts[from as usize].first_point as usize;
-                    let from = from..from + own.len();
+                    let header = &before.contacts[from as usize];
+                    *row = ContactRow { first_point: row.first_point, ..*header };
+                    let from = header.first_point as usize..header.first_point as usize + own.len();
                     points.copy_from_slice(&before.points[from.clone()]);
                     impulses.copy_from_slice(&before.impulses[from.clone()]);
                     computed.copy_from_slice(&before.computed[from]);
                 }
-                self.refresh_points(row, pair.motion(), points, computed);
+                self.refresh_points(row, &found.motion, points, computed);
             }
             // Where they are on a device, the kernel begin_contacts does this.
             if !self.carry.on_device {
@@ -182,7 +190,7 @@ impl Writer<'_> {
         let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
         let effective = EffectiveMass { inverse: &inverse, row };
         let from = manifold.points();
-        for (((p, point), impulse), computed) in from.iter().zip(&mut *points).zip(&mut *impulses).zip(computed) {
+        for (((p, point), impulse), computed) in from.iter().zip(&mut *points).zip(&mut *impulses).zip(&mut *computed) {
             let tangent_mass = match self.config.friction {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
                 FrictionRule::None | FrictionRule::Slip => 0.0,
@@ -190,15 +198,14 @@ impl Writer<'_> {
             *computed = p.computed_separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
-                separation: manifold.separation(p, motion),
                 r_b: p.r_b.to_array(),
                 normal_mass: effective.normal(p.r_a, p.r_b),
                 tangent_mass,
                 ..PointRow::default()
             };
-            self.approach(row, point);
             *impulse = carried_over(row, p);
         }
+        self.refresh_points(row, motion, points, computed);
         if self.patches {
             let (points, patch) = points.split_at_mut(from.len());
             patch[0] = patch_of(&effective, points);
@@ -208,11 +215,9 @@ impl Writer<'_> {
 
     /// Brings the rows of a manifold that is reused to where the bodies are.
     fn refresh_points(&self, row: &ContactRow, motion: &Motion, points: &mut [PointRow], computed: &[f32]) {
-        let normal = Vec3::from_array(row.normal);
-        let (core_a, core_b) = (normal * row.radius_a, normal * row.radius_b);
+        let movement = motion.along(row.normal, [row.radius_a, row.radius_b]);
         for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {
-            let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
-            point.separation = computed + motion.along(normal, r_a - core_a, r_b + core_b);
+            point.separation = computed + movement.between(math::Vec3::load(point.r_a), math::Vec3::load(point.r_b));
             self.approach(row, point);
         }
     }
