@@ -1,11 +1,11 @@
-//! Eight lanes and all threads against one constraint at a time: the same bits.
+//! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
 use drystone::compare::{Comparison, compare};
 use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
 
 /// Compares a backend with the reference on a scene of the catalogue, on a pool of `threads`.
 fn against_reference(
-    backend: fn() -> Box<dyn Backend>,
+    backend: impl Fn() -> Box<dyn Backend> + Sync,
     scene: &str,
     parameters: &[&str],
     settings: &[&str],
@@ -25,8 +25,9 @@ fn best() -> Box<dyn Backend> {
     Box::new(Cpu::new())
 }
 
-fn portable() -> Box<dyn Backend> {
-    Box::new(Cpu::portable())
+/// The backend on each instruction set that there is.
+fn each() -> impl Iterator<Item = impl Fn() -> Box<dyn Backend> + Sync> {
+    (0..Cpu::each().count()).map(|i| move || Box::new(Cpu::each().nth(i).expect("counted")) as Box<_>)
 }
 
 #[track_caller]
@@ -43,8 +44,12 @@ fn a_falling_pile_has_the_same_bits_on_one_thread_and_on_two() {
 }
 
 #[test]
-fn the_portable_lanes_have_the_same_bits() {
-    same_bits(&against_reference(portable, "pile", &["n=200"], &[], 40, 1));
+fn every_instruction_set_has_the_same_bits() {
+    for backend in each() {
+        println!("{}", backend().adapter());
+        same_bits(&against_reference(&backend, "pile", &["n=200"], &[], 40, 1));
+        same_bits(&against_reference(&backend, "drop", &[], &[], 60, 2));
+    }
 }
 
 #[test]
@@ -63,8 +68,10 @@ fn every_rule_has_the_same_bits() {
         &["relaxation=1.2", "max_colors=2"],
     ];
     for settings in rules {
-        println!("{settings:?}");
-        same_bits(&against_reference(best, "pile", &["n=150"], settings, 40, 2));
+        for backend in each() {
+            println!("{settings:?}, {}", backend().adapter());
+            same_bits(&against_reference(backend, "pile", &["n=150"], settings, 40, 2));
+        }
     }
 }
 

@@ -52,9 +52,9 @@ impl Cpu {
         Self::on(InstructionSet::best())
     }
 
-    /// A backend on what every processor has, to compare with.
-    pub fn portable() -> Self {
-        Self::on(InstructionSet::Portable)
+    /// A backend on each instruction set that the processor has, to compare: first on what every processor has, last the best.
+    pub fn each() -> impl Iterator<Item = Self> {
+        InstructionSet::each().map(Self::on)
     }
 
     fn on(instructions: InstructionSet) -> Self {

@@ -13,7 +13,7 @@ const CHAINS: usize = 6;
 pub fn multiply_and_add(rounds: usize) -> u64 {
     match InstructionSet::best() {
         InstructionSet::Portable => chains::<Portable>(rounds),
-        // SAFETY: `InstructionSet::best` asked the processor.
+        // SAFETY: `InstructionSet::each` asked the processor.
         #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx2 => unsafe { chains_avx2(rounds) },
         // SAFETY: as above.

@@ -70,7 +70,7 @@ pub(super) fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
 pub(super) enum InstructionSet {
     /// What every processor of its kind has.
     Portable,
-    /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::best`] makes it, after it has asked.
+    /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::each`] makes it, after it has asked.
     #[cfg(target_arch = "x86_64")]
     Avx2,
     /// Sixteen numbers in one register; the same holds.
@@ -79,18 +79,28 @@ pub(super) enum InstructionSet {
 }
 
 impl InstructionSet {
+    /// Those that this processor has, the best last.
+    pub fn each() -> impl DoubleEndedIterator<Item = Self> {
+        let has = |set: &Self| match set {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => std::arch::is_x86_feature_detected!("avx512f"),
+        };
+        let known = [
+            Self::Portable,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512,
+        ];
+        known.into_iter().filter(has)
+    }
+
     /// The best that this processor has.
     pub fn best() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if std::arch::is_x86_feature_detected!("avx512f") && std::env::var("DRY").is_err() {
-                return Self::Avx512;
-            }
-            if std::arch::is_x86_feature_detected!("avx2") {
-                return Self::Avx2;
-            }
-        }
-        Self::Portable
+        Self::each().next_back().unwrap_or(Self::Portable)
     }
 
     /// Its name, for people.
@@ -110,7 +120,7 @@ macro_rules! enter {
     ($self:ident, $instructions:ident, $range:ident) => {
         match $instructions {
             InstructionSet::Portable => $self.run_on::<Portable>($range),
-            // SAFETY: `InstructionSet::best` asked the processor.
+            // SAFETY: `InstructionSet::each` asked the processor.
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 => unsafe { $self.run_avx2($range) },
             // SAFETY: as above.
