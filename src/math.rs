@@ -6,6 +6,10 @@
 //!
 //! `#[inline(always)]` and no closures: a helper that is not inlined loses the instruction set of its caller.
 
+mod movement;
+
+pub use movement::NormalMovement;
+
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 

@@ -2,10 +2,10 @@
 //! G M⁻¹ Gᵀ, in f64 where they are written over a lane.
 
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::kernels::contact::{NormalMovement, current_separation};
+use drystone::kernels::contact::{current_separation, normal_movement};
 use drystone::kernels::joint::joint_column;
 use drystone::kernels::pair::relative_velocity;
-use drystone::kernels::{Body, Mass, Pair, Point, Sym3};
+use drystone::kernels::{Body, Contact, Mass, Pair, Point, Rules, Sym3};
 use drystone::math::{Quat, Vec3 as LaneVec3, vec3};
 use drystone::problem::ContactRow;
 use drystone::problem::effective::{EffectiveMass, InverseMass};
@@ -74,7 +74,8 @@ impl Case {
 
     fn separation(&self, pair: &Pair<f64>) -> f64 {
         let point = Point { r_a: lane(self.r[0]), r_b: lane(self.r[1]), separation: 0.125, ..Point::default() };
-        let movement = NormalMovement::new(lane(self.normal), pair.b.dp - pair.a.dp, pair.a.dq, pair.b.dq);
+        let contact = Contact { normal: lane(self.normal), ..Contact::default() };
+        let movement = normal_movement(Rules::default(), pair, &contact);
         current_separation(&movement, &point)
     }
 }

@@ -63,7 +63,7 @@ fn a_tolerance_ends_the_sweeps() {
     let rounded = json("tower.contacts --tolerance 1e-2 --backend cpu");
     assert!(rounded["sweeps"].as_u64() < Some(60) && rounded["colors"] == 3, "{rounded}");
     assert_eq!(rounded["backend"], "cpu");
-    assert!(rounded["adapter"].as_str().is_some_and(|name| name.contains("8 lanes")), "{rounded}");
+    assert!(rounded["adapter"].as_str().is_some_and(|name| name.contains("16 lanes")), "{rounded}");
 }
 
 #[test]

@@ -8,8 +8,7 @@ use parry3d::shape::{SharedShape, TypedShape};
 
 use super::manifold::{Manifold, ManifoldPoint};
 use super::query::{Found, convex_contact};
-use crate::kernels::contact::NormalMovement;
-use crate::math;
+use crate::math::{self, NormalMovement};
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]

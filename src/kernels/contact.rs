@@ -9,49 +9,13 @@ use super::friction::{solve_friction, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
-use crate::math::{Lane, Quat, Vec3, conjugate, cross3, dot3, larger, smaller, turned};
+use crate::math::{Lane, NormalMovement, cross3, dot3, larger, smaller};
 
-/// How two bodies moved along a normal since the step began: a separation is linear in the arms.
-///
-/// Where body b is rotated by q, its arm r moves by n . (q r - r) = (q⁻¹ n - n) . r along the normal n.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct NormalMovement<L> {
-    /// Of the centre of b relative to that of a.
-    shift: L,
-    /// Of an arm of a, per length.
-    turn_a: Vec3<L>,
-    /// Of an arm of b, per length.
-    turn_b: Vec3<L>,
-}
-
-impl<L: Lane> NormalMovement<L> {
-    /// Along `normal`, where the centre of b moved by `drift` as seen from that of a and each body turned.
-    #[inline(always)]
-    pub fn new(normal: Vec3<L>, drift: Vec3<L>, turn_a: Quat<L>, turn_b: Quat<L>) -> Self {
-        let shift = dot3(drift, normal);
-        Self { shift, turn_a: turned(conjugate(turn_a), normal), turn_b: turned(conjugate(turn_b), normal) }
-    }
-
-    /// The same for surfaces with these radii of curvature: a round surface turns under its contact, and what is carried
-    /// along is the centre of its curvature.
-    #[inline(always)]
-    pub fn round(self, normal: Vec3<L>, radius_a: L, radius_b: L) -> Self {
-        let shift = self.shift + radius_a * dot3(self.turn_a, normal) + radius_b * dot3(self.turn_b, normal);
-        Self { shift, ..self }
-    }
-
-    /// Double of `normal_movement`.
-    #[inline(always)]
-    fn of(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> Self {
-        let movement = Self::new(contact.normal, pair.b.dp - pair.a.dp, pair.a.dq, pair.b.dq);
-        if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
-    }
-
-    /// How far the arm r_b of b moved away from the arm r_a of a.
-    #[inline(always)]
-    pub fn between(&self, r_a: Vec3<L>, r_b: Vec3<L>) -> L {
-        self.shift + (dot3(self.turn_b, r_b) - dot3(self.turn_a, r_a))
-    }
+/// How the bodies of a contact moved along its normal since the step began.
+#[inline(always)]
+pub fn normal_movement<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> NormalMovement<L> {
+    let movement = NormalMovement::new(contact.normal, pair.b.dp - pair.a.dp, pair.a.dq, pair.b.dq);
+    if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
 }
 
 /// Separation now: what it was when the step began, and what the bodies moved since.
@@ -160,7 +124,7 @@ pub fn solve_contact<L: Lane>(
 ) {
     let has_friction = rules.friction != FrictionRule::None;
     let softness = pair_softness(params, pair);
-    let movement = NormalMovement::of(rules, pair, contact);
+    let movement = normal_movement(rules, pair, contact);
     let contact_points = rules.contact_points(points.len());
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {

@@ -158,7 +158,7 @@ impl Group {
         for lane in 0..WIDTH {
             let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);
             let (a, b) = (c.body_a as usize, c.body_b as usize);
-            assert!(a.max(b) <= problem.bodies.len(), "a contact of a body that there is not");
+            assert!(a.max(b) <= problem.bodies.len(), "contact {} is of bodies that there are not", self.rows[lane]);
             (self.places_a[lane], self.places_b[lane]) = (place(a), place(b));
             let movable = |body: usize| u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
             (self.movable_a, self.movable_b) = (self.movable_a | movable(a), self.movable_b | movable(b));
