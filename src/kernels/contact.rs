@@ -44,6 +44,12 @@ fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
     if rules.accumulated { larger(sum + correction, zero) } else { sum + larger(correction, zero) }
 }
 
+/// What the points of a manifold share in a sweep.
+struct Common<L> {
+    softness: SoftnessOf<L>,
+    movement: NormalMovement<L>,
+}
+
 /// Non-penetration at one point.
 ///
 /// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other: a separation of 1e-11 m
@@ -53,8 +59,7 @@ fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
 fn solve_normal<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
-    softness: &SoftnessOf<L>,
-    movement: &NormalMovement<L>,
+    Common { softness, movement }: &Common<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
@@ -123,15 +128,14 @@ pub fn solve_contact<L: Lane>(
     impulses: &mut [Impulse<L>],
 ) {
     let has_friction = rules.friction != FrictionRule::None;
-    let softness = pair_softness(params, pair);
-    let movement = normal_movement(rules, pair, contact);
+    let common = Common { softness: pair_softness(params, pair), movement: normal_movement(rules, pair, contact) };
     let contact_points = rules.contact_points(points.len());
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {
             sweep_friction(rules, params, pair, contact, points, impulses);
         }
         for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
-            solve_normal(rules, params, &softness, &movement, pair, contact, point, impulse);
+            solve_normal(rules, params, &common, pair, contact, point, impulse);
         }
         if has_friction && !rules.friction_first {
             sweep_friction(rules, params, pair, contact, points, impulses);
