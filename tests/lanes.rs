@@ -81,6 +81,22 @@ fn every_shape_and_unequal_moments_of_inertia_have_the_same_bits() {
     same_bits(&against_reference(best, "wall", &["rows=6", "columns=6"], &[], 40, 2));
 }
 
+#[test]
+fn joints_have_the_same_bits() {
+    let settings: [&[&str]; 4] = [
+        &[],
+        &["tolerance=0.001", "iterations=8"],
+        &["method=accelerated", "iterations=6", "relax=5"],
+        &["max_colors=1"],
+    ];
+    for settings in settings {
+        for backend in each() {
+            same_bits(&against_reference(&backend, "joint-grid", &[], settings, 10, 2));
+            same_bits(&against_reference(backend, "chain", &[], settings, 40, 1));
+        }
+    }
+}
+
 /// Runs the plan without its last pass.
 struct Lazy(Cpu);
 

@@ -108,6 +108,7 @@ pub struct Point<L> {
 }
 
 /// Double of the WGSL struct `Joint`, without the indices.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Joint<L> {
     /// Arm of a when the step begins.

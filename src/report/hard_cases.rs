@@ -79,7 +79,7 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     Ok(format!(
         "# Hard cases\n\n\
          Made by `drystone hard --page docs`; one case by `drystone hard --case H3 --preset accurate`. What fails is in bold. The\n\
-         columns are presets with their substeps, on eight lanes in single precision (`cpu`), on the reference with sweeps in double\n\
+         columns are presets with their substeps, on the lanes of the processor in single precision (`cpu`), on the reference with sweeps in double\n\
          precision (`f64`), and in the shaders (`gpu`: {gpu}). `drystone hard --list` says what each case is.\n\n\
          | case | number | asked | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{WHY}",
         heads.join(" | "),

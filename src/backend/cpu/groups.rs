@@ -14,11 +14,8 @@ use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 /// Sixteen contacts of one color with as many points each.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Group {
-    /// Where the states of the bodies are, and which of them can move, a bit a lane.
-    pub places_a: [u32; WIDTH],
-    pub places_b: [u32; WIDTH],
-    pub movable_a: u16,
-    pub movable_b: u16,
+    pub a: Bodies,
+    pub b: Bodies,
     /// Rows of the problem that the lanes hold; `NO_ROW` where there is none.
     rows: [u32; WIDTH],
     pub contact: [Wide; 10],
@@ -28,7 +25,25 @@ pub(super) struct Group {
     pub points: u32,
 }
 
-const NO_ROW: u32 = u32::MAX;
+pub(super) const NO_ROW: u32 = u32::MAX;
+
+/// Sixteen bodies.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Bodies {
+    /// Where their states are.
+    pub places: [u32; WIDTH],
+    /// Which of them can move, a bit a lane.
+    pub movable: u16,
+}
+
+impl Bodies {
+    /// Puts a body of a problem into a lane, or nobody: one more than the problem has.
+    pub fn set(&mut self, lane: usize, body: usize, problem: &StepProblem) {
+        assert!(body <= problem.bodies.len(), "a constraint of body {body} of {}", problem.bodies.len());
+        self.places[lane] = place(body);
+        self.movable |= u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
+    }
+}
 
 /// The contacts of a problem, color by color.
 #[derive(Default)]
@@ -150,18 +165,15 @@ impl Groups {
 }
 
 impl Group {
-    /// Lanes without a contact hold one of nobody with nobody: a body more than the problem has.
+    /// Lanes without a contact hold one of nobody with nobody.
     fn fill(&mut self, problem: &StepProblem, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
         let nobody = problem.bodies.len() as u32;
         let nothing = ContactRow { body_a: nobody, body_b: nobody, first_point: NO_ROW, ..ContactRow::default() };
         let (no_point, no_impulse) = (PointRow::default(), ImpulseRow::default());
         for lane in 0..WIDTH {
             let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);
-            let (a, b) = (c.body_a as usize, c.body_b as usize);
-            assert!(a.max(b) <= problem.bodies.len(), "contact {} is of bodies that there are not", self.rows[lane]);
-            (self.places_a[lane], self.places_b[lane]) = (place(a), place(b));
-            let movable = |body: usize| u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
-            (self.movable_a, self.movable_b) = (self.movable_a | movable(a), self.movable_b | movable(b));
+            self.a.set(lane, c.body_a as usize, problem);
+            self.b.set(lane, c.body_b as usize, problem);
             let ([nx, ny, nz], [tx, ty, tz]) = (c.normal, c.tangent);
             let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
             set_lane(&mut self.contact, lane, &header);

@@ -11,14 +11,14 @@ use super::super::Backend;
 use super::begin_sweep;
 use super::crew::Crew;
 use super::groups::Groups;
+use super::joints::JointGroups;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, State, extrapolate_velocities, velocity_row};
+use super::sweep::{BodyWork, ContactWork, InstructionSet, JointWork, State, extrapolate_velocities, velocity_row};
 use super::wide::{Row8, WIDTH, Wide};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
-use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, step_length};
-use crate::kernels::{Free, Inertia, Joint, Momentum, Pair, Step, StepParams};
+use crate::kernels::{Free, Inertia, Momentum, Step, StepParams};
 use crate::math::{Vec3, vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{BodyRow, ConvergenceRow, MassRow, StepProblem};
@@ -31,7 +31,7 @@ pub struct Cpu {
     groups: Groups,
     convergence: ConvergenceRow,
     inertias: Vec<Inertia<f32>>,
-    joints: Vec<Joint<f32>>,
+    joints: JointGroups,
     joint_impulses: Vec<Vec3<f32>>,
     momentum: Momentum<f32>,
     /// What accelerated sweeps leave for each other: velocities of the sweep before, and what the joints' impulses were.
@@ -65,7 +65,7 @@ impl Cpu {
             groups: Groups::default(),
             convergence: ConvergenceRow::default(),
             inertias: Vec::new(),
-            joints: Vec::new(),
+            joints: JointGroups::default(),
             joint_impulses: Vec::new(),
             momentum: Momentum::default(),
             velocities_before: Vec::new(),
@@ -92,8 +92,7 @@ impl Cpu {
         self.accelerations.resize(self.bodies.len(), Row8::default());
         self.inertias.clear();
         self.inertias.extend(problem.inertias.iter().map(Inertia::load));
-        self.joints.clear();
-        self.joints.extend(problem.joints.iter().map(Joint::load));
+        self.joints.load(problem);
         self.joint_impulses.clear();
         self.joint_impulses.extend(problem.joint_impulses.iter().map(|r| Vec3::load(r.linear)));
         self.convergence = problem.convergence;
@@ -181,14 +180,22 @@ impl Cpu {
                 }
             }
             Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.lengths)),
-            Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
-                warm_start_joint(pair, joint, *impulse);
-            }),
-            Kernel::SolveJoints(rules) => {
-                if !(rules.measured && self.convergence.done != 0) {
-                    self.over_joints(problem, pass, |params, pair, joint, impulse| {
-                        solve_joint(rules, params, pair, joint, impulse);
-                    });
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
+                let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
+                for color in if skipped { 0..0 } else { pass.colors.clone() } {
+                    let color = (color - problem.first_joint_color) as usize;
+                    let groups = self.joints.colors[color] as usize..self.joints.colors[color + 1] as usize;
+                    let moving = AtomicBool::new(false);
+                    let work = JointWork {
+                        kernel: pass.kernel,
+                        params: &problem.params,
+                        bodies: Shared::new(&mut self.bodies),
+                        groups: &self.joints.all,
+                        impulses: Shared::new(&mut self.joint_impulses),
+                        moving: &moving,
+                    };
+                    crew.spread(groups, &|range| work.run(self.instructions, range));
+                    self.convergence.moving |= u32::from(moving.into_inner());
                 }
             }
         }
@@ -209,34 +216,6 @@ impl Cpu {
             *impulse = extrapolate(first, factor, *impulse, step);
         }
     }
-
-    /// One joint after another, as the reference does: they are few.
-    fn over_joints(
-        &mut self,
-        problem: &StepProblem,
-        pass: &Pass,
-        kernel: impl Fn(&StepParams<f32>, &mut Pair<f32>, &Joint<f32>, &mut Vec3<f32>),
-    ) {
-        let params = StepParams::load(&problem.params);
-        for i in problem.rows_of(&pass.colors) {
-            let (a, b) = (problem.joints[i].body_a as usize, problem.joints[i].body_b as usize);
-            let mut pair = Pair {
-                a: self.bodies[a].load(),
-                b: self.bodies[b].load(),
-                mass_a: self.bodies[a].load_mass(),
-                mass_b: self.bodies[b].load_mass(),
-                moving: 0.0,
-            };
-            kernel(&params, &mut pair, &self.joints[i], &mut self.joint_impulses[i]);
-            if pair.mass_a.inv_mass > 0.0 {
-                self.bodies[a].store_velocity(&pair.a);
-            }
-            if pair.mass_b.inv_mass > 0.0 {
-                self.bodies[b].store_velocity(&pair.b);
-            }
-            self.convergence.moving |= u32::from(pair.moving > 0.0);
-        }
-    }
 }
 
 impl Backend for Cpu {
@@ -251,7 +230,7 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        let widest = problem.bodies.len().max(problem.contacts.len()).div_ceil(WIDTH);
+        let widest = problem.bodies.len().max(problem.contacts.len()).max(problem.joints.len()).div_ceil(WIDTH);
         Crew::lead(widest, |crew| {
             self.load(problem, crew);
             for pass in passes {

@@ -2,6 +2,7 @@
 
 mod crew;
 mod groups;
+mod joints;
 mod lanes;
 mod peak;
 mod reference;

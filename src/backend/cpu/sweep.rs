@@ -5,13 +5,15 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::groups::Group;
+use super::groups::{Bodies, Group, NO_ROW};
+use super::joints::JointGroup;
 use super::shared::Shared;
 use super::wide::{Lanes, Portable, Row8, WIDTH, Wide, lanes};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
+use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::extrapolated;
-use crate::kernels::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams, Sym3};
+use crate::kernels::{Body, Contact, Free, Impulse, Joint, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{Params, Softness};
@@ -45,13 +47,6 @@ impl State {
             dp: vec3(px, py, pz),
             dq: Quat { axis: vec3(qx, qy, qz), w: qw },
         }
-    }
-
-    /// Its masses.
-    pub fn load_mass(&self) -> Mass<f32> {
-        let [xx, xy, xz, inv_mass, yy, yz, zz, _] = self.mass.0;
-        let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
-        Mass { inv_inertia, inv_mass, acceleration: Vec3::default() }
     }
 
     /// Takes over the velocities.
@@ -250,19 +245,10 @@ impl ContactWork<'_> {
 
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &Group) {
-        let (a, b) = (&group.places_a, &group.places_b);
         let states = self.bodies.as_ptr();
-        // SAFETY: `Groups::load` asked whether the bodies are there. One that this color writes is in this group only, and the
-        // others nobody writes.
-        let mut pair = unsafe {
-            Pair {
-                a: wide_body::<L>(states, a),
-                b: wide_body::<L>(states, b),
-                mass_a: wide_mass::<L>(states, a),
-                mass_b: wide_mass::<L>(states, b),
-                moving: L::constant(0.0),
-            }
-        };
+        // SAFETY: `Bodies::set` asked whether they are there. One that this color writes is in this group only, and the others
+        // nobody writes.
+        let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
         let rules = self.kernel.rules().unwrap_or_default();
         let rows = group.first_point as usize..(group.first_point + group.points) as usize;
         // Used where they lie: copied, they are most of what a sweep moves.
@@ -279,13 +265,85 @@ impl ContactWork<'_> {
             _ => restitute_contact(rules, params, &mut pair, contact, points, impulses),
         }
         // SAFETY: as above.
-        unsafe {
-            store_velocities(states, a, group.movable_a, &pair.a);
-            store_velocities(states, b, group.movable_b, &pair.b);
+        unsafe { store_pair(states, &group.a, &group.b, &pair) };
+        note_moving(rules, &pair, self.moving);
+    }
+}
+
+/// A pass over the joints of one color.
+pub(super) struct JointWork<'a> {
+    pub kernel: Kernel,
+    pub params: &'a Params,
+    pub bodies: Shared<'a, State>,
+    pub groups: &'a [JointGroup],
+    /// In the order of the problem.
+    pub impulses: Shared<'a, Vec3<f32>>,
+    /// Set if a correction was above the tolerance.
+    pub moving: &'a AtomicBool,
+}
+
+impl JointWork<'_> {
+    /// Does some groups; no other task has the same.
+    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
+        enter!(self, instructions, groups)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2(&self, groups: Range<usize>) {
+        self.run_on::<super::wide::Avx2>(groups);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn run_avx512(&self, groups: Range<usize>) {
+        self.run_on::<super::wide::Avx512>(groups);
+    }
+
+    #[inline(always)]
+    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
+        let params = wide_params::<L>(self.params);
+        for group in groups {
+            self.sweep::<L>(&params, &self.groups[group]);
         }
-        if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
-            self.moving.store(true, Ordering::Relaxed);
+    }
+
+    #[inline(always)]
+    fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &JointGroup) {
+        let states = self.bodies.as_ptr();
+        // SAFETY: as of contacts.
+        let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
+        // SAFETY: the rows of lanes are `repr(C)` and hold nothing else.
+        let joint: &Joint<L> = unsafe { &as_lanes(std::slice::from_ref(&group.joint))[0] };
+        let mut rows = [Wide::default(); 3];
+        for (lane, &row) in group.rows.iter().enumerate().filter(|(_, row)| **row != NO_ROW) {
+            // SAFETY: a joint is in one lane of one group, and its impulse is its own.
+            let impulse = unsafe { self.impulses.slice(row as usize..row as usize + 1) }[0];
+            (rows[0].0[lane], rows[1].0[lane], rows[2].0[lane]) = (impulse.x, impulse.y, impulse.z);
         }
+        let mut impulse = vec3(L::load(&rows[0]), L::load(&rows[1]), L::load(&rows[2]));
+        let rules = self.kernel.rules().unwrap_or_default();
+        if matches!(self.kernel, Kernel::WarmStartJoints) {
+            warm_start_joint(&mut pair, joint, impulse);
+        } else {
+            solve_joint(rules, params, &mut pair, joint, &mut impulse);
+            let rows = [impulse.x.store(), impulse.y.store(), impulse.z.store()];
+            for (lane, &row) in group.rows.iter().enumerate().filter(|(_, row)| **row != NO_ROW) {
+                // SAFETY: as above.
+                unsafe { self.impulses.write(row as usize, vec3(rows[0].0[lane], rows[1].0[lane], rows[2].0[lane])) };
+            }
+        }
+        // SAFETY: as of contacts.
+        unsafe { store_pair(states, &group.a, &group.b, &pair) };
+        note_moving(rules, &pair, self.moving);
+    }
+}
+
+/// Says so if a lane was corrected by more than the tolerance.
+#[inline(always)]
+fn note_moving<L: Lanes>(rules: Rules, pair: &Pair<L>, moving: &AtomicBool) {
+    if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
+        moving.store(true, Ordering::Relaxed);
     }
 }
 
@@ -293,7 +351,36 @@ impl ContactWork<'_> {
 const NEIGHBORS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<State>() / 8) as u32);
 
 /// # Safety
-/// The states are there, and nobody writes them meanwhile; the same below.
+/// The bodies are there, and nobody writes them meanwhile; the same below.
+#[inline(always)]
+unsafe fn wide_pair<L: Lanes>(states: *const State, a: &Bodies, b: &Bodies) -> Pair<L> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        Pair {
+            a: wide_body::<L>(states, &a.places),
+            b: wide_body::<L>(states, &b.places),
+            mass_a: wide_mass::<L>(states, &a.places),
+            mass_b: wide_mass::<L>(states, &b.places),
+            moving: L::constant(0.0),
+        }
+    }
+}
+
+/// Writes what can move of a pair.
+///
+/// # Safety
+/// The bodies are there, and nobody else uses those that can move meanwhile.
+#[inline(always)]
+unsafe fn store_pair<L: Lanes>(states: *mut State, a: &Bodies, b: &Bodies, pair: &Pair<L>) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        store_velocities(states, a, &pair.a);
+        store_velocities(states, b, &pair.b);
+    }
+}
+
+/// # Safety
+/// As above.
 #[inline(always)]
 unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Body<L> {
     // SAFETY: the caller's promise.
@@ -322,12 +409,13 @@ unsafe fn wide_free<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Fr
     Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) }
 }
 
-/// Writes the velocities of those that can move, a bit each.
+/// Writes the velocities of those that can move.
 ///
 /// # Safety
-/// The states are there, and nobody else uses those that can move meanwhile.
+/// As of [`store_pair`].
 #[inline(always)]
-unsafe fn store_velocities<L: Lanes>(states: *mut State, places: &[u32; WIDTH], movable: u16, body: &Body<L>) {
+unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &Bodies, body: &Body<L>) {
+    let Bodies { places, movable } = *bodies;
     if movable == 0 {
         return;
     }
