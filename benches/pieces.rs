@@ -37,7 +37,7 @@ fn stages(c: &mut Criterion) {
     let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
     let touching = detector.pairs().filter(|p| !p.manifolds.is_empty());
     let mut edges: Vec<_> =
-        touching.map(|p| Edge { a: movable(p.body_a), b: movable(p.body_b), color: None }).collect();
+        touching.map(|p| Edge { a: movable(p.body_a), b: movable(p.body_b), color: None, rank: p.rank() }).collect();
     let (mut graph, bodies) = (ConstraintGraph::default(), world.bodies.len());
     group.bench_function("color, from nothing", |b| {
         b.iter_batched_ref(

@@ -1,7 +1,7 @@
 //! Graph coloring: constraints are put into colors in which no body that a sweep writes occurs twice.
 //!
 //! Integers only. Only bodies that can move count, so a floor costs no color. A constraint keeps its color from step to
-//! step; a new one takes the first that is free on both of its bodies (greedy, in the order given), and the place of an
+//! step; a new one takes the first that is free on both of its bodies (greedy, in the order of the ranks given), and the place of an
 //! ended one is free again. Constraints with one movable body have colors of their own, swept last: what rests on
 //! something fixed has the last word. A constraint that finds no color is swept alone, and counted.
 
@@ -17,6 +17,8 @@ pub struct Edge {
     pub b: u32,
     /// Its color among those of its kind; none if it is new, or found none.
     pub color: Option<u8>,
+    /// New ones choose in the order of their ranks, then of their places.
+    pub rank: u32,
 }
 
 impl Edge {
@@ -68,7 +70,11 @@ impl ConstraintGraph {
                 }
             }
         }
-        for edge in edges.iter_mut().filter(|e| e.color.is_none()) {
+        let is_new = |&i: &u32| edges[i as usize].color.is_none();
+        let mut new: Vec<u32> = (0..edges.len() as u32).filter(is_new).collect();
+        new.sort_unstable_by_key(|&i| (edges[i as usize].rank, i));
+        for i in new {
+            let edge = &mut edges[i as usize];
             let free = self.free(edge) & available;
             if free != 0 {
                 let color = free.trailing_zeros() as u8;

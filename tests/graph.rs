@@ -49,14 +49,18 @@ fn color(edges: &mut [Edge], max_colors: u32) -> Coloring {
 }
 
 fn new_edge(a: u32, b: u32) -> Edge {
-    Edge { a, b, color: None }
+    Edge { a, b, color: None, rank: 0 }
 }
 
 /// Edges of which some have a body that cannot move.
 fn some_edges(color: impl Strategy<Value = Option<u8>> + Clone + 'static) -> impl Strategy<Value = Vec<Edge>> {
     let body = prop_oneof![9 => 0..BODIES, 1 => Just(IMMOVABLE)];
     let edge = (0..BODIES, body, color).prop_filter_map("two bodies", |(a, b, color)| {
-        if a == b { None } else { Some(if a % 2 == 0 { Edge { a, b, color } } else { Edge { a: b, b: a, color } }) }
+        if a == b {
+            None
+        } else {
+            Some(if a % 2 == 0 { Edge { a, b, color, rank: 0 } } else { Edge { a: b, b: a, color, rank: 0 } })
+        }
     });
     prop::collection::vec(edge, 0..200)
 }

@@ -28,7 +28,7 @@ pub enum Numbers {
     F64,
     /// The reference, one constraint at a time on one thread, in single precision.
     Reference,
-    /// Eight constraints at a time, in single precision.
+    /// Sixteen constraints at a time, in single precision.
     Cpu,
     /// The compute shaders, in single precision.
     Gpu,

@@ -185,6 +185,17 @@ impl Pair {
         }
     }
 
+    /// A number that says nothing of where the pair is, and is the same in every copy of its world. Who colors pairs in the order
+    /// of the bodies colors rows of bricks alike: sweeps push a whole row the same way one after another, and a wall of 400 bricks
+    /// rattled at 23 mm/s that otherwise rests at 0.2.
+    pub fn rank(&self) -> u32 {
+        let both = u64::from(self.collider_a) << 32 | u64::from(self.collider_b);
+        // The finalizer of splitmix64.
+        let mixed = (both ^ both >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed >> 32) as u32
+    }
+
     /// How the bodies moved since the manifolds were computed.
     pub fn motion(&self) -> &Motion {
         &self.motion

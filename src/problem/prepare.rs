@@ -71,7 +71,8 @@ impl Prepared {
                         let manifold = &pair.manifolds[k];
                         let points = manifold.points().len() as u32;
                         let source = Source { world: 0, pair: 0, manifold: k as u32, points, row_before: None };
-                        (source, Edge { a: movable(pair.body_a), b: movable(pair.body_b), color: manifold.color })
+                        let [a, b] = [pair.body_a, pair.body_b].map(movable);
+                        (source, Edge { a, b, color: manifold.color, rank: pair.rank() })
                     } else {
                         let row_before = Some(self.row_of[before + k]);
                         (Source { row_before, ..self.sources_before[before + k] }, self.edges_before[before + k])
@@ -101,7 +102,8 @@ impl Prepared {
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
         self.joint_edges.truncate(world.joints.len());
         let fresh = &world.joints[self.joint_edges.len()..];
-        let edge = |j: &BallJoint| Edge { a: movable(j.body_a), b: j.body_b.map_or(IMMOVABLE, movable), color: None };
+        let edge =
+            |j: &BallJoint| Edge { a: movable(j.body_a), b: j.body_b.map_or(IMMOVABLE, movable), color: None, rank: 0 };
         self.joint_edges.extend(fresh.iter().map(edge));
         self.joint_coloring = graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
         self.joint_impulses.resize(world.joints.len(), Vec3::ZERO);

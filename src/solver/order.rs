@@ -87,7 +87,7 @@ fn by_manifold(problem: &ContactProblem) -> Sequence {
         } else {
             of_pair.push(manifolds.len());
             manifolds.push(vec![i]);
-            edges.push(Edge { a, b, color: None });
+            edges.push(Edge { a, b, color: None, rank: 0 });
         }
     }
     let coloring = ConstraintGraph::default().color(problem.bodies.len(), &mut edges, 64);

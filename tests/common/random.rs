@@ -135,7 +135,8 @@ fn params(problem: &StepProblem) -> Params {
 fn in_color_order(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Vec<u32>) {
     let pairs: Vec<_> = (0..count).map(|_| random_pair(random)).collect();
     let place = |body: u32| if is_movable(body) { body } else { IMMOVABLE };
-    let mut edges: Vec<_> = pairs.iter().map(|&[a, b]| Edge { a: place(a), b: place(b), color: None }).collect();
+    let mut edges: Vec<_> =
+        pairs.iter().map(|&[a, b]| Edge { a: place(a), b: place(b), color: None, rank: 0 }).collect();
     let coloring = ConstraintGraph::default().color(BODIES as usize, &mut edges, 64);
     (coloring.order.iter().map(|&i| pairs[i as usize]).collect(), coloring.offsets)
 }
