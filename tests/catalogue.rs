@@ -1,9 +1,9 @@
 //! What the entries of the catalogue say should hold, at default settings and in small.
 
 use drystone::glam::Vec3;
-use drystone::metrics::in_place;
+use drystone::metrics::{in_place, rms_speed};
 use drystone::report::RunReport;
-use drystone::{Body, BodyKind, Reference, Scene, Simulation, SolverConfig};
+use drystone::{Body, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig};
 
 /// A scene of the catalogue, and its simulation after some steps.
 fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
@@ -34,6 +34,17 @@ fn fallen(scene: &Scene, simulation: &Simulation) -> usize {
 
 fn energy(simulation: &Simulation) -> f64 {
     simulation.world.kinetic_energy() + simulation.world.potential_energy()
+}
+
+/// Colors that follow rows of bricks let a wall rattle at 23 mm/s for ever, although every brick stays in its place.
+#[test]
+fn a_wall_rests() {
+    let scene = Scene::find("wall", &[]).expect("the scene");
+    let lanes = Box::new(Cpu::new());
+    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), lanes).expect("a simulation");
+    step(&mut simulation, 300);
+    let speed = rms_speed(&simulation.world);
+    assert!(speed < 1e-3 && fallen(&scene, &simulation) == 0, "{speed:e} m/s");
 }
 
 #[test]
