@@ -25,6 +25,7 @@ pub(super) struct Group {
     pub points: u32,
 }
 
+/// What a lane without a constraint holds.
 pub(super) const NO_ROW: u32 = u32::MAX;
 
 /// Sixteen bodies.

@@ -1,5 +1,7 @@
 //! Joints in groups of sixteen lanes, color by color.
 
+use std::ops::Range;
+
 use super::groups::{Bodies, NO_ROW};
 use super::wide::{WIDTH, Wide};
 use crate::problem::StepProblem;
@@ -30,8 +32,9 @@ impl JointGroups {
         self.colors.clear();
         for color in problem.joint_colors() {
             self.colors.push(self.all.len() as u32);
-            let rows: Vec<usize> = problem.rows_of(&(color..color + 1)).collect();
-            self.all.extend(rows.chunks(WIDTH).map(|rows| JointGroup::of(problem, rows)));
+            let rows = problem.rows_of(&(color..color + 1));
+            let groups = rows.clone().step_by(WIDTH).map(|first| first..rows.end.min(first + WIDTH));
+            self.all.extend(groups.map(|rows| JointGroup::of(problem, rows)));
         }
         self.colors.push(self.all.len() as u32);
     }
@@ -39,12 +42,12 @@ impl JointGroups {
 
 impl JointGroup {
     /// Lanes without a joint hold one of nobody with nobody.
-    fn of(problem: &StepProblem, rows: &[usize]) -> Self {
+    fn of(problem: &StepProblem, mut rows: Range<usize>) -> Self {
         let nobody = problem.bodies.len();
         let mut group =
             Self { a: Bodies::default(), b: Bodies::default(), rows: [NO_ROW; WIDTH], joint: [Wide::default(); 9] };
         for lane in 0..WIDTH {
-            let Some(&row) = rows.get(lane) else {
+            let Some(row) = rows.next() else {
                 group.a.set(lane, nobody, problem);
                 group.b.set(lane, nobody, problem);
                 continue;

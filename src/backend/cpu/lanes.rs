@@ -1,11 +1,11 @@
-//! The kernels over sixteen lanes and all threads: sixteen contacts of one color at a time.
+//! The kernels over sixteen lanes and all threads: sixteen constraints of one color at a time.
 //!
 //! The same kernel text as the reference, over another lane type, so the results are the reference's to the last bit.
 //! Contacts of one color and one number of points stand in groups of sixteen, lane by lane; what does not fill a group is
 //! filled up with contacts of nothing with nothing. The instruction set is chosen at run time. Color order makes the
 //! order inside a pass irrelevant, so a pass can be cut into as many tasks as there are threads.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Backend;
 use super::begin_sweep;
@@ -13,7 +13,9 @@ use super::crew::Crew;
 use super::groups::Groups;
 use super::joints::JointGroups;
 use super::shared::Shared;
-use super::sweep::{BodyWork, ContactWork, InstructionSet, JointWork, State, extrapolate_velocities, velocity_row};
+use super::sweep::{
+    BodyWork, ContactWork, InstructionSet, JointWork, State, Work, extrapolate_velocities, velocity_row,
+};
 use super::wide::{Row8, WIDTH, Wide};
 use crate::error::Result;
 use crate::kernels::integrate::integrate_gyroscopic;
@@ -132,26 +134,15 @@ impl Cpu {
                 let bodies = Shared::new(&mut self.bodies);
                 let (instructions, accelerations) = (self.instructions, &self.accelerations);
                 let work = BodyWork { kernel, params, bodies, accelerations };
-                crew.spread(groups, &|range| work.run(instructions, range));
+                crew.spread(groups, &|range| instructions.run(&work, range));
             }
-            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
-                // Colors of one pass are swept one after another.
-                for color in if skipped { 0..0 } else { pass.colors.clone() } {
-                    let colors = &self.groups.colors;
-                    let groups = colors[color as usize] as usize..colors[color as usize + 1] as usize;
-                    let moving = AtomicBool::new(false);
-                    let work = ContactWork {
-                        kernel: pass.kernel,
-                        params: &problem.params,
-                        bodies: Shared::new(&mut self.bodies),
-                        groups: &self.groups.all,
-                        points: &self.groups.points,
-                        impulses: Shared::new(&mut self.groups.impulses),
-                        moving: &moving,
-                    };
-                    crew.spread(groups, &|range| work.run(self.instructions, range));
-                    self.convergence.moving |= u32::from(moving.into_inner());
+            Kernel::WarmStart(_)
+            | Kernel::SolveContacts(_)
+            | Kernel::ApplyRestitution(_)
+            | Kernel::WarmStartJoints
+            | Kernel::SolveJoints(_) => {
+                if !(pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0) {
+                    self.sweep(problem, pass, crew);
                 }
             }
             Kernel::IntegrateGyroscopic => {
@@ -180,25 +171,24 @@ impl Cpu {
                 }
             }
             Kernel::UpdateMomentum => self.momentum.update(chunked_sum(&self.lengths)),
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
-                let skipped = pass.kernel.rules().is_some_and(|r| r.measured) && self.convergence.done != 0;
-                for color in if skipped { 0..0 } else { pass.colors.clone() } {
-                    let color = (color - problem.first_joint_color) as usize;
-                    let groups = self.joints.colors[color] as usize..self.joints.colors[color + 1] as usize;
-                    let moving = AtomicBool::new(false);
-                    let work = JointWork {
-                        kernel: pass.kernel,
-                        params: &problem.params,
-                        bodies: Shared::new(&mut self.bodies),
-                        groups: &self.joints.all,
-                        impulses: Shared::new(&mut self.joint_impulses),
-                        moving: &moving,
-                    };
-                    crew.spread(groups, &|range| work.run(self.instructions, range));
-                    self.convergence.moving |= u32::from(moving.into_inner());
-                }
-            }
         }
+    }
+
+    /// The contacts, or joints, of the colors of a pass.
+    fn sweep(&mut self, problem: &StepProblem, pass: &Pass, crew: &Crew) {
+        let (kernel, params, moving) = (pass.kernel, &problem.params, &AtomicBool::new(false));
+        let (instructions, bodies) = (self.instructions, Shared::new(&mut self.bodies));
+        if matches!(kernel, Kernel::WarmStartJoints | Kernel::SolveJoints(_)) {
+            let impulses = Shared::new(&mut self.joint_impulses);
+            let work = JointWork { kernel, params, bodies, groups: &self.joints.all, impulses, moving };
+            let colors = pass.colors.clone().map(|color| color - problem.first_joint_color);
+            over_colors(instructions, &work, &self.joints.colors, colors, crew);
+        } else {
+            let Groups { all: groups, colors, points, impulses, .. } = &mut self.groups;
+            let work = ContactWork { kernel, params, bodies, groups, points, impulses: Shared::new(impulses), moving };
+            over_colors(instructions, &work, colors, pass.colors.clone(), crew);
+        }
+        self.convergence.moving |= u32::from(moving.load(Ordering::Relaxed));
     }
 
     fn extrapolate(&mut self, first: bool, crew: &Crew) {
@@ -215,6 +205,20 @@ impl Cpu {
         for (impulse, step) in self.joint_impulses.iter_mut().zip(&mut self.joint_steps) {
             *impulse = extrapolate(first, factor, *impulse, step);
         }
+    }
+}
+
+/// Does one color after another; where the groups of each begin, and where the last ends, say `begins`.
+fn over_colors(
+    instructions: InstructionSet,
+    work: &impl Work,
+    begins: &[u32],
+    colors: impl Iterator<Item = u32>,
+    crew: &Crew,
+) {
+    for color in colors.map(|color| color as usize) {
+        let groups = begins[color] as usize..begins[color + 1] as usize;
+        crew.spread(groups, &|range| instructions.run(work, range));
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::groups::{Bodies, Group, NO_ROW};
 use super::joints::JointGroup;
 use super::shared::Shared;
-use super::wide::{Lanes, Portable, Row8, WIDTH, Wide, lanes};
+use super::wide::{Lanes, Portable, Row8, WIDTH, Wide, lanes, row_at};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::integrate::{integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
@@ -110,19 +110,37 @@ impl InstructionSet {
     }
 }
 
-/// Enters the function of a work that was compiled for an instruction set.
-macro_rules! enter {
-    ($self:ident, $instructions:ident, $range:ident) => {
-        match $instructions {
-            InstructionSet::Portable => $self.run_on::<Portable>($range),
+/// What is done to groups of sixteen, over whatever lanes.
+pub(super) trait Work: Sync {
+    /// Does some groups. To be inlined: what is not loses the instruction set.
+    fn over<L: Lanes>(&self, groups: Range<usize>);
+}
+
+impl InstructionSet {
+    /// Does some groups of a work; no other task has the same.
+    pub fn run(self, work: &impl Work, groups: Range<usize>) {
+        match self {
+            Self::Portable => work.over::<Portable>(groups),
             // SAFETY: `InstructionSet::each` asked the processor.
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => unsafe { $self.run_avx2($range) },
+            Self::Avx2 => unsafe { run_avx2(work, groups) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 => unsafe { $self.run_avx512($range) },
+            Self::Avx512 => unsafe { run_avx512(work, groups) },
         }
-    };
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_avx2(work: &impl Work, groups: Range<usize>) {
+    work.over::<super::wide::Avx2>(groups);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn run_avx512(work: &impl Work, groups: Range<usize>) {
+    work.over::<super::wide::Avx512>(groups);
 }
 
 /// A pass over bodies.
@@ -133,26 +151,9 @@ pub(super) struct BodyWork<'a> {
     pub accelerations: &'a [Row8],
 }
 
-impl BodyWork<'_> {
-    /// Does groups of sixteen bodies; no other task has the same.
-    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
-        enter!(self, instructions, groups)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx2>(groups);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    fn run_avx512(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx512>(groups);
-    }
-
+impl Work for BodyWork<'_> {
     #[inline(always)]
-    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = wide_params::<L>(self.params);
         for group in groups {
             let range = WIDTH * group..WIDTH * (group + 1);
@@ -217,32 +218,17 @@ pub(super) struct ContactWork<'a> {
     pub moving: &'a AtomicBool,
 }
 
-impl ContactWork<'_> {
-    /// Does some groups; no other task has the same.
-    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
-        enter!(self, instructions, groups)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx2>(groups);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    fn run_avx512(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx512>(groups);
-    }
-
+impl Work for ContactWork<'_> {
     #[inline(always)]
-    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = wide_params::<L>(self.params);
         for group in groups {
             self.sweep::<L>(&params, &self.groups[group]);
         }
     }
+}
 
+impl ContactWork<'_> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &Group) {
         let states = self.bodies.as_ptr();
@@ -282,32 +268,17 @@ pub(super) struct JointWork<'a> {
     pub moving: &'a AtomicBool,
 }
 
-impl JointWork<'_> {
-    /// Does some groups; no other task has the same.
-    pub fn run(&self, instructions: InstructionSet, groups: Range<usize>) {
-        enter!(self, instructions, groups)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx2>(groups);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    fn run_avx512(&self, groups: Range<usize>) {
-        self.run_on::<super::wide::Avx512>(groups);
-    }
-
+impl Work for JointWork<'_> {
     #[inline(always)]
-    fn run_on<L: Lanes>(&self, groups: Range<usize>) {
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = wide_params::<L>(self.params);
         for group in groups {
             self.sweep::<L>(&params, &self.groups[group]);
         }
     }
+}
 
+impl JointWork<'_> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &JointGroup) {
         let states = self.bodies.as_ptr();
@@ -424,9 +395,7 @@ unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &Bodies, body: 
         // Almost always all of them.
         if movable == u16::MAX || movable & (1 << lane) != 0 {
             // SAFETY: the caller's promise.
-            unsafe {
-                (&raw mut (*states).velocity).cast::<u64>().add(places[lane] as usize).cast::<Row8>().write(rows[lane])
-            };
+            unsafe { row_at((&raw mut (*states).velocity).cast_const(), places[lane]).cast_mut().write(rows[lane]) };
         }
     }
 }
