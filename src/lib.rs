@@ -42,6 +42,7 @@ pub mod metrics;
 pub mod plan;
 pub mod preset;
 pub mod problem;
+mod random;
 pub mod report;
 pub mod residuals;
 pub mod scenes;

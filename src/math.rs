@@ -63,6 +63,20 @@ pub trait Scalar: Lane + PartialOrd {
     fn to_f64(self) -> f64;
 }
 
+/// Less half of the bits of a positive number, it is the bits of a first guess at the inverse square root.
+pub(crate) const INVERSE_SQRT_GUESS: u32 = 0x5f37_5a86;
+
+/// 1/sqrt(x) from a guess at it: three steps of Newton's method.
+#[inline(always)]
+pub(crate) fn newton_inverse_sqrt<L: Lane>(x: L, guess: L) -> L {
+    let half_x = L::constant(0.5) * x;
+    let three_halves = L::constant(1.5);
+    let mut y = guess;
+    y = y * (three_halves - half_x * y * y);
+    y = y * (three_halves - half_x * y * y);
+    y * (three_halves - half_x * y * y)
+}
+
 macro_rules! scalar_lane {
     ($t:ty) => {
         #[inline(always)]
@@ -93,12 +107,8 @@ impl Lane for f32 {
     scalar_lane!(f32);
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
-        let half_x = 0.5 * self;
-        let mut y = Self::from_bits(0x5f37_5a86_u32.wrapping_sub(self.to_bits() >> 1));
-        y = y * (1.5 - half_x * y * y);
-        y = y * (1.5 - half_x * y * y);
-        y = y * (1.5 - half_x * y * y);
-        y
+        let guess = Self::from_bits(INVERSE_SQRT_GUESS.wrapping_sub(self.to_bits() >> 1));
+        newton_inverse_sqrt(self, guess)
     }
 }
 

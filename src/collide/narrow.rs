@@ -9,6 +9,7 @@ use parry3d::shape::{SharedShape, TypedShape};
 use super::manifold::{Manifold, ManifoldPoint};
 use super::query::{Found, convex_contact};
 use crate::math::{self, NormalMovement};
+use crate::random::mixed;
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -190,10 +191,7 @@ impl Pair {
     /// rattled at 23 mm/s that otherwise rests at 0.2.
     pub fn rank(&self) -> u32 {
         let both = u64::from(self.collider_a) << 32 | u64::from(self.collider_b);
-        // The finalizer of splitmix64.
-        let mixed = (both ^ both >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed >> 32) as u32
+        (mixed(both) >> 32) as u32
     }
 
     /// How the bodies moved since the manifolds were computed.

@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::Scene;
 use super::parts::{centered, floor, unit_box};
-use super::random::SplitMix64;
+use crate::random::SplitMix64;
 use crate::world::{Body, Shape, World};
 
 /// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls; every other

@@ -13,7 +13,6 @@ mod joint;
 mod jointed;
 mod masonry;
 mod parts;
-mod random;
 mod stacks;
 mod worlds;
 

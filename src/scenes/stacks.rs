@@ -3,8 +3,8 @@
 use glam::Vec3;
 
 use super::parts::{centered, floor, unit_box};
-use super::random::SplitMix64;
 use super::{Group, Scene};
+use crate::random::SplitMix64;
 use crate::world::World;
 
 /// Adds `n` cubes on top of each other, the k-th one off the axis by `offset(k)` [m].

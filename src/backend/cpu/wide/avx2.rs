@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::Lane;
+use crate::math::{INVERSE_SQRT_GUESS, Lane, newton_inverse_sqrt};
 
 /// Two registers.
 #[derive(Clone, Copy, Debug)]
@@ -96,13 +96,7 @@ impl Lane for Avx2 {
     }
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
-        let half_x = Self::constant(0.5) * self;
-        let three_halves = Self::constant(1.5);
-        let mut y = Self([guess(self.0[0]), guess(self.0[1])]);
-        y = y * (three_halves - half_x * y * y);
-        y = y * (three_halves - half_x * y * y);
-        y = y * (three_halves - half_x * y * y);
-        y
+        newton_inverse_sqrt(self, Self([guess(self.0[0]), guess(self.0[1])]))
     }
 }
 
@@ -111,7 +105,7 @@ impl Lane for Avx2 {
 fn guess(x: __m256) -> __m256 {
     unsafe {
         let half_bits = _mm256_srli_epi32::<1>(_mm256_castps_si256(x));
-        _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(0x5f37_5a86), half_bits))
+        _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(INVERSE_SQRT_GUESS as i32), half_bits))
     }
 }
 

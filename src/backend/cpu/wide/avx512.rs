@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::Lane;
+use crate::math::{INVERSE_SQRT_GUESS, Lane, newton_inverse_sqrt};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
@@ -95,16 +95,11 @@ impl Lane for Avx512 {
     }
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
-        let half_x = Self::constant(0.5) * self;
-        let three_halves = Self::constant(1.5);
-        let mut y = unsafe {
+        let guess = unsafe {
             let half_bits = _mm512_srli_epi32::<1>(_mm512_castps_si512(self.0));
-            Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(0x5f37_5a86), half_bits)))
+            Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(INVERSE_SQRT_GUESS as i32), half_bits)))
         };
-        y = y * (three_halves - half_x * y * y);
-        y = y * (three_halves - half_x * y * y);
-        y = y * (three_halves - half_x * y * y);
-        y
+        newton_inverse_sqrt(self, guess)
     }
 }
 
