@@ -102,6 +102,37 @@ impl ConstraintGraph {
     }
 }
 
+/// Bodies that are connected, however far.
+#[derive(Clone, Debug, Default)]
+pub struct Islands {
+    /// A body nearer to the root, or the root itself.
+    toward_root: Vec<u32>,
+}
+
+impl Islands {
+    /// So many bodies, each alone.
+    pub fn reset(&mut self, bodies: usize) {
+        self.toward_root.clear();
+        self.toward_root.extend(0..bodies as u32);
+    }
+
+    /// Makes one island of two.
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.toward_root[a.max(b) as usize] = a.min(b);
+    }
+
+    /// The body of the island with the smallest index; shortens the way there.
+    pub fn root(&mut self, body: u32) -> u32 {
+        let (to, mut i) = (&mut self.toward_root, body as usize);
+        while to[i] as usize != i {
+            to[i] = to[to[i] as usize];
+            i = to[i] as usize;
+        }
+        i as u32
+    }
+}
+
 /// Sorts the edges by color: movable ones, their overflow, those with fixed bodies, their overflow.
 fn lay_out(edges: &[Edge]) -> Coloring {
     // 64 colors and one bucket for the overflow, twice.

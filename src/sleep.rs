@@ -10,6 +10,7 @@ use glam::{Quat, Vec3};
 
 use crate::collide::{Activity, Detector};
 use crate::config::SolverConfig;
+use crate::graph::Islands;
 use crate::world::{Body, BodyKind, World};
 
 /// What somebody may change between two steps.
@@ -51,8 +52,8 @@ pub struct Sleep {
     reach: Vec<f32>,
     /// Bodies that sleep, and those that cannot be pushed, as they were left.
     known: Vec<Known>,
-    /// Root of the island of each body, and the next of its island, around; of bodies that sleep.
-    island: Vec<u32>,
+    islands: Islands,
+    /// The next body of the island, around; of bodies that sleep.
     next: Vec<u32>,
     count: usize,
     steps: u32,
@@ -79,7 +80,7 @@ impl Sleep {
             slow_for: vec![0.0; bodies],
             reach: world.bodies.iter().map(reach).collect(),
             known: world.bodies.iter().map(Known::of).collect(),
-            island: (0..bodies as u32).collect(),
+            islands: Islands::default(),
             next: (0..bodies as u32).collect(),
             count: 0,
             steps: 0,
@@ -178,11 +179,11 @@ impl Sleep {
     }
 
     fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector) {
-        // Islands of those awake, the smallest index as root; and who is held by anything, and by nothing that moves by itself.
+        // Islands of those awake; and who is held by anything, and by nothing that moves by itself.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];
-        (0..self.island.len()).filter(|&i| !self.asleep[i]).for_each(|i| self.island[i] = i as u32);
+        self.islands.reset(self.asleep.len());
         let touching =
             detector.pairs().filter(|p| !p.manifolds.is_empty()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
         let joined = world.joints.iter().map(|j| (j.body_a, j.body_b));
@@ -193,17 +194,19 @@ impl Sleep {
                 driven[one] |= other.is_some_and(|other| self.activity[other] == Activity::Moving);
             }
             if let Some(b) = b.filter(|&b| is_dynamic(a) && is_dynamic(b) && !self.asleep[a] && !self.asleep[b]) {
-                let (a, b) = (self.root(a), self.root(b));
-                self.island[a.max(b) as usize] = a.min(b);
+                self.islands.join(a as u32, b as u32);
             }
         }
         let mut restless = vec![false; self.asleep.len()];
         let awake: Vec<usize> = (0..self.asleep.len()).filter(|&i| is_dynamic(i) && !self.asleep[i]).collect();
         for &i in &awake {
-            self.island[i] = self.root(i);
-            restless[self.island[i] as usize] |= self.slow_for[i] < self.after || !held[i] || driven[i];
+            restless[self.islands.root(i as u32) as usize] |= self.slow_for[i] < self.after || !held[i] || driven[i];
         }
-        for i in awake.into_iter().filter(|&i| !restless[self.island[i] as usize]) {
+        for i in awake {
+            let root = self.islands.root(i as u32) as usize;
+            if restless[root] {
+                continue;
+            }
             let body = &mut world.bodies[i];
             (body.linear_velocity, body.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
             self.known[i] = Known::of(body);
@@ -211,20 +214,9 @@ impl Sleep {
             self.activity[i] = Activity::Still;
             self.count += 1;
             // Into the ring of its island.
-            let root = self.island[i] as usize;
             if root != i {
                 self.next[i] = std::mem::replace(&mut self.next[root], i as u32);
             }
         }
-    }
-
-    /// The root of a body's island; halves the way there.
-    fn root(&mut self, body: usize) -> u32 {
-        let mut i = body;
-        while self.island[i] as usize != i {
-            self.island[i] = self.island[self.island[i] as usize];
-            i = self.island[i] as usize;
-        }
-        i as u32
     }
 }
