@@ -78,7 +78,17 @@ impl Crew {
 
     /// Runs `work` over `groups`, cut into chunks if there are enough of them.
     pub fn spread(&self, groups: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
-        let chunks = (groups.len() / CHUNK).min(CHUNKS_PER_THREAD * (self.helpers + 1));
+        self.cut(groups, CHUNK, work);
+    }
+
+    /// Runs `work` over parts, each of which is worth a thread.
+    pub fn spread_parts(&self, parts: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
+        self.cut(parts, 1, work);
+    }
+
+    /// Runs `work` over `groups` in chunks of at least so many.
+    fn cut(&self, groups: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)) {
+        let chunks = (groups.len() / least).min(CHUNKS_PER_THREAD * (self.helpers + 1));
         if self.helpers == 0 || chunks < 2 {
             return work(groups);
         }

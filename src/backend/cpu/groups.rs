@@ -2,7 +2,10 @@
 
 #![allow(unsafe_code)]
 
+use std::ops::Range;
+
 use super::crew::Crew;
+use super::parts::{Begins, Dealt, Parts};
 use super::shared::Shared;
 use super::sweep::place;
 use super::wide::{Lanes, Portable, WIDTH, Wide};
@@ -39,33 +42,32 @@ pub(super) struct Bodies {
 
 impl Bodies {
     /// Puts a body of a problem into a lane, or nobody: one more than the problem has.
-    pub fn set(&mut self, lane: usize, body: usize, problem: &StepProblem) {
-        assert!(body <= problem.bodies.len(), "a constraint of body {body} of {}", problem.bodies.len());
-        self.places[lane] = place(body);
+    pub fn set(&mut self, lane: usize, body: usize, problem: &StepProblem, slots: &[u32]) {
+        self.places[lane] = place(slots[body] as usize);
         self.movable |= u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
     }
 }
 
-/// The contacts of a problem, color by color.
+/// The contacts of a problem, part by part, and color by color in each.
 #[derive(Default)]
 pub(super) struct Groups {
     pub all: Vec<Group>,
-    /// Where the groups of each color begin.
-    pub colors: Vec<u32>,
+    /// Where the groups of each color of each part are.
+    pub begins: Begins,
+    dealt: Dealt,
     pub points: Vec<[Wide; 12]>,
-    pub impulses: Vec<[Wide; 4]>,
     /// What accelerated sweeps leave for each other, kept from one run to the next.
     steps: Vec<Step<Portable>>,
 }
 
 impl Groups {
     /// Takes over the contacts of a problem.
-    pub fn load(&mut self, problem: &StepProblem, crew: &Crew) {
-        self.deal(problem);
+    pub fn load(&mut self, problem: &StepProblem, parts: &Parts, impulses: &mut Vec<[Wide; 4]>, crew: &Crew) {
+        self.deal(problem, parts);
         let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
         self.points.resize(count, [Wide::default(); 12]);
-        self.impulses.resize(count, [Wide::default(); 4]);
-        let (points, impulses) = (Shared::new(&mut self.points), Shared::new(&mut self.impulses));
+        impulses.resize(count, [Wide::default(); 4]);
+        let (points, impulses) = (Shared::new(&mut self.points), Shared::new(impulses));
         let (len, all) = (self.all.len(), Shared::new(&mut self.all));
         crew.spread(0..len, &|range| {
             // SAFETY: tasks have different groups.
@@ -73,23 +75,23 @@ impl Groups {
                 let rows = group.first_point as usize..(group.first_point + group.points) as usize;
                 // SAFETY: groups have different points.
                 let (points, impulses) = unsafe { (points.slice(rows.clone()), impulses.slice(rows)) };
-                group.fill(problem, points, impulses);
+                group.fill(problem, &parts.slots, points, impulses);
             }
         });
     }
 
     /// Gives the impulses back.
-    pub fn store(&self, problem: &mut StepProblem, crew: &Crew) {
-        let (contacts, impulses) = (&problem.contacts, Shared::new(&mut problem.impulses));
+    pub fn store(&self, problem: &mut StepProblem, impulses: &[[Wide; 4]], crew: &Crew) {
+        let (contacts, to_problem) = (&problem.contacts, Shared::new(&mut problem.impulses));
         crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                     let to = contacts[row as usize].first_point as usize;
                     for k in 0..group.points as usize {
-                        let wide = &self.impulses[group.first_point as usize + k];
+                        let wide = &impulses[group.first_point as usize + k];
                         let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
                         // SAFETY: a contact is in one lane of one group, and its impulses are its own.
-                        unsafe { impulses.write(to + k, ImpulseRow { normal, tangent_1, tangent_2, peak }) };
+                        unsafe { to_problem.write(to + k, ImpulseRow { normal, tangent_1, tangent_2, peak }) };
                     }
                 }
             }
@@ -97,11 +99,11 @@ impl Groups {
     }
 
     /// Goes on with all impulses.
-    pub fn extrapolate(&mut self, first: bool, factor: f32, crew: &Crew) {
-        let len = self.impulses.len();
+    pub fn extrapolate(&mut self, first: bool, factor: f32, impulses: &mut [[Wide; 4]], crew: &Crew) {
+        let len = impulses.len();
         self.steps.resize(len, Step::default());
         let factor = Portable::constant(factor.into());
-        let (impulses, steps) = (Shared::new(&mut self.impulses), Shared::new(&mut self.steps));
+        let (impulses, steps) = (Shared::new(impulses), Shared::new(&mut self.steps));
         crew.spread(0..len, &|range| {
             // SAFETY: tasks have different impulses.
             let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
@@ -113,13 +115,19 @@ impl Groups {
     }
 
     /// How far the last sweep moved the impulse of each point of the problem.
-    pub fn measure_step(&self, problem: &StepProblem, lengths: &mut [StepLength<f32>], crew: &Crew) {
+    pub fn measure_step(
+        &self,
+        problem: &StepProblem,
+        impulses: &[[Wide; 4]],
+        lengths: &mut [StepLength<f32>],
+        crew: &Crew,
+    ) {
         let lengths = Shared::new(lengths);
         crew.spread(0..self.all.len(), &|range| {
             for group in &self.all[range] {
                 for k in 0..group.points as usize {
                     let at = group.first_point as usize + k;
-                    let StepLength { square, along } = step_length(components(&self.impulses[at]), &self.steps[at]);
+                    let StepLength { square, along } = step_length(components(&impulses[at]), &self.steps[at]);
                     let (square, along) = (square.store(), along.store());
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                         let to = problem.contacts[row as usize].first_point as usize + k;
@@ -131,50 +139,58 @@ impl Groups {
         });
     }
 
-    /// Deals the contacts of each color out to groups by their number of points, in one walk.
-    fn deal(&mut self, problem: &StepProblem) {
+    /// Deals the contacts of each color of each part out to groups by their number of points.
+    fn deal(&mut self, problem: &StepProblem, parts: &Parts) {
         self.all.clear();
-        self.colors.clear();
+        let (contacts, colors) = (&problem.contacts, problem.contact_colors());
+        self.begins.clear(colors.len());
+        self.dealt.update(problem, colors, parts.count, |row| parts.of(contacts[row].body_a, contacts[row].body_b));
         // Patches stand in the problem whether a pass asks for them or not.
         let patch = u32::from(problem.has_patches());
         let mut next_point = 0;
-        for color in problem.contact_colors() {
-            self.colors.push(self.all.len() as u32);
-            let mut open = [[NO_ROW; WIDTH]; 4];
-            let mut filled = [0; 4];
-            let mut close = |rows: &mut [u32; WIDTH], points: u32| {
+        let mut open = [[NO_ROW; WIDTH]; 4];
+        let mut filled = [0; 4];
+        for rows in self.dealt.cells() {
+            self.begins.push(self.all.len());
+            let mut close = |rows: &mut [u32; WIDTH], filled: &mut usize, points: u32| {
                 self.all.push(Group { rows: *rows, first_point: next_point, points, ..Group::default() });
                 next_point += points;
-                *rows = [NO_ROW; WIDTH];
+                (*rows, *filled) = ([NO_ROW; WIDTH], 0);
             };
-            for row in problem.rows_of(&(color..color + 1)) {
-                let count = problem.contacts[row].point_count;
+            for &row in rows {
+                let count = contacts[row as usize].point_count;
                 let (rows, filled) = (&mut open[count as usize - 1], &mut filled[count as usize - 1]);
-                rows[*filled] = row as u32;
+                rows[*filled] = row;
                 *filled += 1;
                 if *filled == WIDTH {
-                    close(rows, count + patch);
-                    *filled = 0;
+                    close(rows, filled, count + patch);
                 }
             }
-            for (rows, count) in open.iter_mut().zip(1..).filter(|open| open.0[0] != NO_ROW) {
-                close(rows, count + patch);
+            for ((rows, filled), count) in open.iter_mut().zip(&mut filled).zip(1..).filter(|open| *open.0.1 > 0) {
+                close(rows, filled, count + patch);
             }
         }
-        self.colors.push(self.all.len() as u32);
+        self.begins.push(self.all.len());
+    }
+
+    /// The points of a part.
+    pub fn points_of(&self, part: usize) -> Range<usize> {
+        let groups = self.begins.of(part);
+        let first = |group: usize| self.all.get(group).map_or(self.points.len(), |group| group.first_point as usize);
+        first(groups.start)..first(groups.end)
     }
 }
 
 impl Group {
     /// Lanes without a contact hold one of nobody with nobody.
-    fn fill(&mut self, problem: &StepProblem, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
+    fn fill(&mut self, problem: &StepProblem, slots: &[u32], points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
         let nobody = problem.bodies.len() as u32;
         let nothing = ContactRow { body_a: nobody, body_b: nobody, first_point: NO_ROW, ..ContactRow::default() };
         let (no_point, no_impulse) = (PointRow::default(), ImpulseRow::default());
         for lane in 0..WIDTH {
             let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);
-            self.a.set(lane, c.body_a as usize, problem);
-            self.b.set(lane, c.body_b as usize, problem);
+            self.a.set(lane, c.body_a as usize, problem, slots);
+            self.b.set(lane, c.body_b as usize, problem, slots);
             let ([nx, ny, nz], [tx, ty, tz]) = (c.normal, c.tangent);
             let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
             set_lane(&mut self.contact, lane, &header);

@@ -1,8 +1,7 @@
 //! Joints in groups of sixteen lanes, color by color.
 
-use std::ops::Range;
-
 use super::groups::{Bodies, NO_ROW};
+use super::parts::{Begins, Dealt, Parts};
 use super::wide::{WIDTH, Wide};
 use crate::problem::StepProblem;
 
@@ -21,41 +20,42 @@ pub(super) struct JointGroup {
 #[derive(Default)]
 pub(super) struct JointGroups {
     pub all: Vec<JointGroup>,
-    /// Where the groups of each color begin, from the first color of joints.
-    pub colors: Vec<u32>,
+    /// Where the groups of each color of each part are, from the first color of joints.
+    pub begins: Begins,
+    dealt: Dealt,
 }
 
 impl JointGroups {
     /// Takes over the joints of a problem.
-    pub fn load(&mut self, problem: &StepProblem) {
+    pub fn load(&mut self, problem: &StepProblem, parts: &Parts) {
+        let (joints, colors) = (&problem.joints, problem.joint_colors());
         self.all.clear();
-        self.colors.clear();
-        for color in problem.joint_colors() {
-            self.colors.push(self.all.len() as u32);
-            let rows = problem.rows_of(&(color..color + 1));
-            let groups = rows.clone().step_by(WIDTH).map(|first| first..rows.end.min(first + WIDTH));
-            self.all.extend(groups.map(|rows| JointGroup::of(problem, rows)));
+        self.begins.clear(colors.len());
+        self.dealt.update(problem, colors, parts.count, |row| parts.of(joints[row].body_a, joints[row].body_b));
+        for rows in self.dealt.cells() {
+            self.begins.push(self.all.len());
+            self.all.extend(rows.chunks(WIDTH).map(|rows| JointGroup::of(problem, &parts.slots, rows)));
         }
-        self.colors.push(self.all.len() as u32);
+        self.begins.push(self.all.len());
     }
 }
 
 impl JointGroup {
     /// Lanes without a joint hold one of nobody with nobody.
-    fn of(problem: &StepProblem, mut rows: Range<usize>) -> Self {
+    fn of(problem: &StepProblem, slots: &[u32], rows: &[u32]) -> Self {
         let nobody = problem.bodies.len();
         let mut group =
             Self { a: Bodies::default(), b: Bodies::default(), rows: [NO_ROW; WIDTH], joint: [Wide::default(); 9] };
         for lane in 0..WIDTH {
-            let Some(row) = rows.next() else {
-                group.a.set(lane, nobody, problem);
-                group.b.set(lane, nobody, problem);
+            let Some(&row) = rows.get(lane) else {
+                group.a.set(lane, nobody, problem, slots);
+                group.b.set(lane, nobody, problem, slots);
                 continue;
             };
-            let joint = &problem.joints[row];
-            group.rows[lane] = row as u32;
-            group.a.set(lane, joint.body_a as usize, problem);
-            group.b.set(lane, joint.body_b as usize, problem);
+            let joint = &problem.joints[row as usize];
+            group.rows[lane] = row;
+            group.a.set(lane, joint.body_a as usize, problem, slots);
+            group.b.set(lane, joint.body_b as usize, problem, slots);
             let numbers = [joint.r_a, joint.r_b, joint.gap].into_iter().flatten();
             group.joint.iter_mut().zip(numbers).for_each(|(wide, x)| wide.0[lane] = x);
         }

@@ -4,6 +4,7 @@ mod crew;
 mod groups;
 mod joints;
 mod lanes;
+mod parts;
 mod peak;
 mod reference;
 mod shared;

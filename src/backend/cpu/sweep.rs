@@ -10,17 +10,19 @@ use super::joints::JointGroup;
 use super::shared::Shared;
 use super::wide::{Lanes, Portable, Row8, WIDTH, Wide, lanes, row_at};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
-use crate::kernels::integrate::{integrate_positions, integrate_velocities};
+use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::extrapolated;
-use crate::kernels::{Body, Contact, Free, Impulse, Joint, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3};
+use crate::kernels::{
+    Body, Contact, Free, Impulse, Inertia, Joint, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3,
+};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{Params, Softness};
 
-/// All that the passes of a step know of a body: two lines of the cache.
+/// All that sweeps know of a body.
 #[derive(Clone, Copy, Default)]
-#[repr(C, align(128))]
+#[repr(C)]
 pub(super) struct State {
     /// v . w .
     pub velocity: Row8,
@@ -28,8 +30,6 @@ pub(super) struct State {
     pub movement: Row8,
     /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz .
     pub mass: Row8,
-    /// v . w . without the impulses of the substep.
-    pub free: Row8,
 }
 
 /// Where a body's state begins, in units of 8 bytes.
@@ -48,15 +48,10 @@ impl State {
             dq: Quat { axis: vec3(qx, qy, qz), w: qw },
         }
     }
-
-    /// Takes over the velocities.
-    pub fn store_velocity(&mut self, body: &Body<f32>) {
-        self.velocity = velocity_row(body.v, body.w);
-    }
 }
 
 /// Two velocities in a row.
-pub(super) fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
+fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
     Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0])
 }
 
@@ -148,6 +143,8 @@ pub(super) struct BodyWork<'a> {
     pub kernel: Kernel,
     pub params: &'a Params,
     pub bodies: Shared<'a, State>,
+    /// v . w . of each without the impulses of the substep.
+    pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
 }
 
@@ -162,16 +159,21 @@ impl Work for BodyWork<'_> {
             // SAFETY: there are sixteen.
             let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
             if let Kernel::IntegrateVelocities { carry } = self.kernel {
-                let accelerations = &self.accelerations[range];
-                // SAFETY: rows are a quarter of a state.
-                let [x, y, z, ..] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORS.map(|place| place / 4)) };
-                let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
+                let accelerations = &self.accelerations[range.clone()];
                 // SAFETY: as above.
-                let mut free = unsafe { wide_free::<L>(states.as_ptr(), &NEIGHBORS) };
+                let rows = unsafe { self.free.slice(range) };
+                // SAFETY: there are sixteen of each.
+                let (acceleration, free) = unsafe {
+                    (
+                        L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS),
+                        L::gathered(rows.as_ptr(), &NEIGHBORING_ROWS),
+                    )
+                };
+                let ([x, y, z, ..], [vx, vy, vz, _, wx, wy, wz, _]) = (acceleration, free);
+                let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
+                let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
                 integrate_velocities(carry, &params, &mass, &mut body, &mut free);
-                for (state, free) in states.iter_mut().zip(velocity_rows(free.v, free.w)) {
-                    state.free = free;
-                }
+                rows.copy_from_slice(&velocity_rows(free.v, free.w));
             } else {
                 integrate_positions(&params, &mut body);
                 for (state, movement) in states.iter_mut().zip(movement_rows(&body)) {
@@ -182,6 +184,33 @@ impl Work for BodyWork<'_> {
                 state.velocity = velocity;
             }
         }
+    }
+}
+
+/// Forgets the impulses of some points; no other task has the same.
+pub(super) fn clear_impulses(impulses: &Shared<[Wide; 4]>, points: Range<usize>) {
+    // SAFETY: tasks have different points.
+    for impulse in unsafe { impulses.slice(points) } {
+        impulse[..3].fill(Wide::default());
+    }
+}
+
+/// Turns the spins of some bodies with unequal moments of inertia, given with their slots; no other task has the same.
+pub(super) fn integrate_spins(
+    params: &Params,
+    inertias: &[(usize, Inertia<f32>)],
+    bodies: &Shared<State>,
+    free: &Shared<Row8>,
+) {
+    let params = StepParams::load(params);
+    for (slot, inertia) in inertias {
+        // SAFETY: tasks have different bodies.
+        let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
+        let (mut body, [vx, vy, vz, _, wx, wy, wz, _]) = (state.load(), row.0);
+        let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+        integrate_gyroscopic(&params, inertia, &mut body, &mut free);
+        state.velocity = velocity_row(body.v, body.w);
+        *row = velocity_row(free.v, free.w);
     }
 }
 
@@ -321,6 +350,9 @@ fn note_moving<L: Lanes>(rules: Rules, pair: &Pair<L>, moving: &AtomicBool) {
 /// The places of sixteen bodies that stand beside each other.
 const NEIGHBORS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<State>() / 8) as u32);
 
+/// The places of sixteen rows that stand beside each other.
+const NEIGHBORING_ROWS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<Row8>() / 8) as u32);
+
 /// # Safety
 /// The bodies are there, and nobody writes them meanwhile; the same below.
 #[inline(always)]
@@ -369,15 +401,6 @@ unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Ma
     // SAFETY: the caller's promise.
     let [xx, xy, xz, inv_mass, yy, yz, zz, _] = unsafe { L::gathered(&raw const (*states).mass, places) };
     Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
-}
-
-/// # Safety
-/// As above.
-#[inline(always)]
-unsafe fn wide_free<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Free<L> {
-    // SAFETY: the caller's promise.
-    let [vx, vy, vz, _, wx, wy, wz, _] = unsafe { L::gathered(&raw const (*states).free, places) };
-    Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) }
 }
 
 /// Writes the velocities of those that can move.
