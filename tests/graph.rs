@@ -153,6 +153,19 @@ fn constraints_with_a_fixed_body_are_swept_last() {
 }
 
 #[test]
+fn new_edges_choose_in_the_order_of_their_ranks_and_have_places_in_their_own() {
+    for (ranks, colors) in
+        [([0, 1, 2], [0, 1, 0]), ([1, 0, 2], [1, 0, 1]), ([2, 2, 1], [0, 1, 0]), ([1, 3, 2], [0, 1, 0])]
+    {
+        let mut edges = [(0, 1), (1, 2), (2, 3)].map(|(a, b)| new_edge(a, b));
+        edges.iter_mut().zip(ranks).for_each(|(edge, rank)| edge.rank = rank);
+        let coloring = color(&mut edges, 64);
+        assert_eq!(edges.map(|edge| edge.color), colors.map(Some), "ranks {ranks:?}");
+        assert!(coloring.offsets.windows(2).all(|w| coloring.order[w[0] as usize..w[1] as usize].is_sorted()));
+    }
+}
+
+#[test]
 fn no_edges_make_no_colors() {
     let coloring = color(&mut [], 64);
     assert_eq!((coloring.color_count(), coloring.order.len(), coloring.overflow), (0, 0, 0));

@@ -1,7 +1,7 @@
 //! The rows of contacts: written once from a manifold, and carried from step to step while the manifold is reused.
 //!
 //! Normal, tangents, arms and effective masses of a reused manifold stay, and so do its impulses; only the separations
-//! follow the bodies. The bodies of a reused manifold turned by 0.1 rad at most, and unequal moments of inertia turned with
+//! follow the bodies. The bodies of a reused manifold turned by 0.03 rad at most, and unequal moments of inertia turned with
 //! them: what that changes in the masses is left out, as it is in the arms.
 
 use glam::{Vec2, Vec3};
@@ -213,7 +213,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Brings the rows of a manifold that is reused to where the bodies are.
+    /// Brings the separations of a manifold to where the bodies are, from those that were computed.
     fn refresh_points(&self, row: &ContactRow, motion: &Motion, points: &mut [PointRow], computed: &[f32]) {
         let movement = motion.along(row.normal, [row.radius_a, row.radius_b]);
         for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {

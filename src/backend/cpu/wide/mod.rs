@@ -1,7 +1,8 @@
 //! Sixteen numbers side by side, for every instruction set there is.
 //!
-//! A sweep waits for itself: every point of a manifold needs what the one before did to the bodies. Sixteen contacts at a time
-//! are two to four registers of work for each of these waits, twice what the widest unit of most processors takes at once.
+//! Sixteen fill one register of the widest instruction set, and two or four of the others. The dearest thing in a sweep is to bring
+//! bodies from where they stand in memory to the lanes and back ([`Lanes::gathered`], [`Lanes::scattered`]): with lanes of eight it
+//! took 41 % of all instructions.
 
 #![allow(unsafe_code)]
 
