@@ -55,6 +55,9 @@ pub(super) struct Groups {
     /// Where the groups of each color of each part are.
     pub begins: Begins,
     dealt: Dealt,
+    /// Contacts of each color of each part with one to four points, and its first group and point.
+    counts: Vec<[usize; 4]>,
+    firsts: Vec<(usize, u32)>,
     pub points: Vec<[Wide; 12]>,
     /// What accelerated sweeps leave for each other, kept from one run to the next.
     steps: Vec<Step<Portable>>,
@@ -63,7 +66,7 @@ pub(super) struct Groups {
 impl Groups {
     /// Takes over the contacts of a problem.
     pub fn load(&mut self, problem: &StepProblem, parts: &Parts, impulses: &mut Vec<[Wide; 4]>, crew: &Crew) {
-        self.deal(problem, parts);
+        self.deal(problem, parts, crew);
         let count = self.all.last().map_or(0, |g| g.first_point + g.points) as usize;
         self.points.resize(count, [Wide::default(); 12]);
         impulses.resize(count, [Wide::default(); 4]);
@@ -139,38 +142,62 @@ impl Groups {
         });
     }
 
-    /// Deals the contacts of each color of each part out to groups by their number of points.
-    fn deal(&mut self, problem: &StepProblem, parts: &Parts) {
-        self.all.clear();
+    /// Deals the contacts of each color of each part out to groups by their number of points. Groups stand in the order of their
+    /// first rows, so that what is beside each other in the world stays so.
+    fn deal(&mut self, problem: &StepProblem, parts: &Parts, crew: &Crew) {
         let (contacts, colors) = (&problem.contacts, problem.contact_colors());
         self.begins.clear(colors.len());
         self.dealt.update(problem, colors, parts.count, |row| parts.of(contacts[row].body_a, contacts[row].body_b));
         // Patches stand in the problem whether a pass asks for them or not.
         let patch = u32::from(problem.has_patches());
-        let mut next_point = 0;
-        let mut open = [[NO_ROW; WIDTH]; 4];
-        let mut filled = [0; 4];
-        for rows in self.dealt.cells() {
-            self.begins.push(self.all.len());
-            let mut close = |rows: &mut [u32; WIDTH], filled: &mut usize, points: u32| {
-                self.all.push(Group { rows: *rows, first_point: next_point, points, ..Group::default() });
-                next_point += points;
-                (*rows, *filled) = ([NO_ROW; WIDTH], 0);
-            };
-            for &row in rows {
-                let count = contacts[row as usize].point_count;
-                let (rows, filled) = (&mut open[count as usize - 1], &mut filled[count as usize - 1]);
-                rows[*filled] = row;
-                *filled += 1;
-                if *filled == WIDTH {
-                    close(rows, filled, count + patch);
-                }
+        let count_of = |row: u32| contacts[row as usize].point_count as usize - 1;
+        let (dealt, cells) = (&self.dealt, self.dealt.cells());
+        self.counts.resize(cells, [0; 4]);
+        let counts = Shared::new(&mut self.counts);
+        crew.spread_parts(0..cells, &|range| {
+            for cell in range {
+                let mut count = [0; 4];
+                dealt.rows(cell).iter().for_each(|&row| count[count_of(row)] += 1);
+                // SAFETY: tasks have different cells.
+                unsafe { counts.write(cell, count) };
             }
-            for ((rows, filled), count) in open.iter_mut().zip(&mut filled).zip(1..).filter(|open| *open.0.1 > 0) {
-                close(rows, filled, count + patch);
+        });
+        let (mut groups, mut points) = (0, 0);
+        self.firsts.clear();
+        for counts in &self.counts {
+            self.begins.push(groups);
+            self.firsts.push((groups, points));
+            for (rows, each) in counts.iter().zip(1..) {
+                groups += rows.div_ceil(WIDTH);
+                points += rows.div_ceil(WIDTH) as u32 * (each + patch);
             }
         }
-        self.begins.push(self.all.len());
+        self.begins.push(groups);
+        self.all.resize(groups, Group::default());
+        let (firsts, all) = (&self.firsts, Shared::new(&mut self.all));
+        crew.spread_parts(0..cells, &|range| {
+            for cell in range {
+                let (mut next, mut next_point) = firsts[cell];
+                // The group of each number of points that is being filled.
+                let (mut open, mut filled) = ([0; 4], [0; 4]);
+                for &row in dealt.rows(cell) {
+                    let k = count_of(row);
+                    let lane = filled[k] % WIDTH;
+                    if lane == 0 {
+                        (open[k], next) = (next, next + 1);
+                    }
+                    // SAFETY: cells have different groups.
+                    let group = unsafe { &mut all.slice(open[k]..open[k] + 1)[0] };
+                    if lane == 0 {
+                        (group.first_point, group.points) = (next_point, k as u32 + 1 + patch);
+                        next_point += group.points;
+                        group.rows = [NO_ROW; WIDTH];
+                    }
+                    group.rows[lane] = row;
+                    filled[k] += 1;
+                }
+            }
+        });
     }
 
     /// The points of a part.
@@ -186,6 +213,7 @@ impl Group {
     fn fill(&mut self, problem: &StepProblem, slots: &[u32], points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
         let nobody = problem.bodies.len() as u32;
         let nothing = ContactRow { body_a: nobody, body_b: nobody, first_point: NO_ROW, ..ContactRow::default() };
+        (self.a, self.b) = (Bodies::default(), Bodies::default());
         let (no_point, no_impulse) = (PointRow::default(), ImpulseRow::default());
         for lane in 0..WIDTH {
             let c = problem.contacts.get(self.rows[lane] as usize).unwrap_or(&nothing);

@@ -32,9 +32,10 @@ impl JointGroups {
         self.all.clear();
         self.begins.clear(colors.len());
         self.dealt.update(problem, colors, parts.count, |row| parts.of(joints[row].body_a, joints[row].body_b));
-        for rows in self.dealt.cells() {
+        for cell in 0..self.dealt.cells() {
             self.begins.push(self.all.len());
-            self.all.extend(rows.chunks(WIDTH).map(|rows| JointGroup::of(problem, &parts.slots, rows)));
+            self.all
+                .extend(self.dealt.rows(cell).chunks(WIDTH).map(|rows| JointGroup::of(problem, &parts.slots, rows)));
         }
         self.begins.push(self.all.len());
     }

@@ -180,6 +180,15 @@ impl Dealt {
     pub fn update(&mut self, problem: &StepProblem, colors: Range<u32>, parts: usize, part_of: impl Fn(usize) -> u32) {
         let rows =
             || colors.clone().flat_map(|color| problem.rows_of(&(color..color + 1)).map(move |row| (color, row)));
+        if parts == 1 {
+            let first = problem.rows_of(&colors).start as u32;
+            self.rows.clear();
+            self.rows.extend(problem.rows_of(&colors).map(|row| row as u32));
+            self.begins.clear();
+            self.begins.extend(colors.clone().map(|color| problem.colors[color as usize] - first));
+            self.begins.push(self.rows.len() as u32);
+            return;
+        }
         let cell = |(color, row)| part_of(row) as usize * colors.len() + (color - colors.start) as usize;
         self.begins.clear();
         self.begins.resize(parts * colors.len() + 1, 0);
@@ -196,9 +205,14 @@ impl Dealt {
         }
     }
 
-    /// The rows of each color of each part.
-    pub fn cells(&self) -> impl Iterator<Item = &[u32]> {
-        self.begins.windows(2).map(|w| &self.rows[w[0] as usize..w[1] as usize])
+    /// How many colors of parts there are.
+    pub fn cells(&self) -> usize {
+        self.begins.len() - 1
+    }
+
+    /// The rows of a color of a part.
+    pub fn rows(&self, cell: usize) -> &[u32] {
+        &self.rows[self.begins[cell] as usize..self.begins[cell + 1] as usize]
     }
 }
 
