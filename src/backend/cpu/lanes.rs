@@ -3,7 +3,8 @@
 //! The same kernel text as the reference, over another lane type, so the results are the reference's to the last bit.
 //! Contacts of one color and one number of points stand in groups of sixteen, lane by lane; what does not fill a group is
 //! filled up with contacts of nothing with nothing. The instruction set is chosen at run time. Color order makes the
-//! order inside a pass irrelevant, so a pass can be cut into as many tasks as there are threads.
+//! order inside a pass irrelevant, so a pass can be cut into as many tasks as there are threads. Where there are many islands, each
+//! thread does all passes to some of them before it goes on (`parts`).
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -109,6 +110,7 @@ impl Cpu {
         let len = self.parts.all_bodies().len() * WIDTH;
         self.bodies.clear();
         self.bodies.resize(len, State::default());
+        self.free.clear();
         self.free.resize(len, Row8::default());
         self.accelerations.clear();
         self.accelerations.resize(len, Row8::default());
@@ -173,7 +175,7 @@ impl Cpu {
     /// Small islands part by part, from the first of the passes to the last, then large ones pass by pass.
     fn run_on_islands(&mut self, problem: &StepProblem, passes: &[Pass], crew: &Crew) {
         let moving = AtomicBool::new(false);
-        let islands = Islands {
+        let field = Field {
             instructions: self.instructions,
             params: &problem.params,
             first_joint_color: problem.first_joint_color,
@@ -192,13 +194,14 @@ impl Cpu {
         let last = self.parts.count - 1;
         crew.spread_parts(0..last, &|parts| {
             for part in parts {
-                passes.iter().filter(is_needed).for_each(|pass| islands.run(pass, part, &|groups, work| work(groups)));
+                for pass in passes.iter().filter(is_needed) {
+                    field.run(pass, part, &|groups, work| work(groups));
+                }
             }
         });
-        passes
-            .iter()
-            .filter(is_needed)
-            .for_each(|pass| islands.run(pass, last, &|groups, work| crew.spread(groups, work)));
+        for pass in passes.iter().filter(is_needed) {
+            field.run(pass, last, &|groups, work| crew.spread(groups, work));
+        }
         self.convergence.moving |= u32::from(moving.into_inner());
     }
 
@@ -226,7 +229,7 @@ fn stays_on_islands(kernel: Kernel) -> bool {
 }
 
 /// All that passes work on, shared by threads that have different parts of it.
-struct Islands<'a> {
+struct Field<'a> {
     instructions: InstructionSet,
     params: &'a Params,
     first_joint_color: u32,
@@ -246,7 +249,7 @@ struct Islands<'a> {
 /// Has some work done to some groups, by one thread or by many.
 type Spread<'a> = &'a dyn Fn(Range<usize>, &(dyn Fn(Range<usize>) + Sync));
 
-impl Islands<'_> {
+impl Field<'_> {
     /// Does a pass to a part; no other task has the same.
     fn run(&self, pass: &Pass, part: usize, spread: Spread) {
         let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
