@@ -18,6 +18,7 @@ use super::parts::Parts;
 use super::shared::Shared;
 use super::sweep::{
     BodyWork, ContactWork, InstructionSet, JointWork, State, clear_impulses, extrapolate_velocities, integrate_spins,
+    load_bodies, store_bodies,
 };
 use super::wide::{Row8, WIDTH, Wide};
 use crate::error::Result;
@@ -25,7 +26,7 @@ use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, step_length
 use crate::kernels::{Inertia, Momentum, Step};
 use crate::math::Vec3;
 use crate::plan::{Kernel, Pass};
-use crate::problem::{BodyRow, ConvergenceRow, MassRow, Params, StepProblem};
+use crate::problem::{ConvergenceRow, Params, StepProblem};
 
 /// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
 /// a step took 0.87 and 0.60 of the time on one thread if divided, 1.1 and 0.75 on two; of 64 worlds 1.05 and 0.9.
@@ -100,11 +101,6 @@ impl Cpu {
     }
 
     fn load(&mut self, problem: &StepProblem, crew: &Crew) {
-        let state = |(body, mass): (&BodyRow, &MassRow)| {
-            let (body, mass): (&[f32; 16], &[f32; 12]) = (bytemuck::cast_ref(body), bytemuck::cast_ref(mass));
-            let row = |from: &[f32]| Row8(std::array::from_fn(|i| from[i]));
-            State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) }
-        };
         self.parts.update(problem, self.undivided);
         let slots = &self.parts.slots;
         let len = self.parts.all_bodies().len() * WIDTH;
@@ -114,11 +110,8 @@ impl Cpu {
         self.free.resize(len, Row8::default());
         self.accelerations.clear();
         self.accelerations.resize(len, Row8::default());
-        for ((body, mass), &slot) in problem.bodies.iter().zip(&problem.masses).zip(slots) {
-            let [x, y, z] = mass.acceleration;
-            self.bodies[slot as usize] = state((body, mass));
-            self.accelerations[slot as usize] = Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        }
+        let (bodies, accelerations) = (Shared::new(&mut self.bodies), Shared::new(&mut self.accelerations));
+        crew.spread(0..problem.bodies.len(), &|range| load_bodies(problem, slots, range, &bodies, &accelerations));
         self.inertias.clear();
         self.inertias
             .extend(problem.inertias.iter().map(|row| (slots[row.body as usize] as usize, Inertia::load(row))));
@@ -132,22 +125,14 @@ impl Cpu {
     }
 
     fn store(&self, problem: &mut StepProblem, crew: &Crew) {
-        self.store_bodies(problem);
+        let (rows, slots) = (Shared::new(&mut problem.bodies), &self.parts.slots);
+        crew.spread(0..slots.len() - 1, &|range| store_bodies(&self.bodies, slots, range, &rows));
         self.groups.store(problem, &self.impulses, crew);
         for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
             row.linear = impulse.store();
         }
         problem.convergence = self.convergence;
         problem.momentum = self.momentum.store();
-    }
-
-    fn store_bodies(&self, problem: &mut StepProblem) {
-        for (row, &slot) in problem.bodies.iter_mut().zip(&self.parts.slots) {
-            let state = &self.bodies[slot as usize];
-            let all: &mut [f32; 16] = bytemuck::cast_mut(row);
-            all[..8].copy_from_slice(&state.velocity.0);
-            all[8..].copy_from_slice(&state.movement.0);
-        }
     }
 
     /// Runs neighboring passes that are [`stays_on_islands`], or one that is not.

@@ -18,7 +18,7 @@ use crate::kernels::{
 };
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{Params, Softness};
+use crate::problem::{BodyRow, Params, Softness, StepProblem};
 
 /// All that sweeps know of a body.
 #[derive(Clone, Copy, Default)]
@@ -136,6 +136,38 @@ fn run_avx2(work: &impl Work, groups: Range<usize>) {
 #[target_feature(enable = "avx512f")]
 fn run_avx512(work: &impl Work, groups: Range<usize>) {
     work.over::<super::wide::Avx512>(groups);
+}
+
+/// Takes over some bodies of a problem; no other task has the same.
+pub(super) fn load_bodies(
+    problem: &StepProblem,
+    slots: &[u32],
+    range: Range<usize>,
+    states: &Shared<State>,
+    accelerations: &Shared<Row8>,
+) {
+    let row = |from: &[f32]| Row8(std::array::from_fn(|i| from[i]));
+    for i in range {
+        let body: &[f32; 16] = bytemuck::cast_ref(&problem.bodies[i]);
+        let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[i]);
+        let state = State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) };
+        let [x, y, z] = problem.masses[i].acceleration;
+        // SAFETY: bodies have different slots.
+        unsafe {
+            states.write(slots[i] as usize, state);
+            accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        }
+    }
+}
+
+/// Gives some bodies back; no other task has the same.
+pub(super) fn store_bodies(states: &[State], slots: &[u32], range: Range<usize>, rows: &Shared<BodyRow>) {
+    for i in range {
+        let State { velocity, movement, .. } = &states[slots[i] as usize];
+        let both = [velocity.0, movement.0];
+        // SAFETY: tasks have different bodies.
+        unsafe { rows.write(i, bytemuck::cast(both)) };
+    }
 }
 
 /// A pass over bodies.
