@@ -41,7 +41,7 @@ pub(super) struct Crew {
     over: AtomicBool,
 }
 
-/// Groups of eight that a chunk has at least: about a microsecond of work, ten times what it costs to take it.
+/// Groups of sixteen that a chunk has at least: about a microsecond of work, ten times what it costs to take it.
 const CHUNK: usize = 4;
 /// Chunks a thread, so that one that is held up does not hold up all.
 const CHUNKS_PER_THREAD: usize = 4;

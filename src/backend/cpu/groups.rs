@@ -239,7 +239,7 @@ fn components(impulse: &[Wide; 4]) -> Vec3<Portable> {
 
 /// Writes one lane of some rows.
 #[inline(always)]
-fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
+pub(super) fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
     for (row, value) in rows.iter_mut().zip(values) {
         row.0[lane] = *value;
     }

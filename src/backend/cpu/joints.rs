@@ -1,9 +1,9 @@
 //! Joints in groups of sixteen lanes, color by color.
 
-use super::groups::{Bodies, NO_ROW};
+use super::groups::{Bodies, NO_ROW, set_lane};
 use super::parts::{Begins, Dealt, Parts};
 use super::wide::{WIDTH, Wide};
-use crate::problem::StepProblem;
+use crate::problem::{JointRow, StepProblem};
 
 /// Sixteen joints of one color.
 #[derive(Clone, Copy)]
@@ -44,21 +44,17 @@ impl JointGroups {
 impl JointGroup {
     /// Lanes without a joint hold one of nobody with nobody.
     fn of(problem: &StepProblem, slots: &[u32], rows: &[u32]) -> Self {
-        let nobody = problem.bodies.len();
+        let nobody = problem.bodies.len() as u32;
+        let nothing = JointRow { body_a: nobody, body_b: nobody, ..JointRow::default() };
         let mut group =
             Self { a: Bodies::default(), b: Bodies::default(), rows: [NO_ROW; WIDTH], joint: [Wide::default(); 9] };
+        group.rows[..rows.len()].copy_from_slice(rows);
         for lane in 0..WIDTH {
-            let Some(&row) = rows.get(lane) else {
-                group.a.set(lane, nobody, problem, slots);
-                group.b.set(lane, nobody, problem, slots);
-                continue;
-            };
-            let joint = &problem.joints[row as usize];
-            group.rows[lane] = row;
+            let joint = problem.joints.get(group.rows[lane] as usize).unwrap_or(&nothing);
             group.a.set(lane, joint.body_a as usize, problem, slots);
             group.b.set(lane, joint.body_b as usize, problem, slots);
-            let numbers = [joint.r_a, joint.r_b, joint.gap].into_iter().flatten();
-            group.joint.iter_mut().zip(numbers).for_each(|(wide, x)| wide.0[lane] = x);
+            let ([ax, ay, az], [bx, by, bz], [gx, gy, gz]) = (joint.r_a, joint.r_b, joint.gap);
+            set_lane(&mut group.joint, lane, &[ax, ay, az, bx, by, bz, gx, gy, gz]);
         }
         group
     }

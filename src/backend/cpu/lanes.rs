@@ -111,7 +111,7 @@ impl Cpu {
         self.accelerations.clear();
         self.accelerations.resize(len, Row8::default());
         let (bodies, accelerations) = (Shared::new(&mut self.bodies), Shared::new(&mut self.accelerations));
-        crew.spread(0..problem.bodies.len(), &|range| load_bodies(problem, slots, range, &bodies, &accelerations));
+        in_groups(problem.bodies.len(), crew, &|range| load_bodies(problem, slots, range, &bodies, &accelerations));
         self.inertias.clear();
         self.inertias
             .extend(problem.inertias.iter().map(|row| (slots[row.body as usize] as usize, Inertia::load(row))));
@@ -126,7 +126,7 @@ impl Cpu {
 
     fn store(&self, problem: &mut StepProblem, crew: &Crew) {
         let (rows, slots) = (Shared::new(&mut problem.bodies), &self.parts.slots);
-        crew.spread(0..slots.len() - 1, &|range| store_bodies(&self.bodies, slots, range, &rows));
+        in_groups(slots.len() - 1, crew, &|range| store_bodies(&self.bodies, slots, range, &rows));
         self.groups.store(problem, &self.impulses, crew);
         for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
             row.linear = impulse.store();
@@ -205,6 +205,11 @@ impl Cpu {
             *impulse = extrapolate(first, factor, *impulse, step);
         }
     }
+}
+
+/// Spreads work over bodies, sixteen of them as one.
+fn in_groups(bodies: usize, crew: &Crew, work: &(dyn Fn(Range<usize>) + Sync)) {
+    crew.spread(0..bodies.div_ceil(WIDTH), &|groups| work(WIDTH * groups.start..bodies.min(WIDTH * groups.end)));
 }
 
 /// Whether what a kernel does to an island depends on no other.
