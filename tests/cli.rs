@@ -273,18 +273,6 @@ fn adapters_are_listed_as_json_even_if_there_are_none() {
 }
 
 #[test]
-fn adapters_are_listed_with_what_they_can_do() {
-    if std::env::var("DRYSTONE_ADAPTER").is_ok_and(|name| name == "none") {
-        return eprintln!("not run: DRYSTONE_ADAPTER=none says that no GPU is wanted");
-    }
-    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
-    let output = command.args(["adapters", "--json"]).output().expect("the command starts");
-    let listed: Value = serde_json::from_str(&text(&output.stdout)).expect("JSON");
-    let first = array(&listed, "adapters").first().expect("an adapter, or DRYSTONE_ADAPTER=none to test without");
-    assert_eq!(keys(first), ["api", "buffer_limit", "driver", "exact", "hardware", "kind", "name"]);
-}
-
-#[test]
 fn a_comparison_of_the_reference_and_the_cpu_finds_no_difference() {
     let folder = Folder::new();
     let printed = folder.output("compare drop --steps 3 --backends reference,cpu");

@@ -13,17 +13,19 @@ use common::Open;
 
 const G: f64 = 9.81;
 
-on_every_backend! {
-    the_disc_slides_alike_in_every_direction_and_the_box_does_not,
-    what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc,
-    a_block_stops_sliding_and_spinning_in_the_same_frame,
-    a_ball_rolls_down_a_slope_at_five_sevenths_of_free_sliding,
-    a_ball_bounces_to_the_square_of_its_restitution,
-    a_perfectly_elastic_ball_keeps_its_energy,
-    the_last_ball_of_a_cradle_leaves_with_the_speed_of_the_first,
-    a_heavy_top_precesses_at_the_rate_of_its_spin,
-    every_interface_of_a_tower_carries_what_stands_on_it,
-    an_overhanging_stack_stands_up_to_the_harmonic_limit_and_no_further,
+tests! {
+    every_backend {
+        the_disc_slides_alike_in_every_direction_and_the_box_does_not,
+        what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc,
+        a_block_stops_sliding_and_spinning_in_the_same_frame,
+        a_ball_rolls_down_a_slope_at_five_sevenths_of_free_sliding,
+        a_ball_bounces_to_the_square_of_its_restitution,
+        a_perfectly_elastic_ball_keeps_its_energy,
+        the_last_ball_of_a_cradle_leaves_with_the_speed_of_the_first,
+        a_heavy_top_precesses_at_the_rate_of_its_spin,
+        every_interface_of_a_tower_carries_what_stands_on_it,
+        an_overhanging_stack_stands_up_to_the_harmonic_limit_and_no_further,
+    }
 }
 
 fn simulation(world: World, config: SolverConfig, open: Open) -> Simulation {
@@ -42,7 +44,7 @@ fn run(world: World, config: SolverConfig, seconds: f64, rate: u32, open: Open) 
 #[track_caller]
 fn holds(what: &str, measured: f64, expected: f64, tolerance: f64) {
     let off = ((measured - expected) / expected).abs();
-    println!("{what}: {measured:.6}, expected {expected:.6}, {off:.1e} off");
+    measured!("{what}: {measured:.6}, expected {expected:.6}, {off:.1e} off");
     assert!(off <= tolerance, "{what}: {measured} measured, {expected} expected: {off:.2e} off, not {tolerance:.0e}");
 }
 
@@ -94,7 +96,7 @@ fn what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc(open: 
         f64::from(end.x).hypot(f64::from(end.z))
     };
     let (slip, disc) = (creep(FrictionRule::Slip), creep(FrictionRule::Disc));
-    println!("creep in 10 s: slip {slip:.6} m, disc {disc:.6} m");
+    measured!("creep in 10 s: slip {slip:.6} m, disc {disc:.6} m");
     assert!(disc < 1e-3, "disc: {disc} m");
     assert!(slip > 2.0 * disc, "slip: {slip} m, disc: {disc} m");
 }
@@ -111,7 +113,7 @@ fn a_block_stops_sliding_and_spinning_in_the_same_frame(open: Open) {
         slides = if body.linear_velocity.length() > 0.01 { step } else { slides };
         spins = if body.angular_velocity.length() > 0.01 { step } else { spins };
     }
-    println!("slides for {slides} frames, spins for {spins}");
+    measured!("slides for {slides} frames, spins for {spins}");
     // A4: one frame of 1/60 s is four of these; the thresholds are passed a little apart.
     assert!(slides < 360 && (slides - spins).abs() <= 4, "slides {slides}, spins {spins}");
 }
@@ -173,7 +175,7 @@ fn a_perfectly_elastic_ball_keeps_its_energy(open: Open) {
         sum += (energy(&simulation.world) - exact).powi(2);
     }
     let rms = (sum / 20_000.0).sqrt() / exact;
-    println!("rms energy error {:.4} %", 100.0 * rms);
+    measured!("rms energy error {:.4} %", 100.0 * rms);
     assert!(rms < 6e-4, "rms energy error {rms}");
 }
 
@@ -190,7 +192,7 @@ fn the_last_ball_of_a_cradle_leaves_with_the_speed_of_the_first(open: Open) {
     // One impact after another: a step moves a ball by less than a gap.
     let end = run(world, config, 2.0, 9600, open);
     let speeds: Vec<f32> = end.bodies.iter().map(|b| b.linear_velocity.x).collect();
-    println!("{speeds:?}");
+    measured!("{speeds:?}");
     // A11: 1 % of the first ball's speed.
     assert!((speeds[4] - 2.0).abs() < 0.02 && speeds[..4].iter().all(|v| v.abs() < 0.02), "{speeds:?}");
 }

@@ -10,11 +10,13 @@ use common::Open;
 
 const G: f32 = 9.81;
 
-on_every_backend! {
-    a_kinematic_board_reaches_the_pose_that_it_is_sent_to,
-    a_rod_swings_with_the_period_of_a_physical_pendulum,
-    every_joint_of_a_hanging_chain_carries_what_hangs_on_it,
-    tied_bodies_pass_through_each_other_unless_asked_not_to,
+tests! {
+    every_backend {
+        a_kinematic_board_reaches_the_pose_that_it_is_sent_to,
+        a_rod_swings_with_the_period_of_a_physical_pendulum,
+        every_joint_of_a_hanging_chain_carries_what_hangs_on_it,
+        tied_bodies_pass_through_each_other_unless_asked_not_to,
+    }
 }
 
 fn simulate(world: World, config: SolverConfig, open: Open) -> Simulation {

@@ -1,9 +1,10 @@
 //! Every kernel against its Rust double, pass by pass, on random problems.
 
+#[macro_use]
 mod common;
 
 use common::difference::{differing, largest};
-use common::gpu::gpu;
+use common::gpu;
 use common::kernels::{accelerated_sweeps, color_by_color, every_kernel, has_patches, in_one_pass, sweep};
 use common::{random, tolerance};
 use drystone::config::FrictionRule;
@@ -11,6 +12,25 @@ use drystone::kernels::Rules;
 use drystone::plan::{Kernel, Pass};
 use drystone::problem::ConvergenceRow;
 use drystone::{Backend, Gpu, Reference, StepProblem};
+
+tests! {
+    exact_gpu {
+        every_kernel_gives_the_bits_of_its_double_in_exact_mode,
+        tiny_numbers_keep_their_bits_in_exact_mode,
+        sweeps_end_where_no_correction_is_above_the_tolerance,
+    }
+    any_gpu {
+        every_kernel_is_near_its_double_as_plain_wgsl,
+    }
+    no_gpu {
+        every_kernel_changes_a_random_problem,
+        must_fail::an_impulse_that_is_one_percent_off_is_found,
+        must_fail::two_swapped_colors_are_found,
+        must_fail::a_dropped_pass_is_found,
+        must_fail::a_pass_of_momentum_that_is_dropped_is_found,
+        must_fail::a_number_that_is_none_is_found,
+    }
+}
 
 const MEASURED: Rules = Rules {
     biased: true,
@@ -75,31 +95,23 @@ fn run_all(gpu: &mut Gpu, problems: &[StepProblem; 2], mut compare: impl FnMut(&
     }
 }
 
-/// Fails unless all kernels agree: to the last bit, or within the tolerance where the adapter has no exact mode.
+/// Fails unless all kernels agree to the last bit.
 fn assert_same(gpu: &mut Gpu, problems: &[StepProblem; 2], name: &str) {
-    let exact = gpu.is_exact();
     run_all(gpu, problems, |ours, theirs, what| {
-        if exact {
-            let count = differing(ours, theirs);
-            assert_eq!(count, 0, "{name}, {what}: {count} numbers differ");
-        } else {
-            let apart = largest(ours, theirs);
-            assert!(apart <= tolerance::PLAIN_PASS, "{name}, {what}: {apart:e} apart");
-        }
+        let count = differing(ours, theirs);
+        assert_eq!(count, 0, "{name}, {what}: {count} numbers differ");
     });
 }
 
-#[test]
 fn every_kernel_gives_the_bits_of_its_double_in_exact_mode() {
-    let Some(mut gpu) = gpu(true) else { return };
+    let mut gpu = gpu::exact();
     for seed in SEEDS {
         assert_same(&mut gpu, &problems(seed), &format!("seed {seed}"));
     }
 }
 
-#[test]
 fn tiny_numbers_keep_their_bits_in_exact_mode() {
-    let Some(mut gpu) = gpu(true) else { return };
+    let mut gpu = gpu::exact();
     // Squares that are subnormal, and numbers that are.
     for scale in [1e-20, 1e-22, 1e-40] {
         let tiny = problems(0).map(|problem| random::scaled(problem, scale));
@@ -107,9 +119,8 @@ fn tiny_numbers_keep_their_bits_in_exact_mode() {
     }
 }
 
-#[test]
 fn every_kernel_is_near_its_double_as_plain_wgsl() {
-    let Some(mut gpu) = gpu(false) else { return };
+    let mut gpu = gpu::plain();
     let mut worst = (0.0, String::new());
     for seed in SEEDS {
         run_all(&mut gpu, &problems(seed), |ours, theirs, what| {
@@ -119,13 +130,12 @@ fn every_kernel_is_near_its_double_as_plain_wgsl() {
             }
         });
     }
-    println!("largest difference {:e}: {}", worst.0, worst.1);
+    measured!("largest difference {:e}: {}", worst.0, worst.1);
     assert!(worst.0 <= tolerance::PLAIN_PASS, "{:e}: {}", worst.0, worst.1);
 }
 
-#[test]
 fn sweeps_end_where_no_correction_is_above_the_tolerance() {
-    let Some(mut gpu) = gpu(true) else { return };
+    let mut gpu = gpu::exact();
     for (tolerance, sweeps) in [(1e9, 1), (0.0, 3)] {
         for kernel in [Kernel::SolveJoints(MEASURED), Kernel::SolveContacts(MEASURED)] {
             let mut problem = random::problem(0, false);
@@ -145,14 +155,11 @@ fn sweeps_end_where_no_correction_is_above_the_tolerance() {
                 (&ours.bodies, &ours.impulses, &ours.joint_impulses),
                 (&done.bodies, &done.impulses, &done.joint_impulses)
             );
-            if gpu.is_exact() {
-                assert_eq!(differing(&ours, &theirs), 0, "{kernel}");
-            }
+            assert_eq!(differing(&ours, &theirs), 0, "{kernel}");
         }
     }
 }
 
-#[test]
 fn every_kernel_changes_a_random_problem() {
     let problems = problems(0);
     for kernel in every_kernel() {
@@ -174,8 +181,7 @@ mod must_fail {
         assert!(largest(good, bad) > tolerance::PLAIN_PASS, "{:e}", largest(good, bad));
     }
 
-    #[test]
-    fn an_impulse_that_is_one_percent_off_is_found() {
+    pub fn an_impulse_that_is_one_percent_off_is_found() {
         let problem = random::problem(0, false);
         let good = by_the_reference(&problem, &in_one_pass(sweep(), &problem));
         let mut bad = good.clone();
@@ -184,8 +190,7 @@ mod must_fail {
         assert_found(&good, &bad);
     }
 
-    #[test]
-    fn two_swapped_colors_are_found() {
+    pub fn two_swapped_colors_are_found() {
         let problem = random::problem(0, false);
         let mut passes = color_by_color(sweep(), &problem);
         let good = by_the_reference(&problem, &passes);
@@ -193,8 +198,7 @@ mod must_fail {
         assert_found(&good, &by_the_reference(&problem, &passes));
     }
 
-    #[test]
-    fn a_dropped_pass_is_found() {
+    pub fn a_dropped_pass_is_found() {
         let problem = random::problem(0, false);
         let passes = color_by_color(sweep(), &problem);
         let good = by_the_reference(&problem, &passes);
@@ -205,8 +209,7 @@ mod must_fail {
         }
     }
 
-    #[test]
-    fn a_pass_of_momentum_that_is_dropped_is_found() {
+    pub fn a_pass_of_momentum_that_is_dropped_is_found() {
         let problem = random::problem(0, false);
         let passes = accelerated_sweeps(&problem, false);
         let good = by_the_reference(&problem, &passes);
@@ -220,8 +223,7 @@ mod must_fail {
         }
     }
 
-    #[test]
-    fn a_number_that_is_none_is_found() {
+    pub fn a_number_that_is_none_is_found() {
         let good = random::problem(0, false);
         let mut bad = good.clone();
         bad.bodies[0].v[0] = f32::NAN;

@@ -1,15 +1,31 @@
 //! The maze game, played by scripts.
 
+#[macro_use]
 mod common;
 
 use std::path::Path;
 use std::process::Command;
 
-use common::gpu::gpu;
+use common::gpu;
 use drystone::glam::{Quat, Vec3};
 use drystone::maze::{BOARDS, Game, Map, Outcome, Played, RADIUS, Script, pilot, play};
 use drystone::{Backend, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
 use serde_json::Value;
+
+tests! {
+    exact_gpu {
+        the_gpu_plays_the_same_game_to_the_last_bit,
+    }
+    no_gpu {
+        every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping,
+        a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing,
+        lanes_play_the_same_game_to_the_last_bit,
+        the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes,
+        the_command_prints_outcome_and_track,
+        the_pilot_writes_a_script_that_wins,
+        bad_maps_and_scripts_are_refused_in_one_line_with_line_and_column,
+    }
+}
 
 fn reference() -> Box<dyn Backend> {
     Box::new(Reference::<f32>::new())
@@ -29,7 +45,6 @@ fn played(board: &str, script: &Script, backend: Box<dyn Backend>) -> Played {
     play(game(Map::find(board).expect("a board"), backend), script, |_| ()).expect("a game")
 }
 
-#[test]
 fn every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping() {
     for (board, _) in BOARDS {
         let way = pilot(game(Map::find(board).expect("a board"), reference())).expect("a way");
@@ -44,7 +59,6 @@ fn every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping() {
     }
 }
 
-#[test]
 fn a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing() {
     assert_eq!(played("easy", &script("lose"), reference()).outcome, Outcome::Hole);
     let nothing = Script::parse("s", "1 0 0\n").expect("a script");
@@ -53,21 +67,15 @@ fn a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing() {
     assert_eq!((played.outcome, played.steps), (Outcome::Time, 120));
 }
 
-#[test]
 fn lanes_play_the_same_game_to_the_last_bit() {
     let (a, b) = (played("easy", &script("easy"), reference()), played("easy", &script("easy"), Box::new(Cpu::new())));
     assert_eq!((a.steps, a.track), (b.steps, b.track));
 }
 
-#[test]
-fn the_gpu_plays_the_same_game() {
-    let Some(gpu) = gpu(true) else { return };
-    let exact = gpu.is_exact();
-    let (a, b) = (played("easy", &script("easy"), reference()), played("easy", &script("easy"), Box::new(gpu)));
-    assert_eq!(a.outcome, b.outcome);
-    if exact {
-        assert_eq!((a.steps, a.track), (b.steps, b.track));
-    }
+fn the_gpu_plays_the_same_game_to_the_last_bit() {
+    let played = |backend| played("easy", &script("easy"), backend);
+    let (a, b) = (played(reference()), played(Box::new(gpu::exact())));
+    assert_eq!((a.outcome, a.steps, a.track), (b.outcome, b.steps, b.track));
 }
 
 /// Rolls the ball over a floor of 40 x 40 squares of 0.06 m that falls by 2 degrees one way and 1 degree the other; the largest hop
@@ -93,7 +101,6 @@ fn roll_over(floor: Body) -> (f32, f32) {
     (hop, slip)
 }
 
-#[test]
 fn the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes() {
     const SIDE: f32 = 0.06;
     let corner = |k: u32| Vec3::new((k % 41) as f32 * SIDE - 20.0 * SIDE, 0.0, (k / 41) as f32 * SIDE - 20.0 * SIDE);
@@ -124,7 +131,6 @@ fn command(arguments: &str) -> Result<String, String> {
     if output.status.success() { Ok(text(output.stdout)) } else { Err(text(output.stderr)) }
 }
 
-#[test]
 fn the_command_prints_outcome_and_track() {
     let printed = command("play maze easy --script ROOT/tests/maze/easy.txt --json").expect("a game");
     let game: Value = serde_json::from_str(&printed).expect("JSON");
@@ -133,7 +139,6 @@ fn the_command_prints_outcome_and_track() {
     assert!(game["slip"]["rms"].as_f64() < Some(1e-3));
 }
 
-#[test]
 fn the_pilot_writes_a_script_that_wins() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("way.txt").display().to_string();
@@ -142,7 +147,6 @@ fn the_pilot_writes_a_script_that_wins() {
     assert!(printed.contains("won"), "{printed}");
 }
 
-#[test]
 fn bad_maps_and_scripts_are_refused_in_one_line_with_line_and_column() {
     for (arguments, parts) in [
         ("play maze bad.txt --script script.txt", ["bad.txt", "line 2, column 2"]),

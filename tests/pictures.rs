@@ -1,14 +1,29 @@
 //! Pictures without a display: what is in them, what they are compared with, and how bad requests are refused.
 
+#[macro_use]
 mod common;
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::gpu::gpu;
 use drystone::glam::Vec3;
 use drystone::view::{Canvas, ColorBy, Film, Look, Picture};
 use drystone::{Scene, Simulation, SolverConfig};
+
+tests! {
+    any_gpu {
+        the_scene_with_every_shape_looks_as_it_did,
+        a_picture_in_which_one_body_is_elsewhere_is_rejected,
+        the_same_scene_gives_the_same_picture_to_the_last_bit,
+        what_a_body_is_colored_by_shows,
+        a_body_casts_a_shadow_on_what_is_below,
+        bad_requests_are_refused_in_one_line_before_the_run,
+        a_recorded_motion_gives_the_picture_of_the_run,
+    }
+    no_gpu {
+        without_an_adapter_the_driver_package_is_named,
+    }
+}
 
 const SIZE: (u32, u32) = (192, 128);
 /// As `drystone render` looks unless told.
@@ -19,9 +34,8 @@ const CHANNEL: u8 = 24;
 /// Most pixels that may differ, of a hundred: 50 of 24,576. One software adapter gives 0 every time.
 const PERCENT: f64 = 0.2;
 
-/// `scene` after `steps`, drawn; none where no adapter is wanted.
-fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Option<Picture> {
-    gpu(false)?;
+/// `scene` after `steps`, drawn.
+fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Picture {
     let reference = Box::new(drystone::Reference::<f32>::new());
     let mut simulation =
         Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect("a simulation");
@@ -30,14 +44,14 @@ fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Option<Picture> {
     }
     let mut film = Film::new(scene.clone(), color);
     film.add(0.0, &mut simulation);
-    let mut canvas = Canvas::new(&scene.world, SIZE).expect("an adapter");
+    let mut canvas = Canvas::new(&scene.world, SIZE).unwrap_or_else(|e| panic!("{e}"));
     let mut pictures = Vec::new();
     let keep = |p: &Picture| {
         pictures.push(p.clone());
         Ok(())
     };
     film.draw(&mut canvas, &LOOK, keep).expect("a picture");
-    pictures.pop()
+    pictures.pop().expect("one picture")
 }
 
 /// Pixels that differ, of a hundred.
@@ -62,39 +76,32 @@ fn scene(name: &str, parameters: &[&str]) -> Scene {
 }
 
 /// `drystone render drop --steps 60 --size 192x128 --out tests/pictures/drop.png` makes the picture anew.
-#[test]
 fn the_scene_with_every_shape_looks_as_it_did() {
-    let Some(drawn) = picture(&scene("drop", &[]), 60, ColorBy::Material) else { return };
+    let drawn = picture(&scene("drop", &[]), 60, ColorBy::Material);
     let kept = read_png(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures/drop.png"));
     let percent = difference(&drawn, &kept);
     assert!(percent <= PERCENT, "{percent:.2} % of the pixels differ");
 }
 
-#[test]
 fn a_picture_in_which_one_body_is_elsewhere_is_rejected() {
     let before = scene("drop", &[]);
     let mut after = before.clone();
     let moved = after.world.bodies.iter().position(|b| b.name == "cuboid").expect("a cuboid");
     after.world.bodies[moved].position += Vec3::new(0.0, 0.0, 0.5);
-    let (Some(a), Some(b)) = (picture(&before, 0, ColorBy::Material), picture(&after, 0, ColorBy::Material)) else {
-        return;
-    };
+    let (a, b) = (picture(&before, 0, ColorBy::Material), picture(&after, 0, ColorBy::Material));
     assert!(difference(&a, &b) > PERCENT, "{} %", difference(&a, &b));
 }
 
-#[test]
 fn the_same_scene_gives_the_same_picture_to_the_last_bit() {
     let pile = scene("pile", &["n=64"]);
     let draw = || picture(&pile, 30, ColorBy::Batch);
-    let (Some(a), Some(b)) = (draw(), draw()) else { return };
-    assert_eq!(a, b);
+    assert_eq!(draw(), draw());
 }
 
-#[test]
 fn what_a_body_is_colored_by_shows() {
     let tower = scene("tower", &[]);
     let all = [ColorBy::Material, ColorBy::Batch, ColorBy::Speed, ColorBy::Impulse];
-    let drawn: Vec<_> = all.into_iter().filter_map(|color| picture(&tower, 20, color)).collect();
+    let drawn: Vec<_> = all.into_iter().map(|color| picture(&tower, 20, color)).collect();
     for (i, a) in drawn.iter().enumerate() {
         for b in &drawn[..i] {
             assert!(difference(a, b) > PERCENT);
@@ -102,18 +109,17 @@ fn what_a_body_is_colored_by_shows() {
     }
 }
 
-#[test]
 fn a_body_casts_a_shadow_on_what_is_below() {
     // Grays darker than both squares of the ground.
     let shaded = |scene: &Scene| {
-        let drawn = picture(scene, 0, ColorBy::Material)?;
+        let drawn = picture(scene, 0, ColorBy::Material);
         let gray = |p: &&[u8]| p[0].abs_diff(p[2]) < 12 && p[0] < 150;
-        Some(drawn.rgba.chunks_exact(4).filter(gray).count())
+        drawn.rgba.chunks_exact(4).filter(gray).count()
     };
     let ball = scene("sphere-plane", &["height=1"]);
     let mut far_up = ball.clone();
     far_up.world.bodies.last_mut().expect("a ball").position.y = 1e3;
-    let (Some(near), Some(far)) = (shaded(&ball), shaded(&far_up)) else { return };
+    let (near, far) = (shaded(&ball), shaded(&far_up));
     assert!(near > 100 && far == 0, "{near} pixels are in shadow, {far} below a ball that is far up");
 }
 
@@ -143,11 +149,7 @@ fn assert_refused(arguments: &str, adapter: Option<&str>, code: i32, parts: &[&s
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 3, "{arguments} left something behind");
 }
 
-#[test]
 fn bad_requests_are_refused_in_one_line_before_the_run() {
-    if gpu(false).is_none() {
-        return;
-    }
     let none = None;
     assert_refused("render pile -p n=4000000 --out x.bmp", none, 2, &["x.bmp", ".png", ".gif"]);
     assert_refused("render pile -p n=8 --out nowhere/x.png", none, 2, &["nowhere/x.png"]);
@@ -159,16 +161,11 @@ fn bad_requests_are_refused_in_one_line_before_the_run() {
     assert_refused("render tower --out x.png --size 16384x16384", none, 2, &["16384x16384"]);
 }
 
-#[test]
 fn without_an_adapter_the_driver_package_is_named() {
     assert_refused("render tower --out x.png", Some("none"), 3, &["no adapter", "mesa-vulkan-drivers"]);
 }
 
-#[test]
 fn a_recorded_motion_gives_the_picture_of_the_run() {
-    if gpu(false).is_none() {
-        return;
-    }
     let folder = tempfile::tempdir().expect("a folder");
     for arguments in [
         "run tower -p offset=0.3 --steps 40 --every 10 --out motion.csv",

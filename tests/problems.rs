@@ -1,14 +1,15 @@
 //! Contact problems of others: the solver takes as many sweeps as an independent program with the same methods and order.
 //!
-//! Runs where the environment variable DRYSTONE_PROBLEMS names a folder with `NAME.contacts` and a table `anchors.csv`: columns
-//! `problem`, `solver` (`pgs` or `accel`) and `it_1e-1` to `it_1e-3`, sweeps until e_vel is less than that.
+//! Ignored unless the environment variable DRYSTONE_PROBLEMS names a folder with `NAME.contacts` and a table `anchors.csv`:
+//! columns `problem`, `solver` (`pgs` or `accel`) and `it_1e-1` to `it_1e-3`, sweeps until e_vel is less than that.
 
+#[macro_use]
 mod common;
 
 use std::path::{Path, PathBuf};
 
 use common::contacts::{curve, sweeps_to};
-use common::gpu::gpu;
+use common::gpu;
 use drystone::config::Method;
 use drystone::residuals::Measure;
 use drystone::solver::{Order, Solver};
@@ -20,6 +21,20 @@ const ERRORS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 /// Sweeps after which counting ends.
 const MOST: u32 = 60_000;
 
+tests! {
+    given_problems {
+        contact_by_contact_sweeps_are_those_of_the_anchors,
+        momentum_that_ends_with_a_step_back_saves_sweeps,
+        manifold_by_manifold_sweeps_are_no_more,
+        single_precision_leaves_the_errors_of_double_precision,
+        acceleration_pays,
+    }
+    given_problems_and_any_gpu {
+        contact_by_contact_sweeps_of_the_gpu_are_those_of_the_anchors,
+        single_precision_of_the_gpu_leaves_the_errors_of_double_precision,
+    }
+}
+
 /// One line of the table.
 struct Anchor {
     name: String,
@@ -27,12 +42,8 @@ struct Anchor {
     sweeps: [u32; 3],
 }
 
-fn folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("DRYSTONE_PROBLEMS").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("not run: DRYSTONE_PROBLEMS names no folder");
-    }
-    folder
+fn folder() -> PathBuf {
+    std::env::var_os("DRYSTONE_PROBLEMS").expect("DRYSTONE_PROBLEMS names a folder").into()
 }
 
 fn anchors(folder: &Path) -> Vec<(Anchor, ContactProblem)> {
@@ -59,10 +70,12 @@ fn problems(folder: &Path) -> Vec<(String, ContactProblem)> {
     plain.map(|(anchor, problem)| (anchor.name, problem)).collect()
 }
 
-/// f64, the lanes, and plain WGSL where a GPU is wanted.
-fn backends() -> Vec<Option<Box<dyn Backend>>> {
-    let gpu = gpu(false).map(|gpu| Some(Box::new(gpu) as Box<dyn Backend>));
-    [None, Some(Box::new(Cpu::new()) as Box<dyn Backend>)].into_iter().chain(gpu).collect()
+fn lanes() -> Option<Box<dyn Backend>> {
+    Some(Box::new(Cpu::new()))
+}
+
+fn plain_wgsl() -> Option<Box<dyn Backend>> {
+    Some(Box::new(gpu::plain()))
 }
 
 /// Sweeps over those of the anchor, for each error.
@@ -70,40 +83,40 @@ fn ratios((anchor, problem): &(Anchor, ContactProblem), order: Order, backend: O
     let name = backend.as_ref().map_or("f64", |b| b.name());
     let sweeps = sweeps_to(problem, (anchor.method, order), backend, &ERRORS, MOST);
     let method = format!("{:?}", anchor.method);
-    println!("{:<18} {method:<12} {order:<10?} {name:<4} {sweeps:?}, anchor {:?}", anchor.name, anchor.sweeps);
+    measured!("{:<18} {method:<12} {order:<10?} {name:<4} {sweeps:?}, anchor {:?}", anchor.name, anchor.sweeps);
     [0, 1, 2].map(|i| sweeps[i].map_or(f64::INFINITY, f64::from) / f64::from(anchor.sweeps[i]))
 }
 
-#[test]
-fn contact_by_contact_sweeps_are_those_of_the_anchors() {
-    let Some(folder) = folder() else { return };
-    for line in anchors(&folder).into_iter().filter(|line| line.0.method == Method::Plain) {
-        for backend in backends() {
-            let rounded = backend.is_some();
-            let ratios = ratios(&line, Order::Contacts, backend);
-            let allowed = if rounded { 0.1 } else { 0.02 };
-            assert!(ratios.iter().all(|r| (r - 1.0).abs() <= allowed), "{}: {ratios:?} of the anchor", line.0.name);
-        }
+/// Fails unless sweeps are those of the anchors, within the share of them that is `allowed`.
+fn assert_anchored(backend: fn() -> Option<Box<dyn Backend>>, allowed: f64) {
+    for line in anchors(&folder()).into_iter().filter(|line| line.0.method == Method::Plain) {
+        let ratios = ratios(&line, Order::Contacts, backend());
+        assert!(ratios.iter().all(|r| (r - 1.0).abs() <= allowed), "{}: {ratios:?} of the anchor", line.0.name);
     }
 }
 
-#[test]
+fn contact_by_contact_sweeps_are_those_of_the_anchors() {
+    assert_anchored(|| None, 0.02);
+    assert_anchored(lanes, 0.1);
+}
+
+fn contact_by_contact_sweeps_of_the_gpu_are_those_of_the_anchors() {
+    assert_anchored(plain_wgsl, 0.1);
+}
+
 fn momentum_that_ends_with_a_step_back_saves_sweeps() {
     // That of the anchors ends with every step that is longer than the one before.
-    let Some(folder) = folder() else { return };
-    let lines = anchors(&folder).into_iter().filter(|line| line.0.method == Method::Accelerated);
+    let lines = anchors(&folder()).into_iter().filter(|line| line.0.method == Method::Accelerated);
     let all: Vec<_> = lines.flat_map(|line| ratios(&line, Order::Contacts, None)).collect();
-    println!("ratios {all:.2?}, median {:.3}", median(&all));
+    measured!("ratios {all:.2?}, median {:.3}", median(&all));
     assert!(median(&all) < 1.0 && all.iter().all(|&r| r <= 1.15), "{all:?}");
 }
 
-#[test]
 fn manifold_by_manifold_sweeps_are_no_more() {
-    let Some(folder) = folder() else { return };
     for method in [Method::Plain, Method::Accelerated] {
-        let lines = anchors(&folder).into_iter().filter(|(anchor, _)| anchor.method == method);
+        let lines = anchors(&folder()).into_iter().filter(|(anchor, _)| anchor.method == method);
         let all: Vec<_> = lines.flat_map(|line| ratios(&line, Order::Manifolds, None)).collect();
-        println!("{method:?}: ratios {all:.2?}, median {:.3}", median(&all));
+        measured!("{method:?}: ratios {all:.2?}, median {:.3}", median(&all));
         assert!(median(&all) <= 1.0, "the median of {all:?} is more than 1");
         assert!(all.iter().all(|&r| r <= 1.5), "the largest of {all:?} is more than 1.5");
     }
@@ -122,34 +135,35 @@ fn by_rounding(problem: &ContactProblem, order: Order, sweeps: u32) -> f64 {
     (0..sweeps).map(after_one).fold(0.0, f64::max)
 }
 
-#[test]
-fn single_precision_leaves_the_errors_of_double_precision() {
-    let Some(folder) = folder() else { return };
-    for (name, problem) in problems(&folder) {
+fn assert_as_double_precision(backend: fn() -> Option<Box<dyn Backend>>) {
+    for (name, problem) in problems(&folder()) {
         for order in [Order::Contacts, Order::Manifolds] {
             // A tonne on a kilogram: no impulses in f32 are nearer than those of f64 rounded, 1.8e-5.
             let allowed = if name == "tower2_1_1000" { by_rounding(&problem, order, 500) } else { 1e-5 };
-            let mut curves = backends().into_iter().map(|b| curve(&problem, (Method::Plain, order), b, 500));
-            let exact = curves.next().expect("f64 is the first");
-            for rounded in curves {
-                let apart = exact.iter().zip(&rounded).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                println!("{name:<18} {order:<10?} {apart:.1e} apart, {allowed:.1e} allowed");
-                assert!(apart <= allowed && rounded.iter().all(|e| e.is_finite()), "{name}, {order:?}: {apart:e}");
-            }
+            let [exact, rounded] = [None, backend()].map(|b| curve(&problem, (Method::Plain, order), b, 500));
+            let apart = exact.iter().zip(&rounded).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            measured!("{name:<18} {order:<10?} {apart:.1e} apart, {allowed:.1e} allowed");
+            assert!(apart <= allowed && rounded.iter().all(|e| e.is_finite()), "{name}, {order:?}: {apart:e}");
         }
     }
 }
 
-#[test]
+fn single_precision_leaves_the_errors_of_double_precision() {
+    assert_as_double_precision(lanes);
+}
+
+fn single_precision_of_the_gpu_leaves_the_errors_of_double_precision() {
+    assert_as_double_precision(plain_wgsl);
+}
+
 fn acceleration_pays() {
-    let Some(folder) = folder() else { return };
     let (mut fewer, mut lower) = (Vec::new(), Vec::new());
-    for (name, problem) in problems(&folder) {
+    for (name, problem) in problems(&folder()) {
         let sweeps = |method| sweeps_to(&problem, (method, Order::Manifolds), None, &ERRORS, MOST);
         let (plain, accelerated) = (sweeps(Method::Plain), sweeps(Method::Accelerated));
         let after_32 = |method| curve(&problem, (method, Order::Manifolds), None, 32)[31];
         let gain = after_32(Method::Plain) / after_32(Method::Accelerated);
-        println!("{name:<18} {plain:?} and {accelerated:?} sweeps; after 32 {gain:.1} times lower");
+        measured!("{name:<18} {plain:?} and {accelerated:?} sweeps; after 32 {gain:.1} times lower");
         let counts =
             |sweeps: &[Option<u32>]| -> Vec<f64> { sweeps.iter().map(|s| s.expect("reached").into()).collect() };
         let (plain, accelerated) = (counts(&plain), counts(&accelerated));
@@ -157,7 +171,7 @@ fn acceleration_pays() {
         fewer.push(plain[2] / accelerated[2]);
         lower.push(gain);
     }
-    println!("median {:.2} times fewer to 1e-3, {:.1} times lower after 32", median(&fewer), median(&lower));
+    measured!("median {:.2} times fewer to 1e-3, {:.1} times lower after 32", median(&fewer), median(&lower));
     assert!(median(&fewer) >= 2.4, "{fewer:?}");
     assert!(median(&lower) >= 5.0, "{lower:?}");
 }

@@ -1,15 +1,31 @@
 //! Rows that stay on a device from step to step: the reference's to the last bit when somebody asks, and hardly anything
 //! travels.
 
+#[macro_use]
 mod common;
 
-use common::gpu::gpu;
+use common::gpu;
 use drystone::compare::Difference;
 use drystone::plan::Pass;
 use drystone::problem::carry::Carry;
 use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem};
+
+tests! {
+    exact_gpu {
+        what_is_asked_for_has_the_bits_of_the_reference,
+        what_somebody_changes_between_two_steps_reaches_the_device,
+        islands_fall_asleep_and_wake_with_their_impulses,
+        a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
+        two_rows_in_each_others_places_are_found,
+    }
+    any_gpu {
+        the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart,
+        a_small_world_is_one_dispatch_after_those_that_carry_its_rows,
+        a_falling_pile_sends_what_was_computed_and_where_the_rest_was,
+    }
+}
 
 fn simulation(scene: &Scene, config: &SolverConfig, backend: Box<dyn Backend>) -> Simulation {
     Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings")
@@ -30,10 +46,10 @@ fn rows(problem: &StepProblem) -> [&[u8]; 5] {
     ]
 }
 
-/// The reference and a GPU in exact mode on the same scene; none where there is no such GPU.
-fn both(scene: &Scene, config: &SolverConfig) -> Option<[Simulation; 2]> {
-    let gpu = gpu(true).filter(drystone::Gpu::is_exact)?;
-    Some([simulation(scene, config, Box::new(Reference::<f32>::new())), simulation(scene, config, Box::new(gpu))])
+/// The reference and a GPU in exact mode on the same scene.
+fn both(scene: &Scene, config: &SolverConfig) -> [Simulation; 2] {
+    [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, Box::new(gpu::exact())]
+        .map(|b| simulation(scene, config, b))
 }
 
 fn assert_together([ours, theirs]: &[Simulation; 2], what: &str) {
@@ -48,10 +64,9 @@ fn assert_same(both: &mut [Simulation; 2], what: &str) {
     assert_eq!(rows(ours), rows(theirs), "{what}");
 }
 
-#[test]
 fn what_is_asked_for_has_the_bits_of_the_reference() {
     let scene = pile(100);
-    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    let mut both = both(&scene, &SolverConfig::default());
     let (mut computed, mut reused) = (0, 0);
     for step in 1..=120 {
         let stats = both.each_mut().map(|s| s.step(scene.dt).expect("a step"));
@@ -78,10 +93,9 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
     assert!(computed > 100 && reused > 1000, "{computed} computed, {reused} reused: hardly a test");
 }
 
-#[test]
 fn what_somebody_changes_between_two_steps_reaches_the_device() {
     let scene = pile(60);
-    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    let mut both = both(&scene, &SolverConfig::default());
     for step in 1..=100 {
         for simulation in &mut both {
             match step {
@@ -103,13 +117,12 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
     }
 }
 
-#[test]
 fn islands_fall_asleep_and_wake_with_their_impulses() {
     let mut scene = pile(60);
     // Touches nothing, so that there is something to do while all others sleep.
     scene.world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1e3, 1e3, 0.0));
     let config = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
-    let Some(mut both) = both(&scene, &config) else { return };
+    let mut both = both(&scene, &config);
     let mut fewest = [usize::MAX; 2];
     for step in 1..=420 {
         for simulation in &mut both {
@@ -122,15 +135,14 @@ fn islands_fall_asleep_and_wake_with_their_impulses() {
         }
         assert_together(&both, &format!("step {step}"));
     }
-    println!("{fewest:?} manifolds at least, before and after something is pushed");
+    measured!("{fewest:?} manifolds at least, before and after something is pushed");
     assert!(fewest[0] < fewest[1], "nothing slept, or nothing woke: {fewest:?}");
     assert_same(&mut both, "at the end");
 }
 
-#[test]
 fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
     let scene = pile(60);
-    let Some(mut both) = both(&scene, &SolverConfig::default()) else { return };
+    let mut both = both(&scene, &SolverConfig::default());
     for step in 1..=60 {
         if step == 40 {
             both[1].set_backend(Box::new(Reference::<f32>::new()));
@@ -168,12 +180,10 @@ impl Backend for Confused {
     }
 }
 
-#[test]
 fn two_rows_in_each_others_places_are_found() {
     let scene = pile(60);
-    let Some([mut ours, _]) = both(&scene, &SolverConfig::default()) else { return };
-    let Some(gpu) = gpu(true) else { return };
-    let mut theirs = simulation(&scene, &SolverConfig::default(), Box::new(Confused(gpu)));
+    let [mut ours, _] = both(&scene, &SolverConfig::default());
+    let mut theirs = simulation(&scene, &SolverConfig::default(), Box::new(Confused(gpu::exact())));
     for _ in 0..80 {
         ours.step(scene.dt).expect("a step");
         theirs.step(scene.dt).expect("a step");
@@ -182,10 +192,10 @@ fn two_rows_in_each_others_places_are_found() {
 }
 
 /// What each of the last steps of a scene moved to the device and back, and the simulation.
-fn traffic_of(scene: &Scene, steps: u32, last: u32) -> Option<(Vec<Traffic>, Simulation)> {
-    let mut simulation = simulation(scene, &SolverConfig::default(), Box::new(gpu(false)?));
+fn traffic_of(scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation) {
+    let mut simulation = simulation(scene, &SolverConfig::default(), Box::new(gpu::plain()));
     let mut all: Vec<_> = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
-    Some((all.split_off((steps - last) as usize), simulation))
+    (all.split_off((steps - last) as usize), simulation)
 }
 
 /// Bytes of all rows of a problem.
@@ -198,39 +208,36 @@ fn moved(problem: &StepProblem) -> u64 {
     (size_of_val(&problem.bodies[..]) + size_of::<ConvergenceRow>() + size_of::<MomentumRow>()) as u64
 }
 
-#[test]
 fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() {
     let scene = pile(200);
-    let Some((first, mut simulation)) = traffic_of(&scene, 1, 1) else { return };
+    let (first, mut simulation) = traffic_of(&scene, 1, 1);
     assert!(first[0].up as usize >= all_rows(simulation.problem()), "{first:?}");
-    let Some((settled, mut simulation)) = traffic_of(&scene, 400, 10) else { return };
+    let (settled, mut simulation) = traffic_of(&scene, 400, 10);
     let problem = simulation.problem();
     let separations = size_of_val(&problem.points[..]) / size_of::<PointRow>() * size_of::<f32>();
     let least = settled.iter().map(|t| t.up).min().expect("ten steps") as usize;
     let (all, contacts) = (all_rows(problem), problem.contacts.len());
-    println!("{contacts} manifolds: {least} B up of {all} B of rows, {separations} B of them separations");
+    measured!("{contacts} manifolds: {least} B up of {all} B of rows, {separations} B of them separations");
     // Nothing but separations and the words of the carry itself.
     assert!((separations..separations + 512).contains(&least), "{settled:?}");
     assert!(settled.iter().all(|t| t.down == moved(problem)), "{settled:?}");
     assert!(least * 20 < all);
 }
 
-#[test]
 fn a_small_world_is_one_dispatch_after_those_that_carry_its_rows() {
     let scene = Scene::find("tower", &[]).expect("a scene of the catalogue");
-    let Some((settled, simulation)) = traffic_of(&scene, 100, 1) else { return };
+    let (settled, simulation) = traffic_of(&scene, 100, 1);
     assert!(simulation.plan().passes.len() > 20);
     // begin_bodies and begin_contacts; carry_contacts where a manifold was computed.
     assert!((3..=4).contains(&settled[0].dispatches), "{settled:?}");
-    let Some((settled, simulation)) = traffic_of(&pile(400), 2, 1) else { return };
+    let (settled, simulation) = traffic_of(&pile(400), 2, 1);
     assert!(settled[0].dispatches > simulation.plan().passes.len());
 }
 
-#[test]
 fn a_falling_pile_sends_what_was_computed_and_where_the_rest_was() {
     let scene = pile(200);
     let mut steps = 0;
-    let Some((_, mut simulation)) = traffic_of(&scene, 60, 1) else { return };
+    let (_, mut simulation) = traffic_of(&scene, 60, 1);
     for _ in 0..30 {
         let stats = simulation.step(scene.dt).expect("a step");
         let (manifolds, points) = (stats.manifolds, stats.points);

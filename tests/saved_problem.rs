@@ -1,14 +1,27 @@
 //! Contact problems from steps: they are what the step was, and they can be solved.
 
+#[macro_use]
 mod common;
 
+use common::Open;
 use common::contacts::{curve, sweeps_to};
-use common::gpu::gpu;
 use drystone::config::Method;
 use drystone::contacts::{ContactProblem, Operator};
 use drystone::glam::{DVec3, Vec3};
 use drystone::solver::{Order, solution};
-use drystone::{Backend, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Scene, Shape, Simulation, SolverConfig, World};
+
+tests! {
+    every_backend {
+        every_backend_leaves_of_a_saved_step_what_f64_leaves,
+    }
+    no_gpu {
+        a_saved_step_is_read_back_and_solved,
+        acceleration_pays_on_saved_steps,
+        a_problem_says_what_the_bodies_are_about_to_do,
+        saving_a_step_changes_nothing,
+    }
+}
 
 fn simulation(scene: &str, parameters: &[&str], steps: u32) -> Simulation {
     let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
@@ -30,13 +43,12 @@ fn problems() -> Vec<ContactProblem> {
         .into()
 }
 
-#[test]
 fn a_saved_step_is_read_back_and_solved() {
     for problem in problems() {
         let read = ContactProblem::parse(&problem.to_text()).expect("a problem");
         assert_eq!(read, problem);
         let solved = solution(&problem, 1e-8, 20_000).expect("good frames");
-        println!(
+        measured!(
             "{}: {} contacts, {} sweeps, {:?}",
             problem.name,
             problem.contacts.len(),
@@ -47,35 +59,27 @@ fn a_saved_step_is_read_back_and_solved() {
     }
 }
 
-#[test]
-fn every_backend_leaves_of_a_saved_step_what_f64_leaves() {
+fn every_backend_leaves_of_a_saved_step_what_f64_leaves(open: Open) {
     for problem in problems() {
         for order in [Order::Contacts, Order::Manifolds] {
             let exact = curve(&problem, (Method::Plain, order), None, 200);
-            let reference: Box<dyn Backend> = Box::new(Reference::<f32>::new());
-            let gpu = gpu(false).map(|gpu| Box::new(gpu) as Box<dyn Backend>);
-            for backend in [reference, Box::new(Cpu::new())].into_iter().chain(gpu) {
-                let name = backend.name();
-                let rounded = curve(&problem, (Method::Plain, order), Some(backend), 200);
-                let apart = exact.iter().zip(&rounded).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                println!("{}, {order:?}, {name}: {apart:.1e}", problem.name);
-                assert!(apart <= 1e-5, "{}, {order:?}, {name}: {apart:e}", problem.name);
-            }
+            let rounded = curve(&problem, (Method::Plain, order), Some(open()), 200);
+            let apart = exact.iter().zip(&rounded).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            measured!("{}, {order:?}: {apart:.1e}", problem.name);
+            assert!(apart <= 1e-5, "{}, {order:?}: {apart:e}", problem.name);
         }
     }
 }
 
-#[test]
 fn acceleration_pays_on_saved_steps() {
     for problem in problems() {
         let sweeps = |method| sweeps_to(&problem, (method, Order::Manifolds), None, &[1e-1, 1e-2, 1e-3], 20_000);
         let (plain, accelerated) = (sweeps(Method::Plain), sweeps(Method::Accelerated));
-        println!("{}: {plain:?} and {accelerated:?}", problem.name);
+        measured!("{}: {plain:?} and {accelerated:?}", problem.name);
         assert!(plain.iter().zip(&accelerated).all(|(p, a)| a.expect("reached") <= p.expect("reached")));
     }
 }
 
-#[test]
 fn a_problem_says_what_the_bodies_are_about_to_do() {
     // A box that falls onto a plate which moves: gravity of a substep, the gap, and the plate's velocity are in it.
     let mut world = World::new();
@@ -103,7 +107,6 @@ fn a_problem_says_what_the_bodies_are_about_to_do() {
     }
 }
 
-#[test]
 fn saving_a_step_changes_nothing() {
     let end = |save: bool| {
         let mut simulation = simulation("pile", &["n=60"], 60);

@@ -19,6 +19,8 @@ pub struct AdapterSummary {
     pub hardware: bool,
     /// Whether it takes SPIR-V, so that exact mode works.
     pub exact: bool,
+    /// Whether it has a clock that times kernels.
+    pub clock: bool,
     /// Largest buffer that a kernel can be given [B].
     pub buffer_limit: u64,
 }
@@ -152,6 +154,7 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
         },
         hardware: info.device_type != wgpu::DeviceType::Cpu,
         exact: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
+        clock: adapter.features().contains(super::timer::FEATURES),
         buffer_limit: adapter.limits().max_storage_buffer_binding_size,
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         api: format!("{:?}", info.backend),
