@@ -25,16 +25,22 @@ const STEPS: u32 = 5;
 /// A backend cannot run.
 pub fn crossover(cpu: &mut dyn Backend, gpu: &mut dyn Backend) -> Result<Option<usize>> {
     let piles = SIDES.map(pile);
-    let [n, m] = [0, 1].map(|i| piles[i].bodies.len() as f64);
-    let (mut fixed, mut a_body) = ([0.0; 2], [0.0; 2]);
-    let both: [&mut dyn Backend; 2] = [cpu, gpu];
-    for (i, backend) in both.into_iter().enumerate() {
-        let (small, large) = (seconds(backend, &piles[0])?, seconds(backend, &piles[1])?);
-        a_body[i] = ((large - small) / (m - n)).max(0.0);
-        fixed[i] = (small - a_body[i] * n).max(0.0);
-    }
-    let (dearer, cheaper) = (fixed[1] - fixed[0], a_body[0] - a_body[1]);
-    Ok((cheaper > 0.0).then(|| (dearer / cheaper).max(0.0).ceil() as usize))
+    let times = |backend: &mut dyn Backend| Ok([seconds(backend, &piles[0])?, seconds(backend, &piles[1])?]);
+    let (cpu, gpu) = (times(cpu)?, times(gpu)?);
+    Ok(crossing(piles.map(|pile| pile.bodies.len()), cpu, gpu))
+}
+
+/// From how many bodies on the line through the times of `gpu` is below that of `cpu`; none if it never is. Both were measured
+/// with so many `bodies`, few and many; no line falls, and none begins below zero.
+fn crossing(bodies: [usize; 2], cpu: [f64; 2], gpu: [f64; 2]) -> Option<usize> {
+    let [few, many] = bodies.map(|n| n as f64);
+    let line = |[small, large]: [f64; 2]| {
+        let a_body = ((large - small) / (many - few)).max(0.0);
+        ((small - a_body * few).max(0.0), a_body)
+    };
+    let ((fixed_cpu, body_cpu), (fixed_gpu, body_gpu)) = (line(cpu), line(gpu));
+    let (dearer, cheaper) = (fixed_gpu - fixed_cpu, body_cpu - body_gpu);
+    (cheaper > 0.0).then(|| (dearer / cheaper).max(0.0).ceil() as usize)
 }
 
 /// Time of a step of a pile, once it has been run [s].
@@ -122,8 +128,48 @@ mod tests {
     use crate::plan::Pass;
     use std::time::Duration;
 
-    /// Takes as long as it is told to: so much a step, and so much a body.
-    struct Sleeper(Duration, Duration);
+    /// Times of a line of `fixed` and `a_body` at 200 and 8,000 bodies.
+    fn times(fixed: f64, a_body: f64) -> [f64; 2] {
+        BODIES.map(|n| fixed + a_body * n as f64)
+    }
+
+    const BODIES: [usize; 2] = [200, 8_000];
+
+    #[test]
+    fn a_gpu_pays_from_where_the_lines_cross() {
+        // Powers of two, so that every sum is exact: 2 + n / 1024 and 5 + n / 4096 are equal at 4096.
+        let (cpu, gpu) = (times(2.0, 1.0 / 1024.0), times(5.0, 1.0 / 4096.0));
+        let found = crossing(BODIES, cpu, gpu).expect("they cross");
+        assert!((4096..=4097).contains(&found), "{found}");
+        assert!(cpu[0] < gpu[0] && cpu[1] > gpu[1]);
+        // The other way round the GPU pays for few bodies only, so never from a number on.
+        assert_eq!(crossing(BODIES, gpu, cpu), None);
+    }
+
+    #[test]
+    fn a_gpu_that_is_always_cheaper_pays_at_once_and_one_that_is_always_dearer_never() {
+        let (cheap, dear) = (times(1.0, 0.125), times(8.0, 0.5));
+        assert_eq!(crossing(BODIES, dear, cheap), Some(0));
+        assert_eq!(crossing(BODIES, cheap, dear), None);
+        assert_eq!(crossing(BODIES, cheap, cheap), None);
+    }
+
+    #[test]
+    fn a_large_pile_that_was_measured_as_faster_than_a_small_one_counts_as_free() {
+        let (falling, rising) = ([4.0, 3.0], times(1.0, 0.25));
+        assert_eq!(crossing(BODIES, falling, rising), None);
+        // A step costs the GPU 4 whatever its size, and the processor 1 + n / 4.
+        assert_eq!(crossing(BODIES, rising, falling), Some(12));
+        // As much a body, or more, than the small pile leaves for: nothing is left that does not depend on the size.
+        assert_eq!(crossing(BODIES, [0.0, 78.0], [0.0, 39.0]), Some(0));
+    }
+
+    /// Keeps rows; sleeps in every step but the first, and notes which steps go on from its rows.
+    #[derive(Default)]
+    struct Sleeper(Vec<bool>);
+
+    /// The shortest time that such a step takes, however busy the machine is.
+    const SLEEP: Duration = Duration::from_millis(2);
 
     impl Backend for Sleeper {
         fn name(&self) -> &'static str {
@@ -132,20 +178,27 @@ mod tests {
         fn adapter(&self) -> String {
             String::new()
         }
-        fn run(&mut self, problem: &mut StepProblem, _: &[Pass]) -> Result<()> {
-            std::thread::sleep(self.0 + self.1 * problem.bodies.len() as u32);
+        fn run(&mut self, _: &mut StepProblem, _: &[Pass]) -> Result<()> {
+            unreachable!("steps are asked for")
+        }
+        fn step(&mut self, _: &mut StepProblem, _: &[Pass], carry: &Carry) -> Result<()> {
+            if !self.0.is_empty() {
+                std::thread::sleep(SLEEP);
+            }
+            self.0.push(carry.on_device);
             Ok(())
+        }
+        fn keeps_rows(&self) -> bool {
+            true
         }
     }
 
     #[test]
-    fn two_backends_are_equal_where_their_lines_cross() {
-        let of = |fixed: u64, a_body: u64| Sleeper(Duration::from_micros(fixed), Duration::from_nanos(a_body));
-        // 2 + n / 1000 and 5 + n / 4000 milliseconds: equal at 4,000.
-        let found = crossover(&mut of(2_000, 1_000), &mut of(5_000, 250)).expect("they run").expect("they cross");
-        assert!((3_000..5_000).contains(&found), "{found}");
-        assert_eq!(crossover(&mut of(1_000, 250), &mut of(1_000, 1_000)).expect("they run"), None);
-        assert_eq!(crossover(&mut of(8_000, 500), &mut of(1_000, 100)).expect("they run"), Some(0));
+    fn the_first_step_does_not_count_where_rows_stay_on_a_device() {
+        let mut sleeper = Sleeper::default();
+        let measured = seconds(&mut sleeper, &pile(2)).expect("it runs");
+        assert!(measured >= SLEEP.as_secs_f64() && measured.is_finite(), "{measured} s");
+        assert_eq!(sleeper.0, [false, true, true, true, true, true]);
     }
 
     #[test]
