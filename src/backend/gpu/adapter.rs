@@ -155,7 +155,7 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
         hardware: info.device_type != wgpu::DeviceType::Cpu,
         exact: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
         clock: adapter.features().contains(super::timer::FEATURES),
-        buffer_limit: adapter.limits().max_storage_buffer_binding_size,
+        buffer_limit: adapter.limits().max_storage_buffer_binding_size.min(adapter.limits().max_buffer_size),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         api: format!("{:?}", info.backend),
         name: info.name,

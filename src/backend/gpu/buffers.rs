@@ -29,7 +29,8 @@ struct Slot {
 impl Buffers {
     pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String) -> Self {
         let slots = (0..BINDINGS.len() + CARRY_BINDINGS.len()).map(|_| Slot::default()).collect();
-        let limit = device.limits().max_storage_buffer_binding_size;
+        let limits = device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
     }
 
@@ -59,8 +60,7 @@ impl Buffers {
         slot.known.clear();
         slot.buffer = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(name(binding)),
-            // Half as much again, so that a growing pile does not mean a new buffer every step.
-            size: (size + size / 2).clamp(size.max(256), self.limit.max(256)).next_multiple_of(16),
+            size: size_of_buffer(size, self.limit),
             usage: wgpu::BufferUsages::UNIFORM
                 | wgpu::BufferUsages::STORAGE
                 | wgpu::BufferUsages::COPY_DST
@@ -145,7 +145,42 @@ impl Buffers {
     }
 }
 
+/// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` [B]. The size is a multiple of 4 too and at
+/// most the limit; below that it is half as much again as is wanted, so that a growing pile does not mean a new buffer every step.
+pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
+    (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)
+}
+
 fn name(binding: u32) -> &'static str {
     let binding = binding as usize;
     BINDINGS.get(binding).copied().unwrap_or_else(|| CARRY_BINDINGS[binding - BINDINGS.len()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_holds_what_is_wanted_and_is_never_larger_than_the_adapter_allows() {
+        let limits = [128 << 20, (1 << 31) - 1, 1 << 31, (1 << 32) - 4, 4096];
+        for limit in limits {
+            let largest = limit / 4 * 4;
+            for wanted in [0, 4, 1024, limit / 2, limit / 3 * 2, largest - 12, largest - 4, largest] {
+                let wanted = wanted / 4 * 4;
+                let size = size_of_buffer(wanted, limit);
+                assert!(
+                    (wanted..=limit).contains(&size) && size.is_multiple_of(4),
+                    "{size} B for {wanted} B, limit {limit} B"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_buffer_has_room_to_grow_by_half_up_to_the_limit() {
+        assert_eq!(size_of_buffer(1 << 20, 1 << 31), 3 << 19);
+        assert_eq!(size_of_buffer(3_000_000, 4_000_000), 4_000_000);
+        // Bindings of nothing are bound too.
+        assert!(size_of_buffer(0, 1 << 20) >= 16);
+    }
 }

@@ -1,6 +1,6 @@
 //! From the buffers of a device to memory, through one buffer that both can reach.
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, size_of_buffer};
 
 /// A buffer that the device writes and the processor reads.
 ///
@@ -34,7 +34,7 @@ impl ReadBack {
         if self.staging.as_ref().is_none_or(|b| b.size() < size) {
             self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("read back"),
-                size: (size + size / 2).next_multiple_of(16).max(16),
+                size: size_of_buffer(size, self.device.limits().max_buffer_size),
                 usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }));
