@@ -434,6 +434,60 @@ mod exact {
         assert_eq!(inexact(&one_expression("x[1] * x[2] + x[3]")), BTreeSet::new());
     }
 
+    const CONSTANT: u32 = 43;
+    const EXTENDED: u32 = 12;
+    const ACCESS_CHAIN: u32 = 65;
+    const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
+    /// The number of UMin in GLSL.std.450.
+    const UMIN: u32 = 38;
+
+    /// How many indices that are no constants lead into memory, and how many of these are not the smaller of two numbers.
+    fn indices(words: &[u32]) -> (usize, usize) {
+        let all = instructions(words);
+        let results = |wanted: &dyn Fn(u32, &[u32]) -> bool| -> BTreeSet<u32> {
+            all.iter().filter(|(opcode, operands)| wanted(*opcode, operands)).map(|(_, operands)| operands[1]).collect()
+        };
+        let constants = results(&|opcode, _| opcode == CONSTANT);
+        let bounded = results(&|opcode, operands| opcode == EXTENDED && operands[3] == UMIN);
+        let chains = all.iter().filter(|(opcode, _)| [ACCESS_CHAIN, IN_BOUNDS_ACCESS_CHAIN].contains(opcode));
+        // Type, result and base come before the indices.
+        let computed = chains.flat_map(|(_, operands)| &operands[3..]).filter(|index| !constants.contains(index));
+        let (mut count, mut unbounded) = (0, 0);
+        for index in computed {
+            count += 1;
+            unbounded += usize::from(!bounded.contains(index));
+        }
+        (count, unbounded)
+    }
+
+    #[test]
+    fn no_index_leaves_its_buffer() {
+        let small_world: std::sync::Arc<[Kernel]> = [
+            Kernel::IntegrateVelocities { carry: false },
+            Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, round: true, ..Rules::default() }),
+            Kernel::IntegratePositions,
+        ]
+        .into();
+        let kernels = every_kernel().into_iter().map(Program::Pass);
+        for program in kernels.chain(Program::CARRY).chain([Program::Whole(small_world, 16)]) {
+            let words = spirv(&program.source(), program.name(), &program.constants());
+            let (count, unbounded) = indices(&words);
+            // One kernel reads no more than one row.
+            let has_rows = program.name() != "begin_sweep";
+            assert!(unbounded == 0 && (count > 0) == has_rows, "{program:?}: {unbounded} of {count} indices");
+        }
+    }
+
+    #[test]
+    fn an_index_without_a_bound_is_found() {
+        let source = "@group(0) @binding(2) var<storage, read_write> x: array<u32>;
+            @compute @workgroup_size(64) fn kernel(@builtin(global_invocation_id) id: vec3u) { x[x[id.x]] = 7u; }";
+        assert_eq!(indices(&spirv(source, "kernel", &[])), (2, 0));
+        let reflected = Reflected::new(source, "kernel", &[]).unwrap_or_else(|e| panic!("{e}"));
+        let unchecked = naga::back::spv::write_vec(&reflected.module, &reflected.info, &Default::default(), None);
+        assert_eq!(indices(&unchecked.expect("naga writes SPIR-V")), (2, 2));
+    }
+
     #[test]
     fn a_result_without_its_decoration_is_found() {
         let mut words = one_expression("x[1] * x[2] + x[3]");

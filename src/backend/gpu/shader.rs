@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use naga::back::spv;
+use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
 use super::{exact, whole};
@@ -241,7 +242,9 @@ impl Reflected {
         Ok(Self { module, info, bindings, entry_point: entry_point.to_owned() })
     }
 
-    /// SPIR-V in which no result may be reassociated or fused.
+    /// SPIR-V in which no result may be reassociated or fused, and no index leaves its buffer: naga takes the smaller of an index
+    /// and the last one of the buffer, as in the shaders that wgpu compiles itself where the driver does not do it. On the software
+    /// adapter `solve_contacts` takes 1.01 times as long with these checks (pile of 2,000 and wall, 20 pairs of runs in turn).
     ///
     /// # Errors
     /// naga cannot write it.
@@ -255,6 +258,11 @@ impl Reflected {
             lang_version: (1, 3),
             flags: spv::WriterFlags::empty(),
             binding_map: self.bindings.iter().enumerate().map(place).collect(),
+            bounds_check_policies: BoundsCheckPolicies {
+                index: BoundsCheckPolicy::Restrict,
+                buffer: BoundsCheckPolicy::Restrict,
+                ..BoundsCheckPolicies::default()
+            },
             ..Default::default()
         };
         let pipeline =
