@@ -186,7 +186,7 @@ fn what_a_reused_contact_carries_stays_with_it() {
                 .collect();
             assert_eq!(solved, given_back, "step {step}");
             // And the rows of the next step begin with the impulses that those of this one ended with.
-            let next = rows(simulation.next_problem(scene.dt).0);
+            let next = rows(&simulation.next_problem(scene.dt).expect("a step").0);
             for (contact, points) in &solved {
                 match next.get(contact) {
                     Some(now) => {

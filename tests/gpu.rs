@@ -128,9 +128,9 @@ fn apart_during_a_fall(mut step: impl FnMut(&StepProblem, &StepPlan) -> StepProb
     let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
     let mut apart = Vec::new();
     for now in 1..=100 {
-        let (problem, plan) = simulation.next_problem(scene.dt);
+        let (problem, plan) = simulation.next_problem(scene.dt).expect("a step");
         if !problem.contacts.is_empty() && now % 5 == 1 {
-            apart.push(of_velocities(&after(&mut *reference(), problem, plan), &step(problem, plan)));
+            apart.push(of_velocities(&after(&mut *reference(), &problem, &plan), &step(&problem, &plan)));
         }
         simulation.step(scene.dt).expect("the reference runs");
     }

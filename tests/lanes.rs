@@ -126,8 +126,9 @@ impl Backend for Lazy {
     fn adapter(&self) -> String {
         String::new()
     }
-    fn run(&mut self, p: &mut drystone::StepProblem, passes: &[drystone::plan::Pass]) -> drystone::Result<()> {
-        self.0.run(p, &passes[..passes.len() - 1])
+    fn run_checked(&mut self, step: drystone::backend::CheckedStep) -> drystone::Result<()> {
+        let (problem, passes) = step.into_parts();
+        self.0.run(problem, &passes[..passes.len() - 1])
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use super::Backend;
+use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::StepPlan;
@@ -43,8 +43,9 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     let (mut least, mut carry) = (f64::INFINITY, Carry::default());
     for _ in 0..=STEPS {
         let mut problem = pile.clone();
+        let step = CheckedStep::new(&mut problem, &plan.passes)?;
         let start = Instant::now();
-        backend.step(&mut problem, &plan.passes, &carry)?;
+        backend.step(step, &carry)?;
         // The first compiles kernels and sends everything.
         if carry.on_device || !backend.keeps_rows() {
             least = least.min(start.elapsed().as_secs_f64());
@@ -119,7 +120,6 @@ fn pile(side: u32) -> StepProblem {
 mod tests {
     use super::*;
     use crate::backend::cpu::{Cpu, Reference};
-    use crate::plan::Pass;
     use std::time::Duration;
 
     /// Takes as long as it is told to: so much a step, and so much a body.
@@ -132,7 +132,8 @@ mod tests {
         fn adapter(&self) -> String {
             String::new()
         }
-        fn run(&mut self, problem: &mut StepProblem, _: &[Pass]) -> Result<()> {
+        fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+            let (problem, _) = step.into_parts();
             std::thread::sleep(self.0 + self.1 * problem.bodies.len() as u32);
             Ok(())
         }
