@@ -149,7 +149,10 @@ fn every_setting_may_change_on_a_settled_world() {
         println!("{name}: {:.1e} m apart, {speed:.1e} and {speed_anew:.1e} m/s, gap {gap:.1e} m", apart.position);
         assert!(apart.position < 2e-2, "{name}: {apart:?}");
         assert!(gap < 1e-3 + 2.0 * anew.world.joint_gap(), "{name}: {gap}");
-        assert!(speed < 2.0 * speed_anew + 2e-2, "{name}: {speed} m/s, and {speed_anew} in a world made with it");
+        // Some settings let things slide, or compute all contacts anew; under all others a world at rest stays at rest.
+        let moves = ["clamping", "friction none", "friction slip", "speculative_margin"].contains(&name);
+        let most = if moves { 2.0 * speed_anew } else { 2e-3 };
+        assert!(speed < most, "{name}: {speed} m/s, and {speed_anew} in a world made with it");
     }
 }
 

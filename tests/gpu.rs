@@ -108,6 +108,13 @@ fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
 }
 
 #[test]
+fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
+    let config = SolverConfig { friction_at: drystone::config::FrictionAt::Manifold, ..SolverConfig::default() };
+    let scene = Scene::find("slide", &["mu=0".into()]).expect("a scene of the catalogue");
+    assert_same(&scene, &config, 20, "slide without friction");
+}
+
+#[test]
 fn a_mixture_has_work_for_every_kernel() {
     let scene = mixture();
     let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
