@@ -26,7 +26,7 @@ fn stages(c: &mut Criterion) {
     let (world, config) = (simulation.world.clone(), SolverConfig::default());
     let anew = SolverConfig { recycle_distance: 0.0, ..config.clone() };
     let mut group = c.benchmark_group("a manifold");
-    group.throughput(Throughput::Elements(simulation.next_problem(dt).0.contacts.len() as u64));
+    group.throughput(Throughput::Elements(simulation.next_problem(dt).expect("a step").0.contacts.len() as u64));
 
     let mut detector = Detector::new(&world);
     detector.detect(&world, &config, dt, &[], &|_| ());
@@ -77,7 +77,7 @@ fn kernels(c: &mut Criterion) {
         ("joint-grid:n=40", "joint-grid:n=40", SolverConfig::default()),
     ] {
         let (mut simulation, dt) = settled(scene, config);
-        let (problem, plan) = simulation.next_problem(dt);
+        let (problem, plan) = simulation.next_problem(dt).expect("a step");
         let mut kernels: Vec<Kernel> = Vec::new();
         for pass in &plan.passes {
             if !kernels.contains(&pass.kernel) {

@@ -57,17 +57,52 @@ fn distance(x: f32, y: f32) -> f64 {
     }
 }
 
-/// Where two backends first disagree on one problem.
+/// Where two backends first disagree.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FirstDifference {
     /// Step, from 1.
     pub step: u32,
-    /// Pass of that step's plan, from 0, and how many there are.
-    pub pass: usize,
-    /// Passes in the plan.
-    pub passes: usize,
-    /// Its kernel.
-    pub kernel: String,
+    /// Where in that step.
+    #[serde(flatten)]
+    pub stage: Stage,
+}
+
+/// The first stage of a step whose results are not the same.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum Stage {
+    /// Before the first pass: the backends were given different rows.
+    Rows {
+        /// The field of the problem.
+        rows: &'static str,
+    },
+    /// A pass, given the same rows.
+    Pass {
+        /// Its place in that step's plan, from 0.
+        pass: usize,
+        /// Passes in the plan.
+        passes: usize,
+        /// Its kernel.
+        kernel: String,
+    },
+    /// The difference did not appear when the run was repeated: the same input gives other bits.
+    NotRepeated {
+        /// Always true.
+        not_repeated: bool,
+    },
+}
+
+impl std::fmt::Display for FirstDifference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "step {}, ", self.step)?;
+        match &self.stage {
+            Stage::Rows { rows } => write!(f, "before the first pass: {rows} of the problem"),
+            Stage::Pass { pass, passes, kernel } => write!(f, "pass {pass} of {passes}, {kernel}"),
+            Stage::NotRepeated { .. } => {
+                write!(f, "which did not differ when it was repeated: the same input gives other bits")
+            }
+        }
+    }
 }
 
 /// What a comparison found.
@@ -102,20 +137,64 @@ pub fn compare(
         comparison.steps.push(Difference::between(&simulations[0].world, &simulations[1].world));
         after_step();
     }
-    // Found again on a simulation of its own, so that the two above stay free of it.
     if let Some(step) = comparison.steps.iter().position(|d| d.bodies > 0) {
-        let mut again = Simulation::new(scene.world.clone(), config.clone(), open(0)?)?;
-        for _ in 0..step {
-            again.step(scene.dt)?;
-        }
-        let (problem, plan) = again.next_problem(scene.dt);
-        let mut backends = [open(0)?, open(1)?];
-        if let Some(pass) = first_difference(problem, plan, &mut backends)? {
-            let kernel = plan.passes[pass].kernel.to_string();
-            comparison.first = Some(FirstDifference { step: step as u32 + 1, pass, passes: plan.passes.len(), kernel });
-        }
+        let stage = first_stage(scene, config, open, step)?;
+        comparison.first = Some(FirstDifference { step: step as u32 + 1, stage });
     }
     Ok(comparison)
+}
+
+/// Where two backends part in the step that follows `before` others, on simulations of their own.
+fn first_stage(
+    scene: &Scene,
+    config: &SolverConfig,
+    open: &mut dyn FnMut(usize) -> Result<Box<dyn Backend>>,
+    before: usize,
+) -> Result<Stage> {
+    let mut assembled = |which: usize| -> Result<(StepProblem, StepPlan)> {
+        let mut simulation = Simulation::new(scene.world.clone(), config.clone(), open(which)?)?;
+        for _ in 0..before {
+            simulation.step(scene.dt)?;
+        }
+        simulation.next_problem(scene.dt)
+    };
+    let [(problem, plan), (other, other_plan)] = [assembled(0)?, assembled(1)?];
+    if let Some(rows) = first_rows(&problem, &other) {
+        return Ok(Stage::Rows { rows });
+    }
+    if plan != other_plan {
+        return Ok(Stage::Rows { rows: "plan" });
+    }
+    let mut backends = [open(0)?, open(1)?];
+    Ok(match first_difference(&problem, &plan, &mut backends)? {
+        Some(pass) => Stage::Pass { pass, passes: plan.passes.len(), kernel: plan.passes[pass].kernel.to_string() },
+        None => Stage::NotRepeated { not_repeated: true },
+    })
+}
+
+/// The first field in which two problems differ in any bit.
+fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
+    let both = fields(a).into_iter().zip(fields(b));
+    both.into_iter().find(|(a, b)| a.1 != b.1).map(|(a, _)| a.0)
+}
+
+/// The fields of a problem, as bytes.
+fn fields(p: &StepProblem) -> [(&'static str, &[u8]); 13] {
+    [
+        ("params", bytemuck::bytes_of(&p.params)),
+        ("bodies", bytemuck::cast_slice(&p.bodies)),
+        ("masses", bytemuck::cast_slice(&p.masses)),
+        ("inertias", bytemuck::cast_slice(&p.inertias)),
+        ("contacts", bytemuck::cast_slice(&p.contacts)),
+        ("points", bytemuck::cast_slice(&p.points)),
+        ("impulses", bytemuck::cast_slice(&p.impulses)),
+        ("colors", bytemuck::cast_slice(&p.colors)),
+        ("first_joint_color", bytemuck::bytes_of(&p.first_joint_color)),
+        ("joints", bytemuck::cast_slice(&p.joints)),
+        ("joint_impulses", bytemuck::cast_slice(&p.joint_impulses)),
+        ("convergence", bytemuck::bytes_of(&p.convergence)),
+        ("momentum", bytemuck::bytes_of(&p.momentum)),
+    ]
 }
 
 /// The first pass after which two backends disagree on `problem` in any bit that they give back; by bisection.

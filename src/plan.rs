@@ -7,9 +7,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::config::{
-    Clamping, FUSE_BELOW, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig,
-};
+use crate::config::{Clamping, FUSE_BELOW, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig};
 use crate::kernels::Rules;
 use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::problem::{
@@ -148,6 +146,34 @@ pub struct StepPlan {
     pub passes: Vec<Pass>,
 }
 
+/// What a plan was made for, besides the settings and what is in the rows of contacts.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PlanKey {
+    is_made: bool,
+    colors: Vec<u32>,
+    first_joint_color: u32,
+    has_inertias: bool,
+    is_carried: bool,
+}
+
+impl PlanKey {
+    /// Becomes the key of `problem`; whether it was another one, so that its plan has to be made anew.
+    pub fn update(&mut self, problem: &StepProblem, contacts_changed: bool) -> bool {
+        let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
+        let known = (self.first_joint_color, self.has_inertias, self.is_carried);
+        let same = self.is_made && !contacts_changed && others == known && self.colors == problem.colors;
+        self.is_made = true;
+        (self.first_joint_color, self.has_inertias, self.is_carried) = others;
+        self.colors.clone_from(&problem.colors);
+        !same
+    }
+}
+
+/// Whether impulses can be carried over as velocities.
+fn is_long_enough(problem: &StepProblem) -> bool {
+    problem.params.substep >= SHORTEST_CARRIED
+}
+
 /// Shortest substep over which impulses are carried as velocities [s]. What a sweep corrects by less than the last bit of a velocity
 /// is then lost until the step ends, and the shorter the substep, the less it corrects. Squared error of the scene `rolling` with
 /// and without: 9e-7 and 6e-7 at 1/2000 s, 6e-6 and 3e-6 at 1/4000 s, 5e-5 and 3e-6 at 1/8000 s.
@@ -162,7 +188,7 @@ impl StepPlan {
         let friction = if problem.has_friction() { config.friction } else { FrictionRule::None };
         let shared = Rules {
             friction,
-            patch: friction != FrictionRule::None && config.friction_at == FrictionAt::Manifold,
+            patch: problem.has_patches(),
             friction_first: config.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.clamping == Clamping::Accumulated,
             round: problem.has_round_shapes(),
@@ -188,8 +214,7 @@ impl StepPlan {
         let mut plan = Self::default();
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
-        let long_enough = problem.params.substep >= SHORTEST_CARRIED;
-        let carried = shared.accumulated && joints.is_empty() && long_enough;
+        let carried = shared.accumulated && joints.is_empty() && is_long_enough(problem);
         for substep in 0..config.substeps {
             let carry = carried && substep > 0;
             plan.over_bodies(Kernel::IntegrateVelocities { carry });

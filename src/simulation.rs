@@ -1,18 +1,35 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
-use crate::backend::Backend;
+mod stages;
+
 use crate::backend::cpu::Reference;
-use crate::collide::{Detector, Pair};
+use crate::backend::{Backend, CheckedStep};
+use crate::collide::Pair;
 use crate::config::SolverConfig;
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
-use crate::graph::ConstraintGraph;
 use crate::metrics::Penetration;
 use crate::plan::{Kernel, Pass, StepPlan};
-use crate::problem::{Prepared, StepProblem};
-use crate::sleep::Sleep;
+use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
+use stages::Stages;
+
+/// Shortest step [s]. Shorter ones move nothing that single precision can tell from rest.
+pub const SHORTEST_STEP: f32 = 1e-9;
+/// Longest step [s].
+pub const LONGEST_STEP: f32 = 1.0;
+
+/// Refuses a length of a step that no step can be made of: less than [`SHORTEST_STEP`], more than [`LONGEST_STEP`], or no number.
+///
+/// # Errors
+/// One line with the length and the range.
+pub fn check_step_length(dt: f32) -> Result<()> {
+    if (SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
+        return Ok(());
+    }
+    Err(Error::input(format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")))
+}
 
 /// A world that moves.
 ///
@@ -30,20 +47,13 @@ use crate::world::World;
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies. Poses, velocities, forces and joints may be changed between steps; number, shapes and kinds of bodies may
-    /// not, and which bodies joints keep from colliding.
+    /// The bodies. Between steps may change: gravity; poses, velocities, forces, masses and materials of bodies; joints, which are
+    /// told apart by their bodies and anchors. Number, kinds and shapes of bodies may not: the next step then is an error.
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
-    detector: Detector,
-    sleep: Sleep,
-    /// Joints of the problem that the plan is for.
-    planned_joints: usize,
-    graph: ConstraintGraph,
-    joint_graph: ConstraintGraph,
-    prepared: Prepared,
-    problem: StepProblem,
-    plan: StepPlan,
+    /// What lasts from step to step on this side of the backend.
+    stages: Stages,
     /// Whether the backend keeps the rows of the last step on a device.
     on_device: bool,
 }
@@ -56,29 +66,17 @@ impl Simulation {
     pub fn new(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
         world.check()?;
-        Ok(Self {
-            detector: Detector::new(&world),
-            sleep: Sleep::new(&world, &config),
-            planned_joints: 0,
-            world,
-            config,
-            backend,
-            graph: ConstraintGraph::default(),
-            joint_graph: ConstraintGraph::default(),
-            prepared: Prepared::default(),
-            problem: StepProblem::default(),
-            plan: StepPlan::default(),
-            on_device: false,
-        })
+        Ok(Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false })
     }
 
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
     ///
     /// # Errors
-    /// The backend cannot run the step; the world is then as it was.
+    /// `dt` is not from [`SHORTEST_STEP`] to [`LONGEST_STEP`]; bodies came, went, or changed kind or shape; a joint or a mass is not
+    /// fit to be simulated; the backend cannot run the step. The world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
-        if self.begin_step(dt, &mut stats) {
+        if self.begin_step(dt, &mut stats)? {
             self.end_step(dt, &mut stats)?;
         }
         Ok(stats)
@@ -96,12 +94,12 @@ impl Simulation {
         }
         self.leave_device();
         let mut stats = StepStats::default();
-        if !self.begin_step(dt, &mut stats) {
+        if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
         let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> = self.plan.passes.iter().take_while(forces).cloned().collect();
-        let mut problem = self.problem.clone();
+        let first: Vec<_> = self.stages.plan.passes.iter().take_while(forces).cloned().collect();
+        let mut problem = self.stages.problem.clone();
         Reference::<f32>::new().run(&mut problem, &first)?;
         let contacts = ContactProblem::of_step(name.into(), &problem);
         self.end_step(dt, &mut stats)?;
@@ -109,56 +107,68 @@ impl Simulation {
     }
 
     /// Assembles a step; false if there is nothing to do in it.
-    fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> bool {
-        timed(&mut stats.times.detect, || self.sleep.before_step(&self.world, &self.detector));
-        if self.sleep.is_everything_still() {
-            stats.asleep = self.sleep.count();
-            return false;
+    fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
+        check_step_length(dt)?;
+        let changes = timed(&mut stats.times.detect, || self.stages.changes(&self.world, &self.config, dt))?;
+        if changes.rows {
+            self.leave_device();
         }
-        self.assemble(dt, stats);
-        true
+        self.stages.follow(&self.world, &self.config, dt, changes);
+        if self.stages.is_everything_still(&self.world, stats) {
+            return Ok(false);
+        }
+        self.stages.assemble(&self.world, &self.config, dt, self.on_device, stats);
+        Ok(true)
     }
 
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
-        let (carry, passes) = (&self.prepared.carry, &self.plan.passes);
-        let ran = timed(&mut stats.times.run, || self.backend.step(&mut self.problem, passes, carry));
+        let stages = &mut self.stages;
+        let (carry, passes) = (&stages.prepared.carry, &stages.plan.passes);
+        let step = CheckedStep::built(&mut stages.problem, passes);
+        let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
         if let Err(error) = ran {
             self.on_device = false;
             if carry.on_device {
-                self.problem.forget_impulses();
+                stages.problem.forget_impulses();
             }
             return Err(error);
         }
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
-        timed(&mut stats.times.store, || self.prepared.store(&self.problem, self.sleep.asleep(), &mut self.world));
-        stats.sweeps = self.problem.convergence.sweeps;
-        stats.planned_sweeps = self.problem.convergence.planned;
         let store = &mut stats.times.store;
-        if timed(store, || self.sleep.after_step(&mut self.world, &self.detector, dt)) {
-            // Who sleeps has its impulses in its manifolds.
+        if timed(store, || stages.store(&mut self.world, dt)) {
+            // The impulses of sleeping bodies are stored in their manifolds.
             timed(store, || self.fetch());
         }
-        stats.asleep = self.sleep.count();
+        let convergence = &self.stages.problem.convergence;
+        (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
+        stats.asleep = self.stages.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
         Ok(())
     }
 
-    /// Assembles the next step of `dt` seconds without running it: the problem as a value, and its plan.
-    pub fn next_problem(&mut self, dt: f32) -> (&StepProblem, &StepPlan) {
-        self.leave_device();
-        self.sleep.before_step(&self.world, &self.detector);
-        self.assemble(dt, &mut StepStats::default());
-        (&self.problem, &self.plan)
+    /// The next step of `dt` seconds as values, the problem and its plan. The run goes on as if nobody had asked.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`], the backend apart.
+    pub fn next_problem(&mut self, dt: f32) -> Result<(StepProblem, StepPlan)> {
+        check_step_length(dt)?;
+        self.fetch();
+        let mut next = self.stages.clone();
+        let changes = next.changes(&self.world, &self.config, dt)?;
+        next.follow(&self.world, &self.config, dt, changes);
+        next.is_everything_still(&self.world, &mut StepStats::default());
+        next.assemble(&self.world, &self.config, dt, false, &mut StepStats::default());
+        Ok((next.problem, next.plan))
     }
 
     /// Brings what only the backend has of the last step to the problem. What a lost device had is forgotten.
     fn fetch(&mut self) {
-        if self.on_device && self.backend.fetch(&mut self.problem).is_err() {
+        if self.on_device && self.backend.fetch(&mut self.stages.problem).is_err() {
             self.on_device = false;
-            self.problem.forget_impulses();
+            self.stages.problem.forget_impulses();
         }
     }
 
@@ -168,63 +178,15 @@ impl Simulation {
         self.on_device = false;
     }
 
-    /// Detects, colors, prepares and plans.
-    fn assemble(&mut self, dt: f32, stats: &mut StepStats) {
-        let times = &mut stats.times;
-        let give_back = |pair: &mut Pair| self.prepared.give_back(&self.problem, pair);
-        let found = timed(&mut times.detect, || {
-            let (detector, sleep) = (&mut self.detector, &mut self.sleep);
-            let mut found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
-            // Who wakes takes part in this step already.
-            while sleep.wake_touched(detector) {
-                let reshaped = found.reshaped;
-                found = detector.detect(&self.world, &self.config, dt, sleep.activity(), &give_back);
-                found.reshaped |= reshaped;
-            }
-            found
-        });
-        timed(&mut times.color, || {
-            self.prepared.color(&self.world, &mut self.detector, &mut self.graph, self.config.max_colors);
-            self.prepared.color_joints(&self.world, &mut self.joint_graph, self.config.max_colors);
-        });
-        timed(&mut times.prepare, || {
-            self.prepared.carry.on_device = self.on_device;
-            self.prepared.prepare(
-                &self.world,
-                self.sleep.asleep(),
-                &self.detector,
-                &self.config,
-                dt,
-                &mut self.problem,
-            );
-            // Where nothing was computed, the plan of the last step is the plan of this one.
-            let joints = self.problem.joints.len();
-            let same = found.computed == 0 && !found.reshaped && joints == self.planned_joints;
-            if !same || self.plan.passes.is_empty() {
-                self.planned_joints = joints;
-                self.plan = StepPlan::new(&self.config, &self.problem);
-            }
-        });
-        stats.pairs = found.pairs;
-        stats.computed = found.computed;
-        stats.manifolds = self.problem.contacts.len();
-        stats.points = self.problem.point_count(0..stats.manifolds);
-        stats.joints = self.problem.joints.len();
-        stats.colors = self.prepared.coloring.color_count();
-        stats.overflow = self.prepared.coloring.overflow as usize;
-        stats.dispatches = self.plan.passes.len();
-        stats.bytes_moved = self.plan.bytes_moved(&self.problem);
-    }
-
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
     pub fn is_asleep(&self, body: usize) -> bool {
-        self.sleep.asleep().get(body) == Some(&true)
+        self.stages.sleep.asleep().get(body) == Some(&true)
     }
 
-    /// Wakes a body, if it sleeps, and all that lies still with it: for those who change what the next step cannot see, such as a
-    /// joint to the world.
+    /// Wakes a body, if it sleeps, and all that lies still with it. What changes of a sleeping body itself, of gravity or of a
+    /// joint wakes it anyway.
     pub fn wake(&mut self, body: usize) {
-        self.sleep.wake(body);
+        self.stages.sleep.wake(body);
     }
 
     /// Overlap of the world as it is now, from contacts computed anew. The next step is as if nobody had asked: towers of 60
@@ -241,14 +203,14 @@ impl Simulation {
     /// The bodies, and contacts and impulses of the last step.
     pub fn world_and_pairs(&mut self) -> (&World, impl Iterator<Item = &Pair> + Clone) {
         self.fetch();
-        let pairs = self.detector.pairs_mut().flatten();
-        pairs.for_each(|pair| self.prepared.give_back(&self.problem, pair));
-        (&self.world, self.detector.pairs())
+        let Stages { detector, prepared, problem, .. } = &mut self.stages;
+        detector.pairs_mut().flatten().for_each(|pair| prepared.give_back(problem, pair));
+        (&self.world, self.stages.detector.pairs())
     }
 
     /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].
     pub fn joint_impulses(&self) -> &[glam::Vec3] {
-        self.prepared.joint_impulses()
+        self.stages.prepared.joint_impulses()
     }
 
     /// Changes the settings from the next step on.
@@ -257,9 +219,11 @@ impl Simulation {
     /// One is out of range or contradicts another; they are then as they were.
     pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
         config.check()?;
-        self.leave_device();
-        self.config = config;
-        self.plan = StepPlan::default();
+        if config != self.config {
+            self.leave_device();
+            self.stages.change_settings(&self.world, &self.config, &config);
+            self.config = config;
+        }
         Ok(())
     }
 
@@ -277,12 +241,12 @@ impl Simulation {
     /// The last step's problem, with the impulses that solved it.
     pub fn problem(&mut self) -> &StepProblem {
         self.fetch();
-        &self.problem
+        &self.stages.problem
     }
 
     /// The last step's plan.
     pub fn plan(&self) -> &StepPlan {
-        &self.plan
+        &self.stages.plan
     }
 
     /// What runs the steps.

@@ -35,8 +35,8 @@ impl Known {
     }
 }
 
-/// Who sleeps, and since when the others are slow.
-#[derive(Debug, Default)]
+/// Which bodies sleep, and since when the others are slow.
+#[derive(Clone, Debug, Default)]
 pub struct Sleep {
     /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
     after: f32,
@@ -84,6 +84,15 @@ impl Sleep {
             next: (0..bodies as u32).collect(),
             count: 0,
             steps: 0,
+        }
+    }
+
+    /// Takes over other settings: bodies that sleep go on sleeping unless nothing ever does.
+    pub fn change_settings(&mut self, world: &World, config: &SolverConfig) {
+        if self.asleep.is_empty() || config.sleep_after == 0.0 {
+            *self = Self::new(world, config);
+        } else {
+            (self.after, self.speed) = (config.sleep_after, config.sleep_speed);
         }
     }
 
@@ -154,6 +163,15 @@ impl Sleep {
             self.slow_for[i] = 0.0;
             self.count -= 1;
             i = std::mem::replace(&mut self.next[i], i as u32) as usize;
+        }
+    }
+
+    /// Wakes a body that somebody changed, or lets the next step wake what touches a body that never sleeps.
+    pub fn disturb(&mut self, body: usize) {
+        self.wake(body);
+        if let Some(known) = self.known.get_mut(body) {
+            // Equal to nothing.
+            known.force = Vec3::NAN;
         }
     }
 

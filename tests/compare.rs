@@ -1,7 +1,7 @@
 //! The comparison of backends finds what a backend does wrong, and where.
 
-use drystone::compare::{Difference, compare, first_difference};
-use drystone::plan::Pass;
+use drystone::backend::CheckedStep;
+use drystone::compare::{Difference, FirstDifference, Stage, compare, first_difference};
 use drystone::problem::JointImpulseRow;
 use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
@@ -29,7 +29,8 @@ impl Backend for Faulty {
         format!("{:?} at pass {}", self.fault, self.pass)
     }
 
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
         let (before, rest) = passes.split_at(self.pass.min(passes.len()));
         let mut reference = Reference::<f32>::new();
         reference.run(problem, before)?;
@@ -63,8 +64,7 @@ fn lying() -> (StepProblem, StepPlan) {
     for _ in 0..40 {
         simulation.step(scene.dt).expect("the reference runs");
     }
-    let (problem, plan) = simulation.next_problem(scene.dt);
-    (problem.clone(), plan.clone())
+    simulation.next_problem(scene.dt).expect("a step")
 }
 
 #[test]
@@ -121,7 +121,71 @@ fn a_comparison_names_the_step_the_pass_and_the_kernel() {
     assert_eq!((finished, found.steps.len()), (3, 3));
     assert_eq!(found.steps[0].bodies, scene.world.dynamic_count());
     let first = found.first.expect("a difference");
-    assert_eq!((first.step, first.pass, first.kernel.as_str()), (1, 0, "integrate_velocities"));
+    assert!(matches!(&first.stage, Stage::Pass { pass: 0, kernel, .. } if kernel == "integrate_velocities"), "{first}");
+    assert_eq!(first.step, 1);
+}
+
+/// A reference that sees a body somewhere else, but only in its first run: what differs once and never again.
+struct Once(bool);
+
+impl Backend for Once {
+    fn name(&self) -> &'static str {
+        "once"
+    }
+
+    fn adapter(&self) -> String {
+        "a fault that does not appear again".into()
+    }
+
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
+        if std::mem::take(&mut self.0) {
+            problem.bodies[3].v[0] += 1.0;
+        }
+        Reference::<f32>::new().run(problem, passes)
+    }
+}
+
+/// Bits that depended on the number of threads were reported as "no difference in any bit", since no pass makes them.
+#[test]
+fn a_difference_that_no_pass_makes_is_still_a_difference() {
+    let (mut opened, scene) = (0, pile());
+    let mut open = |which| -> Result<Box<dyn Backend>> {
+        opened += 1;
+        Ok(if which == 0 { reference() } else { Box::new(Once(opened == 2)) })
+    };
+    let found = compare(&scene, &SolverConfig::default(), &mut open, 3, || ()).expect("both run");
+    let expected = FirstDifference { step: 1, stage: Stage::NotRepeated { not_repeated: true } };
+    assert_eq!((found.steps[0].bodies, found.first), (1, Some(expected)));
+}
+
+/// A backend that leaves impulses behind which the next step begins with, but bodies as they should be.
+struct Hidden;
+
+impl Backend for Hidden {
+    fn name(&self) -> &'static str {
+        "hidden"
+    }
+
+    fn adapter(&self) -> String {
+        "a fault in what the next step begins with".into()
+    }
+
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
+        Reference::<f32>::new().run(problem, passes)?;
+        problem.impulses.iter_mut().for_each(|impulse| impulse.normal *= 1.01);
+        Ok(())
+    }
+}
+
+#[test]
+fn rows_that_differ_before_the_first_pass_are_named() {
+    let mut open = |which| -> Result<Box<dyn Backend>> { Ok(if which == 0 { reference() } else { Box::new(Hidden) }) };
+    let found = compare(&pile(), &SolverConfig::default(), &mut open, 40, || ()).expect("both run");
+    let first = found.first.expect("a difference");
+    assert_eq!(first.stage, Stage::Rows { rows: "contacts" }, "preloads follow from impulses");
+    assert_eq!(first.to_string(), format!("step {}, before the first pass: contacts of the problem", first.step));
 }
 
 #[test]

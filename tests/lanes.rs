@@ -73,6 +73,16 @@ fn every_rule_has_the_same_bits() {
     }
 }
 
+/// The plan left out what friction per manifold needs, the rows kept it, and lanes took it for a contact point.
+#[test]
+fn friction_per_manifold_without_friction_has_the_same_bits() {
+    for backend in each() {
+        same_bits(&against_reference(&backend, "slide:mu=0", &["friction_at=manifold"], 20, 1));
+        same_bits(&against_reference(&backend, "pile:n=50", &["friction_at=manifold", "friction=none"], 40, 2));
+        same_bits(&against_reference(&backend, "slide:mu=0", &["friction_at=manifold", "friction_sweeps=all"], 20, 1));
+    }
+}
+
 #[test]
 fn every_shape_and_unequal_moments_of_inertia_have_the_same_bits() {
     same_bits(&against_reference(best, "drop", &[], 90, 2));
@@ -126,8 +136,9 @@ impl Backend for Lazy {
     fn adapter(&self) -> String {
         String::new()
     }
-    fn run(&mut self, p: &mut drystone::StepProblem, passes: &[drystone::plan::Pass]) -> drystone::Result<()> {
-        self.0.run(p, &passes[..passes.len() - 1])
+    fn run_checked(&mut self, step: drystone::backend::CheckedStep) -> drystone::Result<()> {
+        let (problem, passes) = step.into_parts();
+        self.0.run(problem, &passes[..passes.len() - 1])
     }
 }
 

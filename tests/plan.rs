@@ -7,8 +7,8 @@ use glam::Vec3;
 fn planned(world: World, config: SolverConfig) -> (StepPlan, u64, Simulation) {
     let backend = Box::new(Reference::<f32>::new());
     let mut simulation = Simulation::new(world, config, backend).expect("good settings");
-    let (problem, plan) = simulation.next_problem(1.0 / 60.0);
-    let (plan, bytes) = (plan.clone(), plan.bytes_moved(problem));
+    let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
+    let bytes = plan.bytes_moved(&problem);
     (plan, bytes, simulation)
 }
 

@@ -5,8 +5,8 @@
 mod common;
 
 use common::gpu;
+use drystone::backend::CheckedStep;
 use drystone::compare::Difference;
-use drystone::plan::Pass;
 use drystone::problem::carry::Carry;
 use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
@@ -86,7 +86,7 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
                 assert_eq!(deepest[0].to_bits(), deepest[1].to_bits(), "{what}");
             }
             // A step that is assembled and not run.
-            9 => drop(both.each_mut().map(|s| s.next_problem(scene.dt).0.contacts.len())),
+            9 => drop(both.each_mut().map(|s| s.next_problem(scene.dt).expect("a step").0.contacts.len())),
             _ => {}
         }
     }
@@ -162,15 +162,15 @@ impl Backend for Confused {
     fn adapter(&self) -> String {
         self.0.adapter()
     }
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
-        self.0.run(problem, passes)
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        self.0.run_checked(step)
     }
-    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+    fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let mut carry = carry.clone();
         if carry.rows_before.len() > 1 {
             carry.rows_before.swap(0, 1);
         }
-        self.0.step(problem, passes, &carry)
+        self.0.step(step, &carry)
     }
     fn keeps_rows(&self) -> bool {
         self.0.keeps_rows()

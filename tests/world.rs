@@ -24,16 +24,45 @@ fn a_good_world_is_taken() {
 #[test]
 fn what_cannot_be_simulated_is_refused_by_name() {
     type Change = fn(&mut World);
-    let cases: [(&str, Change); 9] = [
+    let cases: [(&str, Change); 24] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
-        ("body 1 \"cube\": pose", |w| w.bodies[1].position.x = f32::INFINITY),
+        ("gravity", |w| w.gravity.y = -2e19),
+        ("body 1 \"cube\": position", |w| w.bodies[1].position.x = f32::INFINITY),
         ("body 1 \"cube\": rotation", |w| w.bodies[1].rotation = Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)),
         ("body 1 \"cube\": friction", |w| w.bodies[1].material.friction = -1.0),
         ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 0.0),
         ("body 2 \"\": mass", |w| {
             w.add(Body::dynamic());
         }),
-        ("body 2 \"\": half-spaces", |w| {
+        ("body 1 \"cube\": position", |w| w.bodies[1].position.z = 2e9),
+        ("body 1 \"cube\": linear velocity", |w| w.bodies[1].linear_velocity.x = -2e9),
+        ("body 1 \"cube\": angular velocity", |w| w.bodies[1].angular_velocity.x = f32::NAN),
+        ("body 1 \"cube\": force", |w| w.bodies[1].force.x = f32::INFINITY),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = f32::NAN),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 1e-40),
+        ("body 1 \"cube\": center of mass", |w| w.bodies[1].mass.center.x = f32::NAN),
+        ("body 2 \"\": shapes[0]: ball of radius -1", |w| {
+            w.add(Body::fixed().shape(Shape::ball(-1.0)));
+        }),
+        ("body 2 \"\": shapes[1]: capsule of radius 0", |w| {
+            w.add(Body::fixed().shape(Shape::ball(1.0)).shape(Shape::capsule(1.0, 0.0)));
+        }),
+        ("body 2 \"\": shapes[0]: cuboid of half extent inf", |w| {
+            w.add(Body::fixed().shape(Shape::cuboid(1.0, f32::INFINITY, 1.0)));
+        }),
+        ("body 2 \"\": shapes[0]: cylinder of half height NaN", |w| {
+            w.add(Body::fixed().shape(Shape::cylinder(f32::NAN, 1.0)));
+        }),
+        ("body 2 \"\": shapes[0]: cone of radius", |w| {
+            w.add(Body::fixed().shape(Shape::cone(1.0, 2e9)));
+        }),
+        ("body 2 \"\": shapes[0]: half-space of normal", |w| {
+            w.add(Body::fixed().shape(Shape::half_space(3.0 * Vec3::Y)));
+        }),
+        ("body 2 \"\": shapes[0]: position", |w| {
+            w.add(Body::fixed().shape_at(Shape::ball(1.0), Vec3::splat(f32::NAN), Quat::IDENTITY));
+        }),
+        ("body 2 \"\": shapes[0]: half-spaces", |w| {
             w.add(Body::kinematic().shape(Shape::half_space(Vec3::Y)));
         }),
         ("joint 0: names", |w| w.joints.push(BallJoint::new(1, Vec3::ZERO, 7, Vec3::ZERO))),

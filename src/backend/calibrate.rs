@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use super::Backend;
+use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::StepPlan;
@@ -49,8 +49,9 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     let (mut least, mut carry) = (f64::INFINITY, Carry::default());
     for _ in 0..=STEPS {
         let mut problem = pile.clone();
+        let step = CheckedStep::new(&mut problem, &plan.passes)?;
         let start = Instant::now();
-        backend.step(&mut problem, &plan.passes, &carry)?;
+        backend.step(step, &carry)?;
         // The first compiles kernels and sends everything.
         if carry.on_device || !backend.keeps_rows() {
             least = least.min(start.elapsed().as_secs_f64());
@@ -125,7 +126,6 @@ fn pile(side: u32) -> StepProblem {
 mod tests {
     use super::*;
     use crate::backend::cpu::{Cpu, Reference};
-    use crate::plan::Pass;
     use std::time::Duration;
 
     /// Times of a line of `fixed` and `a_body` at 200 and 8,000 bodies.
@@ -178,10 +178,10 @@ mod tests {
         fn adapter(&self) -> String {
             String::new()
         }
-        fn run(&mut self, _: &mut StepProblem, _: &[Pass]) -> Result<()> {
+        fn run_checked(&mut self, _: CheckedStep) -> Result<()> {
             unreachable!("steps are asked for")
         }
-        fn step(&mut self, _: &mut StepProblem, _: &[Pass], carry: &Carry) -> Result<()> {
+        fn step(&mut self, _: CheckedStep, carry: &Carry) -> Result<()> {
             if !self.0.is_empty() {
                 std::thread::sleep(SLEEP);
             }

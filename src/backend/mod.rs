@@ -1,11 +1,13 @@
 //! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
 
 mod calibrate;
+mod checked;
 mod choose;
 pub mod cpu;
 pub mod gpu;
 
 pub use calibrate::crossover;
+pub use checked::CheckedStep;
 pub use choose::{BackendChoice, Numbers, choose};
 
 use crate::error::Result;
@@ -26,17 +28,25 @@ pub trait Backend: Send {
     /// leave for each other is kept: the next run may go on with more sweeps of the same problem.
     ///
     /// # Errors
+    /// [`CheckedStep::new`] refuses the problem or the passes, the problem does not fit the device, or the device is lost.
+    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+        self.run_checked(CheckedStep::new(problem, passes)?)
+    }
+
+    /// As [`Self::run`], for what was checked before.
+    ///
+    /// # Errors
     /// The problem does not fit the device, or the device is lost.
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()>;
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()>;
 
     /// Runs the passes of a step that follows on the one before as `carry` says. A backend with a device of its own keeps the
     /// rows there, sends what changed and brings back what moved: where `carry` says that the impulses are on the device, those
-    /// of `problem` are not looked at, and where [`Self::keeps_rows`] says so afterwards, they are not written either.
+    /// of the problem are not looked at, and where [`Self::keeps_rows`] says so afterwards, they are not written either.
     ///
     /// # Errors
-    /// As of [`Self::run`].
-    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], _carry: &Carry) -> Result<()> {
-        self.run(problem, passes)
+    /// As of [`Self::run_checked`].
+    fn step(&mut self, step: CheckedStep, _carry: &Carry) -> Result<()> {
+        self.run_checked(step)
     }
 
     /// Whether the rows of the last step are on a device, and its impulses and preloads nowhere else.

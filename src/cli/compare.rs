@@ -58,9 +58,7 @@ impl CompareArgs {
             }
         }
         match found.first {
-            Some(f) => {
-                print(format_args!("first difference: step {}, pass {} of {}, {}", f.step, f.pass, f.passes, f.kernel))
-            }
+            Some(first) => print(format_args!("first difference: {first}")),
             None => print("no difference in any bit"),
         }
     }

@@ -30,7 +30,7 @@ use crate::error::{Error, Result};
 use crate::load::Load;
 use crate::preset::Preset;
 use crate::scenes::Scene;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, check_step_length};
 use crate::stats::StepStats;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
@@ -193,9 +193,7 @@ impl SceneArgs {
         config.check()?;
         let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
         if let Some(dt) = self.dt {
-            if !(dt > 0.0 && dt <= 1.0) {
-                return Err(Error::input(format!("--dt {dt}: must be more than 0 and at most 1 second")));
-            }
+            check_step_length(dt).map_err(|e| Error::input(format!("--{e}")))?;
             scene.dt = dt;
         }
         scene.steps = self.steps.unwrap_or(scene.steps);

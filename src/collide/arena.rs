@@ -8,8 +8,8 @@ use parry3d::math::Pose;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
-use super::narrow::{ColliderInfo, Margins, Moving, Pair, Scratch, Update};
-use super::{Activity, DetectStats, Manifold};
+use super::narrow::{ColliderInfo, FARTHEST, Margins, Moving, Pair, Scratch, Update};
+use super::{Activity, DetectStats};
 use crate::world::BodyKind;
 
 /// What all worlds are told about one detection; bodies are counted over all of them.
@@ -23,6 +23,7 @@ pub(super) struct Now<'a> {
 }
 
 /// The colliders of one world, which meet no others.
+#[derive(Clone)]
 pub(super) struct Arena {
     colliders: Vec<ColliderInfo>,
     unbounded: Vec<u32>,
@@ -38,6 +39,8 @@ pub(super) struct Arena {
     pub pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
+    /// Whether other pairs may meet than before, so that all are looked for.
+    look_again: bool,
 }
 
 /// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
@@ -57,7 +60,18 @@ impl Arena {
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
+            look_again: false,
         }
+    }
+
+    /// The colliders, in the order of the bodies.
+    pub fn colliders(&self) -> &[ColliderInfo] {
+        &self.colliders
+    }
+
+    /// Looks for all pairs in the next detection, because other bodies are jointed.
+    pub fn look_again(&mut self) {
+        self.look_again = true;
     }
 
     /// Brings the pairs to where the bodies are.
@@ -81,7 +95,10 @@ impl Arena {
             aabb
         };
         if self.fat.is_empty() {
-            let fatten = |c: &ColliderInfo| if c.unbounded { empty_box() } else { tight(c).loosened(FAT * c.size) };
+            let fatten = |c: &ColliderInfo| {
+                let fat = tight(c).loosened(FAT * c.size);
+                if c.unbounded || !is_in_range(&fat) { empty_box() } else { fat }
+            };
             self.fat = self.colliders.iter().map(fatten).collect();
             self.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &self.fat);
             self.found.clear();
@@ -99,7 +116,7 @@ impl Arena {
                     return None;
                 }
                 let aabb = tight(c);
-                (!fat.contains(&aabb) && is_finite(&aabb)).then_some(aabb)
+                (!fat.contains(&aabb) && is_in_range(&aabb)).then_some(aabb)
             };
             let colliders = self.colliders.par_iter().with_min_len(256);
             colliders.zip(&self.fat).map(left).collect_into_vec(&mut self.left);
@@ -114,13 +131,23 @@ impl Arena {
             if !self.moved.is_empty() {
                 self.tree.optimize_incremental(&mut self.workspace);
                 self.tree.refit(&mut self.workspace);
+            }
+            if self.look_again {
+                self.moved.clear();
+                self.moved.extend(0..self.colliders.len() as u32);
+                let found = &mut self.found;
+                self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+            } else if !self.moved.is_empty() {
                 let found = &mut self.found;
                 self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
+            }
+            if !self.moved.is_empty() {
                 self.find_unbounded(now);
                 parted = self.drop_parted(now);
             }
         }
         self.add_found(now);
+        self.look_again = false;
         parted
     }
 
@@ -145,12 +172,13 @@ impl Arena {
         }
     }
 
-    /// Ends the pairs whose boxes came apart; the last pair takes an ended one's slot. Returns whether there were any.
+    /// Ends the pairs whose boxes came apart or whose bodies a joint holds; the last pair takes an ended one's slot. Returns whether there were any.
     fn drop_parted(&mut self, now: &Now) -> bool {
         let (mut slot, before) = (0, self.pairs.len());
         while slot < self.pairs.len() {
             let pair = &self.pairs[slot];
-            if self.touches(now, pair.collider_a, pair.collider_b) {
+            let jointed = self.look_again && now.jointed.contains(&key(pair.body_a, pair.body_b));
+            if !jointed && self.touches(now, pair.collider_a, pair.collider_b) {
                 slot += 1;
                 continue;
             }
@@ -194,7 +222,7 @@ impl Arena {
             let changes = pair.rests == takes_part;
             if changes && !takes_part {
                 give_back(pair);
-                pair.manifolds.iter_mut().for_each(Manifold::forget_rows);
+                pair.forget_rows();
             }
             let mut update = Update::Reused;
             if both != [Activity::Still; 2] {
@@ -230,11 +258,12 @@ pub(super) fn key(i: u32, j: u32) -> (u32, u32) {
     (i.min(j), i.max(j))
 }
 
-/// A box that overlaps nothing, far from everything.
+/// A box that overlaps no other but its like, far from everything.
 fn empty_box() -> Aabb {
-    Aabb::new(glam::Vec3::splat(f32::MAX / 4.0), glam::Vec3::splat(f32::MAX / 4.0))
+    Aabb::new(glam::Vec3::splat(2.0 * FARTHEST), glam::Vec3::splat(2.0 * FARTHEST))
 }
 
-fn is_finite(aabb: &Aabb) -> bool {
-    aabb.mins.is_finite() && aabb.maxs.is_finite()
+fn is_in_range(aabb: &Aabb) -> bool {
+    let farthest = glam::Vec3::splat(FARTHEST);
+    aabb.mins.abs().cmple(farthest).all() && aabb.maxs.abs().cmple(farthest).all()
 }

@@ -91,6 +91,23 @@ impl Manifold {
         self.points.iter_mut().for_each(|point| point.row_before = None);
     }
 
+    /// Makes all impulses `impulses` times as large, and the preload `preload` times.
+    pub(crate) fn rescale(&mut self, impulses: f32, preload: f32) {
+        self.preload *= preload;
+        self.twist_impulse *= impulses;
+        self.friction_impulse *= impulses;
+        for point in self.points_mut() {
+            point.normal_impulse *= impulses;
+            point.friction_impulse *= impulses;
+        }
+    }
+
+    /// Forgets the impulses of friction.
+    pub(crate) fn forget_friction(&mut self) {
+        (self.twist_impulse, self.friction_impulse) = (0.0, Vec3::ZERO);
+        self.points_mut().iter_mut().for_each(|point| point.friction_impulse = Vec3::ZERO);
+    }
+
     /// Takes over color and impulses of the same contact one step earlier: points match by feature and, where that
     /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` [m].
     pub(super) fn inherit(&mut self, old: &Self, distance: f32) {

@@ -19,7 +19,8 @@ use parry3d::math::Pose;
 use rayon::prelude::*;
 
 use crate::config::SolverConfig;
-use crate::world::{Body, BodyKind, World};
+use crate::error::{Error, Result};
+use crate::world::{Body, BodyKind, Collider, World};
 use arena::{Arena, Now, key};
 use narrow::{ColliderInfo, Margins, Moving};
 
@@ -57,6 +58,7 @@ impl DetectStats {
 }
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
+#[derive(Clone)]
 pub struct Detector {
     arenas: Vec<Arena>,
     kinds: Vec<BodyKind>,
@@ -66,12 +68,23 @@ pub struct Detector {
     reshaped_in: u64,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
+    /// First body of each world but the first.
+    begins: Vec<usize>,
+}
+
+/// What to do about bodies that came, went or changed.
+const ANEW: &str = "bodies cannot come, go or change kind or shape yet; make a new simulation of this world";
+
+/// Pairs of bodies that a joint keeps from colliding, the smaller index first.
+fn jointed(world: &World) -> HashSet<(u32, u32)> {
+    let apart = world.joints.iter().filter(|joint| !joint.collide);
+    apart.filter_map(|joint| Some(key(joint.body_a as u32, joint.body_b? as u32))).collect()
 }
 
 impl Detector {
     /// A detector for the bodies of `world`, whose number, shapes and kinds stay as they are.
     pub fn new(world: &World) -> Self {
-        let collider = |(body, c): (usize, &crate::world::Collider)| {
+        let collider = |(body, c): (usize, &Collider)| {
             let bounding = c.shape.bounding_radius();
             ColliderInfo {
                 body: body as u32,
@@ -94,12 +107,42 @@ impl Detector {
             detections: 0,
             computed_in: 0,
             reshaped_in: 0,
-            jointed: world
-                .joints
-                .iter()
-                .filter(|j| !j.collide)
-                .filter_map(|j| Some(key(j.body_a as u32, j.body_b? as u32)))
-                .collect(),
+            jointed: jointed(world),
+            begins: world.begins.clone(),
+        }
+    }
+
+    /// Refuses a world whose bodies are not those that this detector was made for.
+    ///
+    /// # Errors
+    /// One line that names the first body that came, went, or changed kind or shape.
+    pub fn check_bodies(&self, world: &World) -> Result<()> {
+        let (had, has) = (self.kinds.len(), world.bodies.len());
+        if had != has || world.begins != self.begins {
+            return Err(Error::input(format!(
+                "the world has {has} bodies in {} parts, and had {had} in {} when its simulation began: {ANEW}",
+                world.begins.len() + 1,
+                self.begins.len() + 1
+            )));
+        }
+        let mut colliders = self.arenas.iter().flat_map(Arena::colliders).peekable();
+        for (i, (body, kind)) in world.bodies.iter().zip(&self.kinds).enumerate() {
+            let same = |c: &Collider| colliders.next().is_some_and(|known| known.is(i, c));
+            let all = body.kind == *kind && body.colliders.iter().all(same);
+            if !all || colliders.peek().is_some_and(|next| next.body as usize == i) {
+                let name = &body.name;
+                return Err(Error::input(format!("body {i} {name:?} changed its kind or shapes: {ANEW}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes over which bodies joints keep from colliding.
+    pub fn follow_joints(&mut self, world: &World) {
+        let jointed = jointed(world);
+        if jointed != self.jointed {
+            self.jointed = jointed;
+            self.arenas.iter_mut().for_each(Arena::look_again);
         }
     }
 

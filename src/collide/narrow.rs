@@ -10,6 +10,7 @@ use super::manifold::{Manifold, ManifoldPoint};
 use super::query::{Found, convex_contact};
 use crate::math::{self, NormalMovement};
 use crate::random::mixed;
+use crate::world::Collider;
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -35,6 +36,13 @@ impl ColliderInfo {
         let Some(half) = self.cuboid else { return self.shape.compute_aabb(&pose) };
         let axes = glam::Mat3::from_quat(pose.rotation);
         Aabb::from_half_extents(pose.translation, axes.abs() * half)
+    }
+
+    /// Whether this is still the collider of a body.
+    pub fn is(&self, body: usize, collider: &Collider) -> bool {
+        self.body as usize == body
+            && std::sync::Arc::ptr_eq(&self.shape.0, &collider.shape.0.0)
+            && self.local == Pose::from_parts(collider.position, collider.rotation)
     }
 
     fn is_composite(&self) -> bool {
@@ -121,10 +129,15 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    fn is_finite(&self) -> bool {
-        self.center.is_finite() && self.rotation.is_finite() && self.v.is_finite() && self.w.is_finite()
+    /// Whether contacts can be computed: parry squares lengths, and takes rotations for unit quaternions.
+    fn is_in_range(&self) -> bool {
+        let near = self.position.abs().cmple(Vec3::splat(FARTHEST)).all();
+        near && (self.rotation.length_squared() - 1.0).abs() < 0.1 && self.v.is_finite() && self.w.is_finite()
     }
 }
+
+/// Farthest that something is from the origin and still touches anything [m]: the square is far inside of single precision.
+pub(super) const FARTHEST: f32 = 1e15;
 
 /// Settings of the detection, as lengths relative to the thinner shape.
 #[derive(Clone, Copy)]
@@ -210,8 +223,8 @@ impl Pair {
         scratch: &mut Scratch,
         give_back: &(dyn Fn(&mut Self) + Sync),
     ) -> Update {
-        // A body that left the finite range touches nothing, so that the trouble does not spread.
-        if !(a.is_finite() && b.is_finite()) {
+        // A body that left the range touches nothing, so that the trouble does not spread.
+        if !(a.is_in_range() && b.is_in_range()) {
             self.manifolds.clear();
             self.invalidate();
             self.computed_in = margins.detection;
@@ -246,6 +259,11 @@ impl Pair {
         self.compute(ca, cb, a, b, look, size, scratch);
         let shape = self.manifolds.iter().map(|m| m.points().len());
         if shape.eq(scratch.old.iter().map(|m| m.points().len())) { Update::Computed } else { Update::Reshaped }
+    }
+
+    /// Forgets where the rows of the manifolds were.
+    pub(crate) fn forget_rows(&mut self) {
+        self.manifolds.iter_mut().for_each(Manifold::forget_rows);
     }
 
     /// Forgets when the manifolds were computed, so that the next update computes them anew.

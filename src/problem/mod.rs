@@ -1,8 +1,10 @@
 //! One step as a value: plain rows in color order, whose names are the names of the WGSL bindings.
 
 pub mod carry;
+mod check;
 mod contacts;
 pub mod effective;
+mod follow;
 mod layout;
 mod prepare;
 pub mod softness;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::carry::{Carry, NO_ROW, Origin, Preload};
 use super::contacts::{Chunk, ContactRows, Source, Writer};
+use super::follow::StepScale;
 use super::layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
     Params, PointRow, Softness,
@@ -37,8 +38,13 @@ pub struct Prepared {
     before: ContactRows,
     sources_before: Vec<Source>,
     edges_before: Vec<Edge>,
-    joint_edges: Vec<Edge>,
+    /// The joints that the rows are of, in the order of the world, and as edges of their graph.
+    pub(super) joints: Vec<BallJoint>,
+    pub(super) joint_edges: Vec<Edge>,
+    pub(super) are_joints_colored: bool,
     joint_coloring: Coloring,
+    /// What impulses and preloads of the last step are proportional to; none before the first.
+    pub(super) scale: Option<StepScale>,
     /// How the rows of contacts follow from those of the step before.
     pub carry: Carry,
     /// Which joint each row is of: those of bodies that are awake.
@@ -94,19 +100,12 @@ impl Prepared {
         &self.joint_impulses
     }
 
-    /// Gives every joint of the world a color; joints and contacts share none.
+    /// Gives every joint a color; joints and contacts share none.
     pub fn color_joints(&mut self, world: &World, graph: &mut ConstraintGraph, max_colors: u32) {
-        if self.joint_edges.len() == world.joints.len() {
-            return;
+        if !self.are_joints_colored {
+            self.joint_coloring = graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
+            self.are_joints_colored = true;
         }
-        let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
-        self.joint_edges.truncate(world.joints.len());
-        let fresh = &world.joints[self.joint_edges.len()..];
-        let edge =
-            |j: &BallJoint| Edge { a: movable(j.body_a), b: j.body_b.map_or(IMMOVABLE, movable), color: None, rank: 0 };
-        self.joint_edges.extend(fresh.iter().map(edge));
-        self.joint_coloring = graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
-        self.joint_impulses.resize(world.joints.len(), Vec3::ZERO);
     }
 
     /// Writes the rows of a step of `dt` seconds into `problem`. Who is `asleep` stands in them as one that nothing moves.
@@ -120,6 +119,7 @@ impl Prepared {
         problem: &mut StepProblem,
     ) {
         prepare_bodies(world, asleep, config, problem);
+        self.scale = Some(StepScale::new(config, dt));
         let h = dt / config.substeps as f32;
         problem.params = Params {
             substep: h,
@@ -284,7 +284,7 @@ impl Prepared {
 }
 
 /// How overlap is removed, for contacts of `ratio` times the frequency.
-fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
+pub(super) fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
     match config.stabilization {
         Stabilization::Soft => {
             softness(config.contact_frequency / h * ratio, config.contact_damping, h, config.push_limit)

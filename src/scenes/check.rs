@@ -8,10 +8,9 @@ use super::Scene;
 use super::file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
 use super::joint::joint;
 use crate::error::{Error, Result};
-use crate::world::{Body, BodyKind, MassProperties, Shape, World};
+use crate::simulation::{LONGEST_STEP, SHORTEST_STEP};
+use crate::world::{Body, BodyKind, MOST_GRAVITY, MOST_LENGTH, MOST_SPEED, MassProperties, Shape, World};
 
-/// Largest coordinate and size [m]: its cube is still a number in single precision.
-const MOST_LENGTH: f32 = 1e9;
 /// How far a quaternion or a normal may be from length 1; nearer ones are normalized.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
@@ -20,8 +19,8 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     if file.version != 1 {
         return Err(unknown_version(file.version));
     }
-    let dt = one("dt", file.dt, "more than 0 and at most 1", |x| x > 0.0 && x <= 1.0)?;
-    let mut world = World { gravity: finite("gravity", file.gravity)?.into(), ..World::new() };
+    let dt = one("dt", file.dt, "1e-9 to 1", |x| (SHORTEST_STEP..=LONGEST_STEP).contains(&x))?;
+    let mut world = World { gravity: gravity(file.gravity)?.into(), ..World::new() };
     let container = file.container.map(container).transpose()?;
     for (index, body_file) in file.bodies.into_iter().enumerate() {
         let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;
@@ -59,7 +58,7 @@ fn body(file: &BodyFile) -> Result<Body> {
         BodyKind::Dynamic => Body::dynamic(),
     };
     let [x, y, z] = lengths("position", file.position)?;
-    let velocity = |name, v| if file.kind == BodyKind::Fixed { zero(name, v) } else { finite(name, v) };
+    let velocity = |name, v| if file.kind == BodyKind::Fixed { zero(name, v) } else { speed(name, v) };
     let linear = velocity("linear_velocity", file.linear_velocity)?;
     let angular = velocity("angular_velocity", file.angular_velocity)?;
     let pushed = |x: f32| x == 0.0 || file.kind == BodyKind::Dynamic;
@@ -193,8 +192,12 @@ fn one(name: impl Display, value: f64, must: &str, fits: impl Fn(f32) -> bool) -
     checked(name, [value], must, fits).map(|[x]| x)
 }
 
-fn finite<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
-    checked(name, values, "finite", |_| true)
+fn gravity(values: [f64; 3]) -> Result<[f32; 3]> {
+    checked("gravity", values, "at most 1e9 m/s² in size", |x| x.abs() <= MOST_GRAVITY)
+}
+
+fn speed<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
+    checked(name, values, "at most 1e9 in size", |x| x.abs() <= MOST_SPEED)
 }
 
 fn zero<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {

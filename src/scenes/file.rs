@@ -32,10 +32,10 @@ pub struct SceneFile {
     pub version: u32,
     /// Name of the scene; the file's name without its extension if left out.
     pub name: Option<String>,
-    /// Acceleration of every dynamic body [m/s²].
+    /// Acceleration of every dynamic body [m/s²], up to 1e9 along each axis.
     #[serde(default = "defaults::gravity")]
     pub gravity: [f64; 3],
-    /// Length of a step [s], more than 0, up to 1.
+    /// Length of a step [s], 1e-9 to 1.
     #[serde(default = "defaults::dt")]
     pub dt: f64,
     /// Steps of a run that asks for none.
@@ -63,9 +63,9 @@ pub struct BodyFile {
     pub position: [f64; 3],
     /// Rotation of the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
     pub rotation: [f64; 4],
-    /// Velocity of the center of mass [m/s]; zero for a fixed body.
+    /// Velocity of the center of mass [m/s], up to 1e9 along each axis; zero for a fixed body.
     pub linear_velocity: [f64; 3],
-    /// Angular velocity in world axes [rad/s]; zero for a fixed body.
+    /// Angular velocity in world axes [rad/s], up to 1e9 along each axis; zero for a fixed body.
     pub angular_velocity: [f64; 3],
     /// Force through the center of mass, besides gravity [N]; zero unless dynamic.
     pub force: [f64; 3],

@@ -18,8 +18,8 @@ pub use order::{Order, Sequence};
 
 use glam::DVec3;
 
-use crate::backend::Backend;
 use crate::backend::cpu::Reference;
+use crate::backend::{Backend, CheckedStep};
 use crate::config::Method;
 use crate::contacts::{ContactProblem, Operator, Velocity};
 use crate::error::Result;
@@ -122,7 +122,7 @@ impl<'a> Solver<'a> {
             let restarts = self.restarts();
             match &mut self.work {
                 Work::Exact(reference) => reference.advance(&self.problem, &plan.passes),
-                Work::Rounded(backend) => backend.run(&mut self.problem, &plan.passes)?,
+                Work::Rounded(backend) => backend.run_checked(CheckedStep::built(&mut self.problem, &plan.passes))?,
             }
             // Right after a restart nothing depends on the velocities of the sweep before. Begun anew, it is one, too.
             let is_new = self.since == if self.method == Method::Plain { DRIFT_SWEEPS } else { LONGEST_MOMENTUM };

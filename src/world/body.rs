@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::shape::{Shape, pose};
+use super::{MOST_LENGTH, MOST_SPEED, is_place};
 use crate::error::{Error, Result};
 
 /// Who decides how a body moves.
@@ -296,28 +297,66 @@ impl Body {
 
     /// Refuses what no step can be made of.
     pub(super) fn check(&self) -> Result<()> {
+        self.check_motion()?;
+        self.check_shapes()?;
+        self.check_surface()
+    }
+
+    fn check_motion(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::input(what));
-        if !self.is_finite() || !self.force.is_finite() {
-            return refuse("pose, velocity and force must be finite".into());
+        if !is_place(self.position) {
+            return refuse(format!("position = {}: must be at most {MOST_LENGTH:e} m in size", self.position));
         }
-        if (self.rotation.length() - 1.0).abs() > 1e-3 {
+        if !((self.rotation.length() - 1.0).abs() <= 1e-3) {
             return refuse(format!("rotation = {}: must have unit length", self.rotation));
         }
+        for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
+            if !v.abs().cmple(Vec3::splat(MOST_SPEED)).all() {
+                return refuse(format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size"));
+            }
+        }
+        if !self.force.is_finite() {
+            return refuse(format!("force = {}: must be finite", self.force));
+        }
+        Ok(())
+    }
+
+    fn check_shapes(&self) -> Result<()> {
+        for (k, Collider { shape, position, rotation }) in self.colliders.iter().enumerate() {
+            let refuse = |what: String| Err(Error::input(format!("shapes[{k}]: {what}")));
+            shape.check().map_err(|e| e.within(format_args!("shapes[{k}]")))?;
+            if !is_place(*position) {
+                return refuse(format!("position = {position}: must be at most {MOST_LENGTH:e} m in size"));
+            }
+            if !((rotation.length() - 1.0).abs() <= 1e-3) {
+                return refuse(format!("rotation = {rotation}: must have unit length"));
+            }
+            if self.kind == BodyKind::Kinematic && shape.is_half_space() {
+                return refuse("half-spaces are for fixed bodies".into());
+            }
+            if self.kind == BodyKind::Dynamic && !shape.has_volume() {
+                return refuse("half-spaces, meshes and height fields have no mass: not for dynamic bodies".into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a mass or a material that no step can be made of.
+    pub(super) fn check_surface(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::input(what));
         let Material { friction, restitution } = self.material;
         if !(friction >= 0.0 && friction.is_finite() && (0.0..=1.0).contains(&restitution)) {
             return refuse(format!(
                 "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
             ));
         }
-        let is_plane = |c: &Collider| c.shape.as_half_space().is_some();
-        if self.kind == BodyKind::Kinematic && self.colliders.iter().any(is_plane) {
-            return refuse("half-spaces are for fixed bodies".into());
+        let MassProperties { mass, center, principal_inertia, principal_frame } = self.mass;
+        if !is_place(center) || !((principal_frame.length() - 1.0).abs() <= 1e-3) {
+            return refuse(format!(
+                "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
+            ));
         }
-        if self.kind == BodyKind::Dynamic && self.colliders.iter().any(|c| !c.shape.has_volume()) {
-            return refuse("half-spaces, meshes and height fields have no mass: not for dynamic bodies".into());
-        }
-        let MassProperties { mass, principal_inertia, .. } = self.mass;
-        let has_mass = |x: f32| x > 0.0 && x.is_finite();
+        let has_mass = |x: f32| x > 0.0 && x.is_finite() && x.recip().is_finite();
         if self.kind == BodyKind::Dynamic && !(has_mass(mass) && principal_inertia.to_array().into_iter().all(has_mass))
         {
             return refuse(format!(

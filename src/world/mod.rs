@@ -17,6 +17,18 @@ use glam::Vec3;
 
 use crate::error::{Error, Result};
 
+/// Largest coordinate and size [m]: its cube is still a number in single precision.
+pub const MOST_LENGTH: f32 = 1e9;
+/// Fastest that a body may begin with [m/s], [rad/s].
+pub const MOST_SPEED: f32 = 1e9;
+/// Largest acceleration of gravity along an axis [m/s²].
+pub const MOST_GRAVITY: f32 = 1e9;
+
+/// Whether a point has coordinates that are numbers and not too large.
+fn is_place(point: Vec3) -> bool {
+    point.abs().cmple(Vec3::splat(MOST_LENGTH)).all()
+}
+
 /// A set of rigid bodies under one gravity.
 #[derive(Clone, Debug)]
 pub struct World {
@@ -102,24 +114,46 @@ impl World {
         self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
     }
 
-    /// Refuses what no step can be made of: numbers that are not finite, dynamic bodies without mass, moving bodies with shapes
-    /// that only fixed ones can have, joints to bodies that are not there.
+    /// Refuses what no step can be made of: numbers that are not finite or out of range, shapes without extent, dynamic bodies
+    /// without mass, moving bodies with shapes that only fixed ones can have, joints to bodies that are not there.
     ///
     /// # Errors
-    /// One line that names the body, or the joint.
+    /// One line that names the body and its shape, or the joint.
     pub fn check(&self) -> Result<()> {
-        if !self.gravity.is_finite() {
-            return Err(Error::input(format!("gravity = {}: must be finite", self.gravity)));
-        }
+        self.check_gravity()?;
         if let Some(k) = self.parts().position(|part| part.start > part.end || part.end > self.bodies.len()) {
             return Err(Error::input(format!(
                 "world {k}: begins or ends beyond the last of {} bodies",
                 self.bodies.len()
             )));
         }
-        for (i, body) in self.bodies.iter().enumerate() {
-            body.check().map_err(|e| Error::input(format!("body {i} {:?}: {e}", body.name)))?;
+        self.check_bodies(Body::check)?;
+        self.check_joints()
+    }
+
+    /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
+    pub(crate) fn check_gravity(&self) -> Result<()> {
+        if self.gravity.abs().cmple(Vec3::splat(MOST_GRAVITY)).all() {
+            return Ok(());
         }
+        let gravity = self.gravity;
+        Err(Error::input(format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis")))
+    }
+
+    /// Refuses masses and materials that no step can be made of.
+    pub(crate) fn check_surfaces(&self) -> Result<()> {
+        self.check_bodies(Body::check_surface)
+    }
+
+    fn check_bodies(&self, check: impl Fn(&Body) -> Result<()>) -> Result<()> {
+        for (i, body) in self.bodies.iter().enumerate() {
+            check(body).map_err(|e| e.within(format_args!("body {i} {:?}", body.name)))?;
+        }
+        Ok(())
+    }
+
+    /// Refuses joints to bodies that are not there, and anchors that are no points.
+    pub(crate) fn check_joints(&self) -> Result<()> {
         for (i, joint) in self.joints.iter().enumerate() {
             let bodies = self.bodies.len();
             if joint.body_a >= bodies || joint.body_b.is_some_and(|b| b >= bodies) {
@@ -128,8 +162,8 @@ impl World {
             if joint.body_b == Some(joint.body_a) {
                 return Err(Error::input(format!("joint {i}: ties body {} to itself", joint.body_a)));
             }
-            if !(joint.anchor_a.is_finite() && joint.anchor_b.is_finite()) {
-                return Err(Error::input(format!("joint {i}: its anchors must be finite")));
+            if ![joint.anchor_a, joint.anchor_b].into_iter().all(is_place) {
+                return Err(Error::input(format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size")));
             }
         }
         Ok(())

@@ -4,8 +4,9 @@ use std::fmt;
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
-use parry3d::shape::{SharedShape, TriMeshFlags};
+use parry3d::shape::{SharedShape, TriMeshFlags, TypedShape};
 
+use super::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result};
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
@@ -68,12 +69,18 @@ impl Shape {
     /// A triangle mesh: vertices [m] and counter-clockwise triangles seen from outside.
     ///
     /// # Errors
-    /// No triangle, or an index that names no vertex.
+    /// No triangle, an index that names no vertex, or a vertex that is no point.
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
             return Err(Error::input(format!(
                 "mesh triangle {t:?} names a vertex beyond the last, {}",
                 vertices.len()
+            )));
+        }
+        if let Some(k) = vertices.iter().position(|&v| !is_place(v)) {
+            return Err(Error::input(format!(
+                "mesh vertex {k}, {}: must be at most {MOST_LENGTH:e} m in size",
+                vertices[k]
             )));
         }
         let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
@@ -85,16 +92,60 @@ impl Shape {
     /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` [m].
     ///
     /// # Errors
-    /// Fewer than two rows or columns, or rows of unequal length.
+    /// Fewer than two rows or columns, rows of unequal length, or a height or scale that is no length.
     pub fn height_field(heights: &[Vec<f32>], scale: Vec3) -> Result<Self> {
         let rows = heights.len();
         let columns = heights.first().map_or(0, Vec::len);
         if rows < 2 || columns < 2 || heights.iter().any(|r| r.len() != columns) {
             return Err(Error::input("a height field needs at least 2 rows of equal length with at least 2 heights"));
         }
+        let is_height = |h: &f32| (h * scale.y).abs() <= MOST_LENGTH;
+        if !(is_place(scale) && scale.min_element() > 0.0 && heights.iter().flatten().all(is_height)) {
+            return Err(Error::input(format!(
+                "a height field, scaled by {scale}: must be at most {MOST_LENGTH:e} m in size"
+            )));
+        }
         // parry stores columns one after another.
         let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
         Ok(Self(SharedShape::heightfield(parry3d::utils::Array2::new(rows, columns, data), scale)))
+    }
+
+    /// Refuses a shape without extent, one larger than [`MOST_LENGTH`], or one whose numbers are none.
+    ///
+    /// # Errors
+    /// One line that names the shape, the number and its range.
+    pub(super) fn check(&self) -> Result<()> {
+        let sizes = |kind: &str, sizes: &[(&str, f32)]| match sizes.iter().find(|s| !(s.1 > 0.0 && s.1 <= MOST_LENGTH))
+        {
+            None => Ok(()),
+            Some((name, size)) => {
+                Err(Error::input(format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m")))
+            }
+        };
+        match self.0.as_typed_shape() {
+            TypedShape::Ball(ball) => sizes("ball", &[("radius", ball.radius)]),
+            TypedShape::Cuboid(cuboid) => {
+                let [x, y, z] = cuboid.half_extents.to_array();
+                sizes("cuboid", &[("half extent", x), ("half extent", y), ("half extent", z)])
+            }
+            TypedShape::Capsule(c) => sizes("capsule", &[("half height", c.half_height()), ("radius", c.radius)]),
+            TypedShape::Cylinder(c) => sizes("cylinder", &[("half height", c.half_height), ("radius", c.radius)]),
+            TypedShape::Cone(c) => sizes("cone", &[("half height", c.half_height), ("radius", c.radius)]),
+            TypedShape::HalfSpace(plane) if (plane.normal.length() - 1.0).abs() <= 1e-3 => Ok(()),
+            TypedShape::HalfSpace(plane) => {
+                let (normal, length) = (plane.normal, plane.normal.length());
+                Err(Error::input(format!("half-space of normal {normal}: must have length 1, but has length {length}")))
+            }
+            _ => {
+                let extents = self.0.compute_local_aabb();
+                match is_place(extents.mins) && is_place(extents.maxs) {
+                    true => Ok(()),
+                    false => {
+                        Err(Error::input(format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size")))
+                    }
+                }
+            }
+        }
     }
 
     /// Whether the shape has a finite volume, so that a body with it can have mass from density.

@@ -73,10 +73,10 @@ impl Groups {
         let (points, impulses) = (Shared::new(&mut self.points), Shared::new(impulses));
         let (len, all) = (self.all.len(), Shared::new(&mut self.all));
         crew.spread(0..len, &|range| {
-            // SAFETY: tasks have different groups.
+            // SAFETY: tasks have different groups: `Crew::spread` cuts their range.
             for group in unsafe { all.slice(range) } {
                 let rows = group.first_point as usize..(group.first_point + group.points) as usize;
-                // SAFETY: groups have different points.
+                // SAFETY: `deal` gives each group points of its own.
                 let (points, impulses) = unsafe { (points.slice(rows.clone()), impulses.slice(rows)) };
                 group.fill(problem, &parts.slots, points, impulses);
             }
@@ -93,7 +93,8 @@ impl Groups {
                     for k in 0..group.points as usize {
                         let wide = &impulses[group.first_point as usize + k];
                         let [normal, tangent_1, tangent_2, peak] = [0, 1, 2, 3].map(|i| wide[i].0[lane]);
-                        // SAFETY: a contact is in one lane of one group, and its impulses are its own.
+                        // SAFETY: `deal` puts each contact into one lane of one group, and `CheckedStep` holds that contacts
+                        // have different points.
                         unsafe { to_problem.write(to + k, ImpulseRow { normal, tangent_1, tangent_2, peak }) };
                     }
                 }
@@ -108,7 +109,7 @@ impl Groups {
         let factor = Portable::constant(factor.into());
         let (impulses, steps) = (Shared::new(impulses), Shared::new(&mut self.steps));
         crew.spread(0..len, &|range| {
-            // SAFETY: tasks have different impulses.
+            // SAFETY: tasks have different impulses: `Crew::spread` cuts their range.
             let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
             for (impulse, step) in impulses.iter_mut().zip(steps) {
                 let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
@@ -134,7 +135,7 @@ impl Groups {
                     let (square, along) = (square.store(), along.store());
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                         let to = problem.contacts[row as usize].first_point as usize + k;
-                        // SAFETY: a contact is in one lane of one group, and its points are its own.
+                        // SAFETY: as in `store`.
                         unsafe { lengths.write(to, StepLength { square: square.0[lane], along: along.0[lane] }) };
                     }
                 }
@@ -158,7 +159,7 @@ impl Groups {
             for cell in range {
                 let mut count = [0; 4];
                 dealt.rows(cell).iter().for_each(|&row| count[count_of(row)] += 1);
-                // SAFETY: tasks have different cells.
+                // SAFETY: tasks have different cells: `Crew::spread_parts` cuts their range.
                 unsafe { counts.write(cell, count) };
             }
         });
@@ -186,7 +187,7 @@ impl Groups {
                     if lane == 0 {
                         (open[k], next) = (next, next + 1);
                     }
-                    // SAFETY: cells have different groups.
+                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different cells.
                     let group = unsafe { &mut all.slice(open[k]..open[k] + 1)[0] };
                     if lane == 0 {
                         (group.first_point, group.points) = (next_point, k as u32 + 1 + patch);

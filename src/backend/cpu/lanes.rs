@@ -9,7 +9,7 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::super::Backend;
+use super::super::{Backend, CheckedStep};
 use super::begin_sweep;
 use super::crew::Crew;
 use super::groups::Groups;
@@ -288,7 +288,8 @@ impl Backend for Cpu {
         format!("{threads} thread{plural}, {WIDTH} lanes, {}", self.instructions.name())
     }
 
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
         let widest = problem.bodies.len().max(problem.contacts.len()).max(problem.joints.len()).div_ceil(WIDTH);
         Crew::lead(widest, |crew| {
             self.load(problem, crew);

@@ -1,6 +1,6 @@
 //! The CPU reference: one thread, one constraint at a time, in the order of the plan.
 
-use super::super::Backend;
+use super::super::{Backend, CheckedStep};
 use super::begin_sweep;
 use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
@@ -212,7 +212,8 @@ impl<S: Scalar> Backend for Reference<S> {
         format!("one thread, scalar f{}", 8 * size_of::<S>())
     }
 
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
         self.rows.load(problem);
         self.convergence = problem.convergence;
         self.advance(problem, passes);

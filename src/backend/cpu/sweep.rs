@@ -152,7 +152,7 @@ pub(super) fn load_bodies(
         let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[i]);
         let state = State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) };
         let [x, y, z] = problem.masses[i].acceleration;
-        // SAFETY: bodies have different slots.
+        // SAFETY: tasks have different bodies (`in_groups` cuts their range), and `Parts::give_slots` gives each a slot of its own.
         unsafe {
             states.write(slots[i] as usize, state);
             accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]));
@@ -165,7 +165,7 @@ pub(super) fn store_bodies(states: &[State], slots: &[u32], range: Range<usize>,
     for i in range {
         let State { velocity, movement, .. } = &states[slots[i] as usize];
         let both = [velocity.0, movement.0];
-        // SAFETY: tasks have different bodies.
+        // SAFETY: tasks have different bodies: `in_groups` cuts their range.
         unsafe { rows.write(i, bytemuck::cast(both)) };
     }
 }
@@ -186,15 +186,15 @@ impl Work for BodyWork<'_> {
         let params = wide_params::<L>(self.params);
         for group in groups {
             let range = WIDTH * group..WIDTH * (group + 1);
-            // SAFETY: tasks have different groups, and so different bodies.
+            // SAFETY: tasks have different groups of slots: `Crew::spread` cuts their range.
             let states = unsafe { self.bodies.slice(range.clone()) };
-            // SAFETY: there are sixteen.
+            // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
             let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
             if let Kernel::IntegrateVelocities { carry } = self.kernel {
                 let accelerations = &self.accelerations[range.clone()];
                 // SAFETY: as above.
                 let rows = unsafe { self.free.slice(range) };
-                // SAFETY: there are sixteen of each.
+                // SAFETY: `NEIGHBORING_ROWS` are the places of the sixteen rows of each slice.
                 let (acceleration, free) = unsafe {
                     (
                         L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS),
@@ -221,7 +221,7 @@ impl Work for BodyWork<'_> {
 
 /// Forgets the impulses of some points; no other task has the same.
 pub(super) fn clear_impulses(impulses: &Shared<[Wide; 4]>, points: Range<usize>) {
-    // SAFETY: tasks have different points.
+    // SAFETY: tasks have different parts, and `Groups::points_of` gives each part points of its own.
     for impulse in unsafe { impulses.slice(points) } {
         impulse[..3].fill(Wide::default());
     }
@@ -236,7 +236,7 @@ pub(super) fn integrate_spins(
 ) {
     let params = StepParams::load(params);
     for (slot, inertia) in inertias {
-        // SAFETY: tasks have different bodies.
+        // SAFETY: one task has all spins of a part, and `Parts::give_slots` gives each part slots of its own.
         let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
         let (mut body, [vx, vy, vz, _, wx, wy, wz, _]) = (state.load(), row.0);
         let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
@@ -254,7 +254,7 @@ pub(super) fn extrapolate_velocities(
     before: &Shared<Row8>,
     range: Range<usize>,
 ) {
-    // SAFETY: tasks have different bodies.
+    // SAFETY: tasks have different slots: `Crew::spread` cuts their range.
     let (bodies, before) = unsafe { (bodies.slice(range.clone()), before.slice(range)) };
     for (body, before) in bodies.iter_mut().zip(before) {
         let now = body.velocity;
@@ -293,13 +293,14 @@ impl ContactWork<'_> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &Group) {
         let states = self.bodies.as_ptr();
-        // SAFETY: `Bodies::set` asked whether they are there. One that this color writes is in this group only, and the others
-        // nobody writes.
+        // SAFETY: `Bodies::set` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep` holds
+        // that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
         let rules = self.kernel.rules().unwrap_or_default();
         let rows = group.first_point as usize..(group.first_point + group.points) as usize;
         // Used where they lie: copied, they are most of what a sweep moves.
-        // SAFETY: the rows of lanes are `repr(C)` and hold nothing else; the impulses of a group are its own.
+        // SAFETY: `Contact`, `Point` and `Impulse` are `repr(C)` and hold lanes only; `Groups::deal` gives each group points, and so
+        // impulses, of its own.
         let (contact, points, impulses) = unsafe {
             let contact: &[Contact<L>] = as_lanes(std::slice::from_ref(&group.contact));
             let points: &[Point<L>] = as_lanes(&self.points[rows.clone()]);
@@ -345,11 +346,11 @@ impl JointWork<'_> {
         let states = self.bodies.as_ptr();
         // SAFETY: as of contacts.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
-        // SAFETY: the rows of lanes are `repr(C)` and hold nothing else.
+        // SAFETY: `Joint` is `repr(C)` and holds lanes only.
         let joint: &Joint<L> = unsafe { &as_lanes(std::slice::from_ref(&group.joint))[0] };
         let mut rows = [Wide::default(); 3];
         for (lane, &row) in group.rows.iter().enumerate().filter(|(_, row)| **row != NO_ROW) {
-            // SAFETY: a joint is in one lane of one group, and its impulse is its own.
+            // SAFETY: `JointGroups::load` puts each joint into one lane of one group, and tasks have different groups.
             let impulse = unsafe { self.impulses.slice(row as usize..row as usize + 1) }[0];
             (rows[0].0[lane], rows[1].0[lane], rows[2].0[lane]) = (impulse.x, impulse.y, impulse.z);
         }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::shader::{self, Program};
 use super::timer::Timer;
 use super::{Dispatch, Gpu};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::problem::carry::{Carry, NO_ROW, Preload};
 use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
 
@@ -70,6 +70,7 @@ impl Gpu {
             return Ok(first);
         }
         if !carry.rows_before.is_empty() {
+            check_places(problem, carry, before)?;
             self.send_places(problem, carry, before)?;
             first.push(Dispatch::over(Program::CarryContacts, problem.contacts.len()));
         }
@@ -141,6 +142,24 @@ impl Gpu {
         }
         self.rows = Some(Rows { fetched: true, ..rows });
         Ok(())
+    }
+}
+
+/// Refuses places in the step before that were not there: kernels would read other rows in their place.
+fn check_places(problem: &StepProblem, carry: &Carry, before: Rows) -> Result<()> {
+    let was = |row: u32, rows: usize| row == NO_ROW || (row as usize) < rows;
+    let contacts = problem.contacts.len();
+    let new = carry.rows_before.iter().filter(|&&row| row == NO_ROW).count();
+    let rows = carry.rows_before.len() == contacts && carry.rows_before.iter().all(|&row| was(row, before.contacts));
+    let mut origins = carry.computed.iter();
+    let computed = new == carry.computed.len()
+        && origins.all(|origin| {
+            let points = origin.points.iter().all(|&row| was(row, before.points));
+            (origin.row as usize) < contacts && was(origin.contact, before.contacts) && points
+        });
+    match rows && computed {
+        true => Ok(()),
+        false => Err(Error::input("carry: names rows that were not in the step before")),
     }
 }
 

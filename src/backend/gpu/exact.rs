@@ -53,11 +53,11 @@ pub(super) fn shader_module(device: &wgpu::Device, reflected: &Reflected) -> Res
         spirv: Some(spirv.into()),
         ..Default::default()
     };
-    // SAFETY: the driver takes these words unseen, so that they must be valid and must stay inside the buffers that are bound.
-    // They are valid: naga wrote them from a module that it validated, and `without_contraction` adds decorations only. They stay
-    // inside: `Reflected::exact_spirv` lets naga bound every index by the length of its buffer, whatever a problem's rows and a
-    // pass's colors say (`tests/shaders.rs` looks at every index), and bound every loop. `Programs::prepare` makes the layout of
-    // the bindings from the same module.
+    // SAFETY: the driver takes these words unseen, so that they must be valid and their indices must stay inside the buffers that
+    // are bound. They are valid: naga wrote them from a module that it validated, and `without_contraction` adds decorations only.
+    // Indices stay inside: those of a problem's rows and a pass's colors name rows that are there, which `CheckedStep` keeps; and
+    // `Reflected::exact_spirv` lets naga bound every index by the length of its buffer, whatever the rows say, which
+    // `tests/shaders.rs` keeps. `Programs::prepare` makes the layout of the bindings from the same module.
     Ok(unsafe { device.create_shader_module_passthrough(descriptor) })
 }
 

@@ -26,7 +26,7 @@ pub use carry::CarryParams;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use super::Backend;
+use super::{Backend, CheckedStep};
 use crate::error::{Error, Result};
 use crate::kernels::momentum::{CHUNK, StepLength};
 use crate::plan::{Kernel, Pass};
@@ -300,7 +300,8 @@ impl Backend for Gpu {
         format!("{}{}", self.summary, if self.exact { ", exact" } else { "" })
     }
 
-    fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
         self.rows = None;
         self.send_all(problem, passes)?;
         let encoder = self.encoded(problem, Vec::new(), passes, false)?;
@@ -312,7 +313,8 @@ impl Backend for Gpu {
         finished
     }
 
-    fn step(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
+    fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
+        let (problem, passes) = step.into_parts();
         self.follow(problem, passes, carry)
     }
 

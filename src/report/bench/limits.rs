@@ -65,7 +65,7 @@ const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
 pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
     let config = SolverConfig::default();
     let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;
-    let problem = simulation.next_problem(dt).0.clone();
+    let problem = simulation.next_problem(dt)?.0;
     let pools: Result<Vec<_>> = threads
         .iter()
         .map(|&t| rayon::ThreadPoolBuilder::new().num_threads(t).build().map_err(|e| Error::input(format!("{t}: {e}"))))

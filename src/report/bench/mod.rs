@@ -276,10 +276,9 @@ fn middle(values: impl Iterator<Item = f64>, q: f64) -> f64 {
 
 /// How far the impulses of the next step are from solving its first substep when that ends; takes that step.
 fn residual(simulation: &mut Simulation, dt: f32) -> Option<f64> {
-    let (problem, plan) = simulation.next_problem(dt);
+    let (mut problem, plan) = simulation.next_problem(dt).ok()?;
     let begins = |p: &crate::plan::Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
     let end = plan.passes.iter().skip(1).position(begins).map_or(plan.passes.len(), |i| i + 1);
-    let mut problem = problem.clone();
     Reference::<f32>::new().run(&mut problem, &plan.passes[..end]).ok()?;
     let of_contact = |row: &crate::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;

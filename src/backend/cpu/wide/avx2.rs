@@ -125,6 +125,7 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
+        // SAFETY: the caller promises that a row is at each of the places.
         let r: [__m256; WIDTH] = lanes!(lane => unsafe { _mm256_load_ps(row_at(rows, places[lane]).cast()) });
         let s = transposed([r[8], r[9], r[10], r[11], r[12], r[13], r[14], r[15]]);
         let r = transposed([r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]]);

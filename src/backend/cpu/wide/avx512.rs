@@ -116,11 +116,17 @@ impl Lanes for Avx512 {
     }
     #[inline(always)]
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
+        // SAFETY: the caller promises that a row is at each of the places.
         let r: [*const Row8; WIDTH] = lanes!(lane => unsafe { row_at(rows, places[lane]) });
         // Quarters of a register never meet before the last line, so the rows that are four apart share one.
-        let [b0, b1, b2, b3] = transposed([both(r[0], r[4]), both(r[1], r[5]), both(r[2], r[6]), both(r[3], r[7])]);
-        let [b4, b5, b6, b7] =
-            transposed([both(r[8], r[12]), both(r[9], r[13]), both(r[10], r[14]), both(r[11], r[15])]);
+        // SAFETY: as above.
+        let (first, second) = unsafe {
+            (
+                [both(r[0], r[4]), both(r[1], r[5]), both(r[2], r[6]), both(r[3], r[7])],
+                [both(r[8], r[12]), both(r[9], r[13]), both(r[10], r[14]), both(r[11], r[15])],
+            )
+        };
+        let ([b0, b1, b2, b3], [b4, b5, b6, b7]) = (transposed(first), transposed(second));
         unsafe {
             [
                 Self(_mm512_shuffle_f32x4::<0x88>(b0, b4)),
@@ -157,8 +163,12 @@ impl Lanes for Avx512 {
 }
 
 /// Two rows in one register.
+///
+/// # Safety
+/// A row is at both addresses, and no thread writes it meanwhile.
 #[inline(always)]
-fn both(low: *const Row8, high: *const Row8) -> __m512 {
+unsafe fn both(low: *const Row8, high: *const Row8) -> __m512 {
+    // SAFETY: the caller's promise; rows are aligned to 32 bytes.
     unsafe {
         let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_load_ps(low.cast())));
         _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_load_ps(high.cast()))))

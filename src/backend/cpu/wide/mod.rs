@@ -42,7 +42,7 @@ pub trait Lanes: Lane {
     /// From rows of sixteen bodies, number by number. Where each row is, in units of 8 bytes from `rows`, say `places`.
     ///
     /// # Safety
-    /// The rows are there, and nobody writes them meanwhile.
+    /// A row is at each of the places, and no thread writes it meanwhile.
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8];
     /// To sixteen rows.
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH];
@@ -51,7 +51,7 @@ pub trait Lanes: Lane {
 /// The row at a place.
 ///
 /// # Safety
-/// It is there.
+/// `place` is where a row of the allocation of `rows` begins.
 #[inline(always)]
 pub(super) unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
     // SAFETY: the caller's promise. Indices of the processor count in eights.

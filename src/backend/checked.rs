@@ -1,0 +1,63 @@
+//! The boundary between problems that anybody may have made and backends that rely on them.
+
+use crate::error::{Error, Result};
+use crate::plan::{Kernel, Pass};
+use crate::problem::StepProblem;
+
+/// A problem and passes over it that keep what backends rely on: every index names a row that is there, no two constraints of a
+/// color have a body in common that can move, and every pass goes over colors that are there.
+///
+/// Threads of the CPU write bodies without locks because of this. On a GPU rows are those that are meant, because of this; shaders
+/// stay inside their buffers whatever the rows say.
+#[derive(Debug)]
+pub struct CheckedStep<'a> {
+    problem: &'a mut StepProblem,
+    passes: &'a [Pass],
+}
+
+impl<'a> CheckedStep<'a> {
+    /// Checks a problem and passes over it.
+    ///
+    /// # Errors
+    /// One line that names the row and the field.
+    pub fn new(problem: &'a mut StepProblem, passes: &'a [Pass]) -> Result<Self> {
+        problem.check()?;
+        check_passes(problem, passes)?;
+        Ok(Self { problem, passes })
+    }
+
+    /// What the simulation built. Its stages keep the same promises: `graph` gives the colors, `problem` lays out the rows, `plan`
+    /// makes the passes, and `Simulation::step` has checked the indices of bodies and joints.
+    pub(crate) fn built(problem: &'a mut StepProblem, passes: &'a [Pass]) -> Self {
+        Self { problem, passes }
+    }
+
+    /// The problem, to be solved in place, and the passes.
+    pub fn into_parts(self) -> (&'a mut StepProblem, &'a [Pass]) {
+        (self.problem, self.passes)
+    }
+}
+
+/// Refuses passes over colors that are not there, and passes with patches over rows without them or the other way round.
+fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
+    let (contacts, joints) = (problem.contact_colors(), problem.joint_colors());
+    for (i, Pass { kernel, colors }) in passes.iter().enumerate() {
+        let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));
+        let known = match kernel {
+            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => &contacts,
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => &joints,
+            _ => &(0..0),
+        };
+        if colors.start > colors.end || !colors.is_empty() && !(known.start <= colors.start && colors.end <= known.end)
+        {
+            return refuse(format!("colors {colors:?}: there are {known:?}"));
+        }
+        let over_contacts =
+            matches!(kernel, Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_));
+        let patch = kernel.rules().is_some_and(|rules| rules.patch);
+        if over_contacts && !problem.contacts.is_empty() && patch != problem.has_patches() {
+            return refuse(format!("patch = {patch}: the contacts of this problem say otherwise"));
+        }
+    }
+    Ok(())
+}

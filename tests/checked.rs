@@ -1,0 +1,154 @@
+//! Problems that anybody may have made are checked before threads or drivers rely on them.
+
+use drystone::backend::CheckedStep;
+use drystone::plan::{Kernel, Pass};
+use drystone::problem::InertiaRow;
+use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+
+/// The problem of a step with contacts, joints and spins, and its plan.
+fn step(settings: &[&str]) -> (StepProblem, StepPlan) {
+    let mut config = SolverConfig::default();
+    settings.iter().for_each(|s| config.set(s).expect("a setting"));
+    let scene = Scene::find("bridge", &[]).expect("the scene");
+    let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
+    for _ in 0..60 {
+        simulation.step(scene.dt).expect("a step");
+    }
+    let (problem, plan) = simulation.next_problem(scene.dt).expect("a step");
+    assert!(!problem.contacts.is_empty() && !problem.joints.is_empty() && !problem.inertias.is_empty());
+    (problem, plan)
+}
+
+fn refusal(mut problem: StepProblem, passes: &[Pass]) -> Option<String> {
+    let line = CheckedStep::new(&mut problem, passes).err().map(|e| e.to_string());
+    // Every backend refuses it, in the same words, and leaves it as it is.
+    for mut backend in [Box::new(Cpu::new()) as Box<dyn Backend>, Box::new(Reference::<f32>::new())] {
+        if line.is_some() {
+            let before = problem.clone();
+            assert_eq!(backend.run(&mut problem, passes).err().map(|e| e.to_string()), line);
+            assert_eq!(before, problem);
+        }
+    }
+    line
+}
+
+#[test]
+fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
+    let rules: [&[&str]; 6] = [
+        &[],
+        &["friction_at=manifold"],
+        &["friction_at=manifold", "friction=none"],
+        &["max_colors=1"],
+        &["method=accelerated", "iterations=5", "tolerance=0.01"],
+        &["stabilization=baumgarte", "relax=0", "clamping=per-correction"],
+    ];
+    for name in ["pile:n=60", "drop", "bridge", "joint-grid", "drum", "slide:mu=0", "chain:worlds=3", "rolling"] {
+        for rule in rules {
+            let scene = Scene::find_spec(name).expect("the scene");
+            let mut config = SolverConfig { sleep_after: 0.2, ..SolverConfig::default() };
+            rule.iter().for_each(|s| config.set(s).expect("a setting"));
+            let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
+            for step in 0..60 {
+                simulation.step(scene.dt).expect("a step");
+                let plan = simulation.plan().clone();
+                let mut problem = simulation.problem().clone();
+                let checked = CheckedStep::new(&mut problem, &plan.passes);
+                assert!(checked.is_ok(), "{name} {rule:?} step {step}: {checked:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_there_is_refused_by_row_and_field() {
+    let (problem, plan) = step(&[]);
+    assert_eq!(refusal(problem.clone(), &plan.passes), None);
+    let bodies = problem.bodies.len() as u32;
+    type Break = fn(&mut StepProblem, u32);
+    let cases: [(&str, Break); 21] = [
+        ("masses: ", |p, _| p.masses.truncate(1)),
+        ("impulses: ", |p, _| p.impulses.truncate(1)),
+        ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
+        ("params.body_count: ", |p, _| p.params.body_count += 1),
+        ("params.point_count: ", |p, _| p.params.point_count += 1),
+        ("params.joint_count: ", |p, _| p.params.joint_count += 1),
+        ("params.inertia_count: ", |p, _| p.params.inertia_count += 1),
+        ("contacts[1]: bodies", |p, n| p.contacts[1].body_b = n),
+        ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
+        ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
+        ("inertias[0]: body", |p, n| p.inertias[0].body = n),
+        ("inertias[1]: body", |p, _| p.inertias[1] = InertiaRow { ..p.inertias[0] }),
+        ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),
+        ("contacts[0].point_count = 5", |p, _| p.contacts[0].point_count = 5),
+        ("contacts[1].first_point", |p, _| p.contacts[1].first_point += 1),
+        ("contacts[1].first_point", |p, _| {
+            // One point more is taken for a patch, which every other contact lacks.
+            (p.points.push(p.points[0]), p.impulses.push(p.impulses[0]));
+            p.params.point_count += 1;
+        }),
+        ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32 + 1),
+        ("colors of contacts", |p, _| p.colors[1] = u32::MAX),
+        ("colors of contacts", |p, _| p.colors[0] = 1),
+        ("colors of joints", |p, _| *p.colors.last_mut().expect("joints") += 1),
+        ("color 0: body", |p, _| {
+            // All contacts in one color.
+            p.colors.splice(1..p.first_joint_color as usize - 1, []);
+            p.first_joint_color = 2;
+        }),
+    ];
+    for (start, spoil) in cases {
+        let mut broken = problem.clone();
+        spoil(&mut broken, bodies);
+        let line = refusal(broken, &plan.passes).unwrap_or_else(|| panic!("{start}: was taken"));
+        let known = line.starts_with(&format!("step problem: {start}"));
+        assert!(known && !line.contains('\n'), "{start}: {line}");
+    }
+}
+
+#[test]
+fn a_joint_color_with_a_body_twice_is_refused() {
+    let (mut problem, plan) = step(&[]);
+    let first = problem.first_joint_color as usize;
+    problem.colors.truncate(first + 1);
+    problem.colors.push(problem.joints.len() as u32);
+    let line = refusal(problem, &plan.passes[..1]).expect("refused");
+    assert!(line.contains("occurs twice, and can move"), "{line}");
+}
+
+#[test]
+fn passes_over_colors_that_are_not_there_are_refused() {
+    let (problem, plan) = step(&[]);
+    let of = |wanted: fn(Kernel) -> bool| plan.passes.iter().position(|p| wanted(p.kernel)).expect("a pass");
+    let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
+    let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));
+    let bodies = of(|k| matches!(k, Kernel::IntegratePositions));
+    let all = problem.colors.len() as u32;
+    #[allow(clippy::reversed_empty_ranges)]
+    for (pass, colors) in [
+        (contacts, 0..problem.first_joint_color),
+        (contacts, problem.first_joint_color..problem.first_joint_color + 1),
+        (contacts, 2..1),
+        (joints, 0..1),
+        (joints, problem.first_joint_color..all),
+        (bodies, 0..1),
+    ] {
+        let mut passes = plan.passes.clone();
+        passes[pass].colors = colors.clone();
+        let line = refusal(problem.clone(), &passes).unwrap_or_else(|| panic!("pass {pass}, {colors:?}: was taken"));
+        assert!(line.starts_with(&format!("pass {pass}, ")) && line.contains("there are"), "{line}");
+    }
+}
+
+#[test]
+fn a_pass_with_patches_over_rows_without_is_refused_and_the_other_way_round() {
+    let (without, plan) = step(&[]);
+    let (with, patched) = step(&["friction_at=manifold"]);
+    assert_eq!(refusal(with.clone(), &patched.passes), None);
+    for (problem, passes) in [(without, patched.passes), (with, plan.passes)] {
+        // The colors may differ as well: only the first pass over contacts counts here.
+        let first = passes.iter().find(|p| matches!(p.kernel, Kernel::WarmStart(_) | Kernel::SolveContacts(_)));
+        let pass = Pass { colors: 0..1, ..first.expect("a pass").clone() };
+        let line = refusal(problem, &[pass]).expect("refused");
+        assert!(line.contains("patch = "), "{line}");
+    }
+}
