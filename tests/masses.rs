@@ -37,7 +37,7 @@ fn pendulums(angle: f32) -> World {
     world
 }
 
-/// 600 steps of 1/240 s are five passes of the vertical: two periods. Measured 4e-4 off.
+/// Five passes of the vertical are two periods. Measured 2.7e-5 off.
 fn pendulums_of_all_masses_have_one_period(open: Open) {
     const DT: f32 = 1.0 / 240.0;
     let out = |world: &World, k: usize| f64::from(world.bodies[k].position.x - 5.0 * k as f32);
@@ -66,7 +66,7 @@ fn pendulums_of_all_masses_have_one_period(open: Open) {
     assert!(simulation.world.joint_gap() < 1e-4, "{} m", simulation.world.joint_gap());
 }
 
-/// What holds the lower ball is light by up to 1e16: what a joint of two such masses bears is the weight of the lower.
+/// A joint bears what hangs on it, where the upper ball is up to 1e30 times as heavy as the lower.
 fn a_light_ball_hangs_on_a_heavy_one(open: Open) {
     let pairs = [[1e7_f32, 1e-9], [1e7, 1.0], [1.0, 1e-9], [1e15, 1e-15]];
     let mut world = World::new();
@@ -95,7 +95,7 @@ fn a_light_ball_hangs_on_a_heavy_one(open: Open) {
     }
 }
 
-/// A cube that slides at 4 m/s: v²/(2 mu g). Measured 5e-4 off, of all masses alike.
+/// A cube that slides at 4 m/s: v²/(2 mu g). Measured 2.1e-3 off, of all masses alike.
 fn cubes_of_all_masses_slide_as_far(open: Open) {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.4));
@@ -128,6 +128,7 @@ fn lanes_have_the_bits_of_the_reference_at_all_masses() {
         bodies.iter().map(|b| [b.position, b.linear_velocity, b.angular_velocity].map(bits)).collect::<Vec<_>>()
     };
     let reference = run(Box::new(Reference::<f32>::new()));
+    assert!(reference.as_flattened().as_flattened().iter().all(|&x| f32::from_bits(x).is_finite()));
     for i in 0..Cpu::each().count() {
         let lanes = Cpu::each().nth(i).expect("counted");
         let name = lanes.adapter();
