@@ -153,9 +153,12 @@ impl Prepared {
         self.joint_rows.clear();
         // A joint holds bodies of one island, which are asleep together.
         let rests = |body: usize| asleep.get(body) == Some(&true);
+        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let is_awake = |i: u32| {
             let joint = &world.joints[i as usize];
-            !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
+            // One of two bodies that nothing moves has no block to solve.
+            (moves(joint.body_a) || joint.body_b.is_some_and(moves))
+                && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
         };
         for color in self.joint_coloring.offsets.windows(2) {
             problem.colors.push(self.joint_rows.len() as u32);
