@@ -102,7 +102,8 @@ impl World {
         self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
     }
 
-    /// Refuses what no step can be made of: numbers that are not finite, dynamic bodies without mass, moving bodies with shapes
+    /// Refuses what no step can be made of: numbers that are not finite, dynamic bodies without mass or with one out of
+    /// [`MassProperties::MASSES`], moving bodies with shapes
     /// that only fixed ones can have, joints to bodies that are not there.
     ///
     /// # Errors
