@@ -10,10 +10,49 @@ fn solve_3x3(row_0: vec3f, row_1: vec3f, row_2: vec3f, g: vec3f) -> vec3f {
     return (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0));
 }
 
+// One step of Newton's method on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
+fn newton_step(inertia: Inertia, h: f32, spin: vec3f, next: vec3f) -> vec3f {
+    let p = inertia.principal;
+    let k = inertia.inv_principal;
+    let m = (spin + next) * 0.5;
+    let l = p * m;
+    let residual = (next - spin) + k * (cross3(m, l) * h);
+    let f = k * (h * 0.5);
+    let row_0 = vec3f(1.0, f.x * (l.z - m.z * p.y), f.x * (m.y * p.z - l.y));
+    let row_1 = vec3f(f.y * (m.z * p.x - l.z), 1.0, f.y * (l.x - m.x * p.z));
+    let row_2 = vec3f(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), 1.0);
+    return next - solve_3x3(row_0, row_1, row_2, residual);
+}
+
+// Square of the angle [rad] up to which two Newton steps leave no more than rounding.
+const SLOW: f32 = 0.0625;
+
+// What integrate_gyroscopic adds to the angular velocity w of a body whose spin about its principal axes x, y, z is fast: its
+// square is (h W)^2.
+fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
+    var h = params.substep;
+    if square > 1.0 { h = params.substep * inverse_sqrt(square); }
+    var next = spin;
+    for (var step = 0u; step < 4u; step++) {
+        next = newton_step(inertia, h, spin, next);
+    }
+    let change = next - spin;
+    let turn = x * change.x + y * change.y + z * change.z;
+    // Axes that are not quite of unit length stretch a large change, always in the same sense: the energy E is set back, to
+    // E (3 - E)^2 / 4 of what it was, which is never above 1. A spin whose energy is no number stays.
+    let changed = w + turn;
+    let after = vec3f(dot3(x, changed), dot3(y, changed), dot3(z, changed));
+    let energy = dot3(inertia.principal * spin, spin);
+    let energy_after = dot3(inertia.principal * after, after);
+    let scale = (energy - energy_after) * reciprocal(energy + energy);
+    return select(vec3f(0.0), turn + changed * scale, 1.0 > scale * scale);
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var i = id.x; i < params.inertia_count; i += groups.x * WORKGROUP) {
         let inertia = inertias[i];
+        let p = inertia.principal;
         let k = inertia.inv_principal;
 
         // The principal axes now.
@@ -22,24 +61,26 @@ fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_w
         let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
         let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-        // The free spin: impulses come after. Two Newton steps on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
+        // The free spin: impulses come after.
         let w = free[inertia.body].w;
         let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
-        var next = spin;
-        for (var step = 0u; step < 2u; step++) {
-            let m = (spin + next) * 0.5;
-            let l = inertia.principal * m;
-            let residual = (next - spin) + k * (cross3(m, l) * params.substep);
-            let f = k * (params.substep * 0.5);
-            let p = inertia.principal;
-            let row_0 = vec3f(1.0, f.x * (l.z - m.z * p.y), f.x * (m.y * p.z - l.y));
-            let row_1 = vec3f(f.y * (m.z * p.x - l.z), 1.0, f.y * (l.x - m.x * p.z));
-            let row_2 = vec3f(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), 1.0);
-            next -= solve_3x3(row_0, row_1, row_2, residual);
+
+        // (h W)^2
+        let a = vec3f((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
+        let rates = vec3f(a.y * a.z, a.z * a.x, a.x * a.y);
+        let sizes = vec3f(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
+        let angle = spin * params.substep;
+        let square = dot3(sizes, angle * angle);
+
+        var turn: vec3f;
+        if SLOW > square {
+            let next = newton_step(inertia, params.substep, spin, newton_step(inertia, params.substep, spin, spin));
+            // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+            let change = next - spin;
+            turn = x * change.x + y * change.y + z * change.z;
+        } else {
+            turn = fast_turn(inertia, square, x, y, z, spin, w);
         }
-        // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
-        let change = next - spin;
-        let turn = x * change.x + y * change.y + z * change.z;
         free[inertia.body].w = w + turn;
         bodies[inertia.body].w += turn;
     }

@@ -51,6 +51,8 @@ pub trait Lane:
     }
     /// 1/sqrt(x) for normal positive x. In `f32` exactly as the shader does it, about 1 ulp off.
     fn inverse_sqrt(self) -> Self;
+    /// One over the power of two in x: x times it is of size 1 to 2. For normal x of either sign, in `f32` below 2^127.
+    fn inverse_power(self) -> Self;
 }
 
 /// A lane of one number, which can be converted to and from `f32` storage.
@@ -65,6 +67,11 @@ pub trait Scalar: Lane + PartialOrd {
 
 /// Less half of the bits of a positive number, it is the bits of a first guess at the inverse square root.
 pub(crate) const INVERSE_SQRT_GUESS: u32 = 0x5f37_5a86;
+
+/// The bits of an exponent in a number.
+pub(crate) const EXPONENT: u32 = 0x7f80_0000;
+/// Less the bits of an exponent, it is those of the opposite one.
+pub(crate) const OPPOSITE_EXPONENT: u32 = 0x7f00_0000;
 
 /// 1/sqrt(x) from a guess at it: three steps of Newton's method.
 #[inline(always)]
@@ -110,6 +117,10 @@ impl Lane for f32 {
         let guess = Self::from_bits(INVERSE_SQRT_GUESS.wrapping_sub(self.to_bits() >> 1));
         newton_inverse_sqrt(self, guess)
     }
+    #[inline(always)]
+    fn inverse_power(self) -> Self {
+        Self::from_bits(OPPOSITE_EXPONENT.wrapping_sub(self.to_bits() & EXPONENT))
+    }
 }
 
 impl Lane for f64 {
@@ -118,6 +129,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
         1.0 / self.sqrt()
+    }
+    #[inline(always)]
+    fn inverse_power(self) -> Self {
+        Self::from_bits(0x7fe0_0000_0000_0000_u64.wrapping_sub(self.to_bits() & 0x7ff0_0000_0000_0000))
     }
 }
 
@@ -173,11 +188,13 @@ pub fn smaller<L: Lane>(a: L, b: L) -> L {
     L::smaller(a, b)
 }
 
-/// 1/x, of either sign.
+/// 1/x, of either sign. Scaled, so that no square leaves single precision.
 #[inline(always)]
 pub fn reciprocal<L: Lane>(x: L) -> L {
-    let y = (x * x).inverse_sqrt();
-    x * (y * y)
+    let scale = x.inverse_power();
+    let scaled = x * scale;
+    let y = (scaled * scaled).inverse_sqrt();
+    scaled * (y * y) * scale
 }
 
 /// Three numbers.
@@ -382,5 +399,33 @@ mod tests {
     fn the_reciprocal_keeps_the_sign() {
         assert!((reciprocal(-4.0_f32) + 0.25).abs() < 1e-7);
         assert!((reciprocal(0.5_f32) - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_reciprocal_is_good_to_four_ulp_over_the_normal_range() {
+        for exponent in -37..38 {
+            for mantissa in 1..50 {
+                let x = 10f32.powi(exponent) * (mantissa as f32 * 0.17);
+                let error = (f64::from(reciprocal(x)) * f64::from(x) - 1.0).abs();
+                assert!(error < 4.0 * f64::from(f32::EPSILON), "x = {x:e}: relative error {error:e}");
+                let scaled = x.inverse_power() * x;
+                assert!(
+                    (1.0..2.0).contains(&scaled) && (-x).inverse_power() == x.inverse_power(),
+                    "x = {x:e}: {scaled}"
+                );
+            }
+        }
+        let tiny = 3.7e-200_f64;
+        assert!((1.0..2.0).contains(&(tiny.inverse_power() * tiny)));
+    }
+
+    /// Scaling by powers of two rounds nothing.
+    #[test]
+    fn the_reciprocal_has_the_bits_that_it_has_unscaled() {
+        for k in 1..100_000 {
+            let x = k as f32 * 1.234_567e-3;
+            let y = (x * x).inverse_sqrt();
+            assert_eq!(reciprocal(x), x * (y * y), "{x}");
+        }
     }
 }

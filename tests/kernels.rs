@@ -17,6 +17,8 @@ tests! {
     exact_gpu {
         every_kernel_gives_the_bits_of_its_double_in_exact_mode,
         tiny_numbers_keep_their_bits_in_exact_mode,
+        fast_spins_keep_their_bits_in_exact_mode,
+        light_and_heavy_joints_keep_their_bits_in_exact_mode,
         sweeps_end_where_no_correction_is_above_the_tolerance,
     }
     any_gpu {
@@ -24,6 +26,7 @@ tests! {
     }
     no_gpu {
         every_kernel_changes_a_random_problem,
+        masses_of_other_powers_of_two_change_no_velocity,
         must_fail::an_impulse_that_is_one_percent_off_is_found,
         must_fail::two_swapped_colors_are_found,
         must_fail::a_dropped_pass_is_found,
@@ -116,6 +119,63 @@ fn tiny_numbers_keep_their_bits_in_exact_mode() {
     for scale in [1e-20, 1e-22, 1e-40] {
         let tiny = problems(0).map(|problem| random::scaled(problem, scale));
         assert_same(&mut gpu, &tiny, &format!("scale {scale:e}"));
+    }
+}
+
+/// The spins of a problem after the kernel, and its passes.
+fn spun(problem: &StepProblem) -> (StepProblem, Vec<Pass>) {
+    let passes = ways_to_run(Kernel::IntegrateGyroscopic, problem).remove(0);
+    (by_the_reference(problem, &passes), passes)
+}
+
+/// From spins that torque hardly turns to those that it would turn by 1e5 rad a substep.
+fn fast_spins_keep_their_bits_in_exact_mode() {
+    let mut gpu = gpu::exact();
+    for factor in [0.01, 0.3, 1.0, 3.0, 30.0, 1e3, 1e5] {
+        let problem = random::faster(random::problem(0, false), factor);
+        let (ours, passes) = spun(&problem);
+        let apart = largest(&ours, &problem);
+        assert!(apart > 1e-3 && apart.is_finite(), "{factor} times as fast: {apart:e}");
+        let theirs = after(&mut gpu, &problem, &passes);
+        assert_eq!(differing(&ours, &theirs), 0, "{factor} times as fast");
+    }
+}
+
+/// Powers of two round nothing: a problem of masses so many times as large has the same velocities to the last bit, and
+/// impulses as many times as large. 2^40 is 1e12.
+fn masses_of_other_powers_of_two_change_no_velocity() {
+    let mut joints = 0;
+    for (seed, factor) in [(0, 2_f32.powi(40)), (1, 2_f32.powi(-40))] {
+        for kernel in every_kernel() {
+            let problem = &problems(seed)[usize::from(has_patches(kernel))];
+            let heavy = random::heavier(problem.clone(), factor);
+            for passes in ways_to_run(kernel, problem) {
+                let usual = random::heavier(by_the_reference(problem, &passes), factor);
+                let scaled = by_the_reference(&heavy, &passes);
+                // The square of a step is one of impulses.
+                let (momentum, convergence) = (usual.momentum, usual.convergence);
+                let scaled = StepProblem { momentum, convergence, ..scaled };
+                assert_eq!(differing(&usual, &scaled), 0, "{kernel}, {factor:e} times as heavy");
+                joints += usize::from(matches!(kernel, Kernel::SolveJoints(_)));
+            }
+        }
+    }
+    assert!(joints > 0);
+}
+
+fn light_and_heavy_joints_keep_their_bits_in_exact_mode() {
+    let mut gpu = gpu::exact();
+    // Arms of 1000 are those of blocks that rounding makes indefinite.
+    for (factor, arms) in [(1e-15, 1.0), (1e-9, 1.0), (1e7, 1.0), (1e15, 1.0), (1.0, 1e3), (1e7, 1e4)] {
+        let mut problem = random::heavier(random::problem(0, false), factor);
+        problem.joints.iter_mut().flat_map(|row| row.r_a.iter_mut().chain(&mut row.r_b)).for_each(|x| *x *= arms);
+        for rules in [Rules::default(), MEASURED.of_joints()] {
+            let passes = color_by_color(Kernel::SolveJoints(rules), &problem);
+            let (ours, theirs) = (by_the_reference(&problem, &passes), after(&mut gpu, &problem, &passes));
+            let apart = common::difference::of_velocities(&ours, &problem);
+            assert!(apart > 1.0 && apart.is_finite(), "{factor:e} times as heavy: {apart:e} m/s");
+            assert_eq!(differing(&ours, &theirs), 0, "{factor:e} times as heavy");
+        }
     }
 }
 

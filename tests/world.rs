@@ -22,15 +22,32 @@ fn a_good_world_is_taken() {
 }
 
 #[test]
+fn bodies_at_the_ends_of_the_range_are_taken() {
+    for (mass, moments) in [(1e-15, Vec3::splat(1e-30)), (1e15, Vec3::splat(1e30)), (1.0, Vec3::new(1.0, 1e-12, 1.0))] {
+        let taken = refusal(|w| {
+            w.bodies[1].mass.mass = mass;
+            w.bodies[1].mass.principal_inertia = moments;
+        });
+        assert_eq!(taken, None);
+    }
+}
+
+#[test]
 fn what_cannot_be_simulated_is_refused_by_name() {
     type Change = fn(&mut World);
-    let cases: [(&str, Change); 24] = [
+    let cases: [(&str, Change); 30] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
         ("gravity", |w| w.gravity.y = -2e19),
         ("body 1 \"cube\": position", |w| w.bodies[1].position.x = f32::INFINITY),
         ("body 1 \"cube\": rotation", |w| w.bodies[1].rotation = Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)),
         ("body 1 \"cube\": friction", |w| w.bodies[1].material.friction = -1.0),
         ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 0.0),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 2e15),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.mass = 5e-16),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.principal_inertia.y = 2e30),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.principal_inertia = Vec3::splat(5e-31)),
+        ("body 1 \"cube\": mass", |w| w.bodies[1].mass.principal_inertia = Vec3::new(1.0, 1.0, 2e12)),
+        ("body 1 \"cube\": center of mass", |w| w.bodies[1].mass.center.z = f32::NAN),
         ("body 2 \"\": mass", |w| {
             w.add(Body::dynamic());
         }),

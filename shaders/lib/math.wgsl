@@ -21,10 +21,15 @@ fn inverse_sqrt(x: f32) -> f32 {
     return y;
 }
 
-// 1/x, of either sign.
+// One over the power of two in x: x times it is of size 1 to 2. For normal x of either sign below 2^127.
+fn inverse_power(x: f32) -> f32 { return bitcast<f32>(0x7f000000u - (bitcast<u32>(x) & 0x7f800000u)); }
+
+// 1/x, of either sign. Scaled, so that no square leaves single precision.
 fn reciprocal(x: f32) -> f32 {
-    let y = inverse_sqrt(x * x);
-    return x * (y * y);
+    let scale = inverse_power(x);
+    let scaled = x * scale;
+    let y = inverse_sqrt(scaled * scaled);
+    return scaled * (y * y) * scale;
 }
 
 fn quat_mul(a: vec4f, b: vec4f) -> vec4f {

@@ -3,6 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::layout::{ContactRow, MassRow};
+use crate::math::Lane;
 
 /// Inverse mass [1/kg] and inverse inertia in world axes [1/(kg m²)] of one body.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,10 @@ impl EffectiveMass<'_> {
         let (t_1, t_2) = self.row.tangents();
         let (s_11, s_22, s_12) =
             (self.entry(r_a, r_b, t_1, t_1), self.entry(r_a, r_b, t_2, t_2), self.entry(r_a, r_b, t_1, t_2));
-        inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
+        // Squares of a light body's entries would leave single precision.
+        let scale = (s_11 + s_22).inverse_power();
+        let (s_11, s_22, s_12) = (s_11 * scale, s_22 * scale, s_12 * scale);
+        scale * inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
     }
 
     /// One over the entry of the tangential direction `d`.

@@ -69,11 +69,12 @@ pub struct MassRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct InertiaRow {
-    /// Principal moments of inertia [kg m²].
+    /// Principal moments of inertia, by the power of two [kg m²] in the largest: only their ratios matter, and no product
+    /// with spins leaves single precision.
     pub principal: [f32; 3],
     /// Whose they are.
     pub body: u32,
-    /// One over the moments [1/(kg m²)].
+    /// One over those.
     pub inv_principal: [f32; 3],
     #[doc(hidden)]
     pub pad: f32,

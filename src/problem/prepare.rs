@@ -15,6 +15,7 @@ use super::softness::softness;
 use crate::collide::Detector;
 use crate::config::{FrictionAt, FrictionRule, SolverConfig, Stabilization};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use crate::math::Lane;
 use crate::world::{BallJoint, Body, BodyKind, World};
 
 /// Where each row came from: what carries rows over from step to step, and gives impulses back to manifolds.
@@ -152,9 +153,12 @@ impl Prepared {
         self.joint_rows.clear();
         // A joint holds bodies of one island, which are asleep together.
         let rests = |body: usize| asleep.get(body) == Some(&true);
+        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let is_awake = |i: u32| {
             let joint = &world.joints[i as usize];
-            !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
+            // One of two bodies that nothing moves has no block to solve.
+            (moves(joint.body_a) || joint.body_b.is_some_and(moves))
+                && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
         };
         for color in self.joint_coloring.offsets.windows(2) {
             problem.colors.push(self.joint_rows.len() as u32);
@@ -326,12 +330,16 @@ fn prepare_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem
     problem.inertias.clear();
     if config.gyroscopic {
         let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic();
-        let row = |(i, b): (usize, &Body)| InertiaRow {
-            principal: b.mass.principal_inertia.to_array(),
-            body: i as u32,
-            inv_principal: b.mass.principal_inertia.recip().to_array(),
-            frame: (b.rotation * b.mass.principal_frame).to_array(),
-            ..InertiaRow::default()
+        let row = |(i, b): (usize, &Body)| {
+            let unit = b.mass.principal_inertia.max_element().inverse_power();
+            let principal = b.mass.principal_inertia * unit;
+            InertiaRow {
+                principal: principal.to_array(),
+                body: i as u32,
+                inv_principal: principal.recip().to_array(),
+                frame: (b.rotation * b.mass.principal_frame).to_array(),
+                ..InertiaRow::default()
+            }
         };
         problem.inertias.extend(world.bodies.iter().enumerate().filter(|&(i, b)| turns(b) && !rests(i)).map(row));
     }

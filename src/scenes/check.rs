@@ -108,19 +108,10 @@ fn with_mass(mut body: Body, file: &BodyFile) -> Result<Body> {
     if dynamic && file.mass_properties.is_none() && file.shapes.is_empty() {
         return Err(Error::input("a dynamic body without shapes needs mass_properties"));
     }
-    if dynamic && !usable(&body.mass) {
-        let mass = shown(&[body.mass.mass.into()]);
-        let inertia = shown(&body.mass.principal_inertia.to_array().map(f64::from));
-        return Err(Error::input(format!("mass {mass} kg with inertia {inertia} kg m²: must be positive and finite")));
+    if dynamic {
+        body.mass.check()?;
     }
     Ok(body)
-}
-
-/// Whether the solver can divide by mass and moments.
-fn usable(m: &MassProperties) -> bool {
-    let [x, y, z] = m.principal_inertia.to_array();
-    let divides = |x: f32| x > 0.0 && x.is_finite() && x.recip().is_finite();
-    [m.mass, x, y, z].into_iter().all(divides) && m.center.is_finite() && m.principal_frame.is_finite()
 }
 
 fn mass_properties(file: &MassFile) -> Result<MassProperties> {

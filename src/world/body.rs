@@ -1,5 +1,7 @@
 //! One rigid body: pose, velocity, mass, colliders, material.
 
+use std::ops::RangeInclusive;
+
 use glam::{DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
 use schemars::JsonSchema;
@@ -73,6 +75,32 @@ impl MassProperties {
     /// Infinite mass: nothing moves it.
     pub const IMMOVABLE: Self =
         Self { mass: 0.0, center: Vec3::ZERO, principal_inertia: Vec3::ZERO, principal_frame: Quat::IDENTITY };
+
+    /// Masses that can be simulated [kg]: squares of impulses and of inverse masses stay numbers in single precision.
+    pub const MASSES: RangeInclusive<f32> = 1e-15..=1e15;
+    /// Moments of inertia that can be simulated [kg m²].
+    pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
+    /// Largest ratio of two moments of a body; that of a rod is a sixth of the square of its length over its radius.
+    pub const MOST_RATIO: f32 = 1e12;
+
+    /// Refuses what a dynamic body cannot have.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { mass, center, principal_inertia, principal_frame } = *self;
+        if !(center.is_finite() && principal_frame.is_finite()) {
+            return Err(Error::input(format!("center of mass = {center}, frame = {principal_frame}: must be finite")));
+        }
+        let moments = principal_inertia.to_array();
+        if !(Self::MASSES.contains(&mass)
+            && moments.iter().all(|i| Self::MOMENTS.contains(i))
+            && principal_inertia.max_element() <= Self::MOST_RATIO * principal_inertia.min_element())
+        {
+            return Err(Error::input(format!(
+                "mass = {mass:e} kg, inertia = {moments:?} kg m²: must be 1e-15 to 1e15 kg, 1e-30 to 1e30 kg m² and moments within \
+                 1e12 of each other"
+            )));
+        }
+        Ok(())
+    }
 
     /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.
     fn from_parry(m: &ParryMass, density: f32) -> Self {
@@ -350,18 +378,14 @@ impl Body {
                 "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
             ));
         }
-        let MassProperties { mass, center, principal_inertia, principal_frame } = self.mass;
+        let MassProperties { center, principal_frame, .. } = self.mass;
         if !is_place(center) || !((principal_frame.length() - 1.0).abs() <= 1e-3) {
             return refuse(format!(
                 "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
             ));
         }
-        let has_mass = |x: f32| x > 0.0 && x.is_finite() && x.recip().is_finite();
-        if self.kind == BodyKind::Dynamic && !(has_mass(mass) && principal_inertia.to_array().into_iter().all(has_mass))
-        {
-            return refuse(format!(
-                "mass = {mass} kg, inertia = {principal_inertia} kg m²: must be positive and finite"
-            ));
+        if self.kind == BodyKind::Dynamic {
+            self.mass.check()?;
         }
         Ok(())
     }

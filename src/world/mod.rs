@@ -115,7 +115,8 @@ impl World {
     }
 
     /// Refuses what no step can be made of: numbers that are not finite or out of range, shapes without extent, dynamic bodies
-    /// without mass, moving bodies with shapes that only fixed ones can have, joints to bodies that are not there.
+    /// without mass or with one out of [`MassProperties::MASSES`], moving bodies with shapes that only fixed ones can have, joints to
+    /// bodies that are not there.
     ///
     /// # Errors
     /// One line that names the body and its shape, or the joint.

@@ -112,6 +112,31 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem
 }
 
+/// The same problem with masses `factor` times as large, and impulses with them.
+pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
+    let lighter = |x: &mut f32| *x *= 1.0 / factor;
+    let scale = |x: &mut f32| *x *= factor;
+    for row in &mut problem.masses {
+        row.inv_inertia_x.iter_mut().chain(&mut row.inv_inertia_yz).chain([&mut row.inv_mass]).for_each(lighter);
+    }
+    problem.points.iter_mut().flat_map(|row| [&mut row.normal_mass, &mut row.tangent_mass]).for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
+    problem
+}
+
+/// The same problem with spins `factor` times as fast, and moments of inertia of other ratios: some of a solid, some up to
+/// 1:1000.
+pub fn faster(mut problem: StepProblem, factor: f32) -> StepProblem {
+    problem.bodies.iter_mut().flat_map(|row| &mut row.w).for_each(|w| *w *= factor);
+    for (k, row) in problem.inertias.iter_mut().enumerate() {
+        let thin = [1.0, 0.1, 0.01, 0.001][k % 4];
+        row.principal[k % 3] *= thin;
+        row.inv_principal[k % 3] *= 1.0 / thin;
+    }
+    problem
+}
+
 fn params(problem: &StepProblem) -> Params {
     let substep = 0.1;
     let mut params = Params::default();

@@ -206,6 +206,9 @@ fn operations() -> f64 {
         fn inverse_sqrt(self) -> Self {
             counted(self.0.inverse_sqrt())
         }
+        fn inverse_power(self) -> Self {
+            counted(self.0.inverse_power())
+        }
     }
 
     let rules = Rules { biased: true, friction: FrictionRule::Disc, accumulated: true, ..Rules::default() };

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::{INVERSE_SQRT_GUESS, Lane, newton_inverse_sqrt};
+use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT, newton_inverse_sqrt};
 
 /// Two registers.
 #[derive(Clone, Copy, Debug)]
@@ -97,6 +97,19 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
         newton_inverse_sqrt(self, Self([guess(self.0[0]), guess(self.0[1])]))
+    }
+    #[inline(always)]
+    fn inverse_power(self) -> Self {
+        Self([inverse_power(self.0[0]), inverse_power(self.0[1])])
+    }
+}
+
+/// One over the power of two in each number.
+#[inline(always)]
+fn inverse_power(x: __m256) -> __m256 {
+    unsafe {
+        let exponent = _mm256_and_si256(_mm256_castps_si256(x), _mm256_set1_epi32(EXPONENT as i32));
+        _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(OPPOSITE_EXPONENT as i32), exponent))
     }
 }
 

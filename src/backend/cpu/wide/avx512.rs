@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::{INVERSE_SQRT_GUESS, Lane, newton_inverse_sqrt};
+use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT, newton_inverse_sqrt};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
@@ -100,6 +100,13 @@ impl Lane for Avx512 {
             Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(INVERSE_SQRT_GUESS as i32), half_bits)))
         };
         newton_inverse_sqrt(self, guess)
+    }
+    #[inline(always)]
+    fn inverse_power(self) -> Self {
+        Self(unsafe {
+            let exponent = _mm512_and_si512(_mm512_castps_si512(self.0), _mm512_set1_epi32(EXPONENT as i32));
+            _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(OPPOSITE_EXPONENT as i32), exponent))
+        })
     }
 }
 

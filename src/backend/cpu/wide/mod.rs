@@ -136,6 +136,10 @@ impl Lane for Portable {
     fn inverse_sqrt(self) -> Self {
         Self(Wide(self.0.0.map(Lane::inverse_sqrt)))
     }
+    #[inline(always)]
+    fn inverse_power(self) -> Self {
+        Self(Wide(self.0.0.map(Lane::inverse_power)))
+    }
 }
 
 impl Lanes for Portable {
