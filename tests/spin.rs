@@ -3,10 +3,10 @@
 #[macro_use]
 mod common;
 
-use common::Open;
+use common::{Open, gpu};
 use drystone::preset::Preset;
 use drystone::scenes::SceneFile;
-use drystone::{Body, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
 use glam::{DVec3, Quat, Vec3};
 
 const SPEEDS: [f32; 10] = [1.0, 30.0, 60.0, 120.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6];
@@ -52,10 +52,11 @@ fn spinning(inertia: [f32; 3], speed: f32) -> World {
 }
 
 tests! {
-    every_backend {
-        every_backend_turns_fast_spins_alike,
+    exact_gpu {
+        a_gpu_turns_fast_spins_as_the_reference_does,
     }
     no_gpu {
+        lanes_turn_fast_spins_as_the_reference_does,
         free_rotation_keeps_its_energy_and_momentum_at_every_speed,
         free_rotation_keeps_its_energy_in_steps_of_every_length,
         a_spin_whose_energy_is_no_number_stays_one,
@@ -81,11 +82,17 @@ fn most(a: f64, b: f64) -> f64 {
 
 /// Steps a world on the reference with the settings of `fast`: four substeps a step.
 fn drift(world: World, dt: f32, steps: u32) -> Drift {
+    drift_from(world, 1.0, dt, steps)
+}
+
+/// The same from `factor` times the spins of the world.
+fn drift_from(world: World, factor: f32, dt: f32, steps: u32) -> Drift {
     let state = |world: &World| -> Vec<(f64, DVec3)> {
         world.bodies.iter().map(|b| (b.kinetic_energy(), b.angular_momentum())).collect()
     };
-    let begun = state(&world);
     let mut simulation = simulate(world, || Box::new(Reference::<f32>::new()));
+    simulation.world.bodies.iter_mut().for_each(|body| body.angular_velocity *= factor);
+    let begun = state(&simulation.world);
     let mut drift = Drift { gained: 0.0, lost: 0.0, momentum: 0.0 };
     for _ in 0..steps {
         simulation.step(dt).expect("a step");
@@ -128,7 +135,7 @@ fn free_rotation_keeps_its_energy_and_momentum_at_every_speed() {
 }
 
 fn free_rotation_keeps_its_energy_in_steps_of_every_length() {
-    for dt in [1e-6, 1e-3, 0.1, 1.0, 1e3] {
+    for dt in [1e-6, 1e-3, 0.1, 1.0] {
         for speed in [1.0, 300.0, 1e6] {
             let drift = drift(spinning([1.0, 2.0, 2.9], speed), dt, 200);
             assert!(drift.gained.max(drift.lost) < 1e-4, "steps of {dt} s, {speed} rad/s: {drift:?}");
@@ -136,11 +143,10 @@ fn free_rotation_keeps_its_energy_in_steps_of_every_length() {
     }
 }
 
-/// Squares of 1e20 are beyond single precision.
+/// Squares of 1e20 are beyond single precision. No world begins with such a spin, but a run may come to it.
 fn a_spin_whose_energy_is_no_number_stays_one() {
     for (name, inertia) in INERTIAS {
-        let world = spinning(inertia, 1e20);
-        let drift = drift(world, 1.0 / 60.0, 60);
+        let drift = drift_from(spinning(inertia, 1.0), 1e20, 1.0 / 60.0, 60);
         assert!(drift.gained.max(drift.lost) < 1e-2, "{name}: {drift:?}");
     }
 }
@@ -169,7 +175,15 @@ fn a_spinning_board_gains_no_energy() {
     assert!(drift.gained.max(drift.lost) < 1e-4, "{drift:?}");
 }
 
-fn every_backend_turns_fast_spins_alike(open: Open) {
+fn lanes_turn_fast_spins_as_the_reference_does() {
+    assert_turns_as_the_reference(|| Box::new(Cpu::new()));
+}
+
+fn a_gpu_turns_fast_spins_as_the_reference_does() {
+    assert_turns_as_the_reference(|| Box::new(gpu::exact()));
+}
+
+fn assert_turns_as_the_reference(open: Open) {
     let state = |open: Open| {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
         for (_, inertia) in INERTIAS {
@@ -191,11 +205,12 @@ fn every_backend_turns_fast_spins_alike(open: Open) {
     }
 }
 
-/// An ordinary drop of seven bodies onto a floor. A hull of 0.6 g m² about its thinnest axis bounces, spins at 1200 rad/s, and gained
-/// 3e10 times the energy of all. Now at most 2 %, in step 4: a capsule begins 16 mm deep and is pushed out. The bound leaves room for
+/// An ordinary drop of seven bodies onto a floor. A hull of 0.6 g m² about its thinnest axis spins at 1200 rad/s, and gained 3e10
+/// times the energy of all. Now at most 2 %, in step 4: a capsule begins 16 mm deep and is pushed out. The bound leaves room for
 /// bounces, which do not keep the energy of bodies that turn by radians a substep: up to 1.5 times as much with 4 to 256 substeps.
 fn a_drop_in_which_a_hull_spins_fast_gains_no_energy() {
-    let scene = SceneFile::parse(DROP).and_then(|file| file.into_scene("drop")).expect("a scene");
+    let mut scene = SceneFile::parse(DROP).and_then(|file| file.into_scene("drop")).expect("a scene");
+    scene.world.bodies[1].angular_velocity = Vec3::new(900.0, 700.0, 400.0);
     let energy = |world: &World| world.kinetic_energy() + world.potential_energy();
     let before = energy(&scene.world);
     let mut simulation = simulate(scene.world, || Box::new(Reference::<f32>::new()));
@@ -206,7 +221,7 @@ fn a_drop_in_which_a_hull_spins_fast_gains_no_energy() {
         spin = simulation.world.bodies.iter().map(|b| b.angular_velocity.length()).fold(spin, f32::max);
     }
     measured!("{gained:.4} times the energy, {spin} rad/s");
-    assert!(gained < 3.0, "{gained} times the energy");
+    assert!(gained < 1.5, "{gained} times the energy");
     assert!(spin > 240.0, "nothing spins fast: {spin} rad/s");
 }
 
