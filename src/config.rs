@@ -215,7 +215,7 @@ impl Default for SolverConfig {
             gyroscopic: true,
             speculative_margin: 0.04,
             recycle_distance: 0.02,
-            sleep_after: 0.0,
+            sleep_after: 0.5,
             sleep_speed: 1e-2,
             fuse_colors_below: FUSE_BELOW,
             max_colors: 64,
@@ -224,6 +224,15 @@ impl Default for SolverConfig {
 }
 
 impl SolverConfig {
+    /// The same settings, but nothing falls asleep: for whatever is measured or compared.
+    ///
+    /// ```
+    /// assert_eq!(drystone::SolverConfig::default().without_sleep().sleep_after, 0.0);
+    /// ```
+    pub fn without_sleep(self) -> Self {
+        Self { sleep_after: 0.0, ..self }
+    }
+
     /// Reads settings from a TOML file; what it leaves out takes its default.
     ///
     /// # Errors

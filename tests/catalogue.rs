@@ -10,7 +10,8 @@ fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
     let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
     let scene = Scene::find(name, &parameters).expect(name);
     let reference = Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect(name);
+    let mut simulation =
+        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference).expect(name);
     step(&mut simulation, steps);
     (scene, simulation)
 }
@@ -41,7 +42,8 @@ fn energy(simulation: &Simulation) -> f64 {
 fn a_wall_rests() {
     let scene = Scene::find("wall", &[]).expect("the scene");
     let lanes = Box::new(Cpu::new());
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), lanes).expect("a simulation");
+    let mut simulation =
+        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), lanes).expect("a simulation");
     step(&mut simulation, 300);
     let speed = rms_speed(&simulation.world);
     assert!(speed < 1e-3 && fallen(&scene, &simulation) == 0, "{speed:e} m/s");
@@ -126,7 +128,7 @@ fn the_report_names_the_largest_tower_that_stands() {
 #[test]
 fn the_report_counts_joints_and_the_sweeps_that_a_tolerance_saved() {
     let scene = Scene::find("pendulum", &[]).expect("a pendulum");
-    let config = SolverConfig { tolerance: 1e-3, iterations: 8, ..SolverConfig::default() };
+    let config = SolverConfig { tolerance: 1e-3, iterations: 8, ..SolverConfig::default().without_sleep() };
     let reference = Box::new(Reference::<f32>::new());
     let mut simulation = Simulation::new(scene.world.clone(), config, reference).expect("a simulation");
     let mut report = RunReport::new(&scene, &simulation);

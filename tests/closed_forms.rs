@@ -74,7 +74,8 @@ fn simulation(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> 
 
 /// Runs `seconds` of `world` in steps of 1/`rate` s, with 4 substeps each, and returns what became of it.
 fn run(world: World, backend: Box<dyn Backend>, seconds: f64, rate: u32) -> World {
-    let mut simulation = simulation(world, SolverConfig { substeps: 4, ..SolverConfig::default() }, backend);
+    let mut simulation =
+        simulation(world, SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() }, backend);
     for _ in 0..(seconds * f64::from(rate)).round() as u32 {
         simulation.step(1.0 / rate as f32).expect("a step");
     }
@@ -130,7 +131,12 @@ fn sag_of_two_cubes(backend: Box<dyn Backend>, frequency: f32, preload_rate: f32
     for y in [0.5, 1.5] {
         world.add(cube().position(0.0, y, 0.0));
     }
-    let soft = SolverConfig { substeps: 2, contact_frequency: frequency, preload_rate, ..SolverConfig::default() };
+    let soft = SolverConfig {
+        substeps: 2,
+        contact_frequency: frequency,
+        preload_rate,
+        ..SolverConfig::default().without_sleep()
+    };
     let mut simulation = simulation(world, soft, backend);
     for _ in 0..steps {
         simulation.step(1.0 / 60.0).expect("a step");
@@ -179,7 +185,8 @@ fn what_a_load_leaves_behind_stays_where_it_is(open: Open) {
     for (y, density) in [(0.5, 1e3), (1.5, 1e3), (2.5, 1e5)] {
         world.add(cube().density(density).position(0.0, y, 0.0));
     }
-    let mut simulation = simulation(world, SolverConfig { substeps: 32, ..SolverConfig::default() }, backend);
+    let mut simulation =
+        simulation(world, SolverConfig { substeps: 32, ..SolverConfig::default().without_sleep() }, backend);
     let height = |s: &Simulation| f64::from(s.world.bodies[2].position.y);
     let mut highest = f64::MIN;
     for step in 0..240 {
@@ -215,7 +222,7 @@ fn a_box_below_the_friction_angle_stays_where_it_is(open: Open) {
     let mut world = ground(FRAC_PI_6, 0.6);
     let start = Vec3::new(0.0, 0.5, 0.0);
     world.add(cube().position(start.x, start.y, start.z).friction(0.6));
-    let mut simulation = simulation(world, SolverConfig::default(), backend);
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep(), backend);
     let mut farthest = 0.0_f32;
     for _ in 0..600 {
         simulation.step(1.0 / 60.0).expect("a step");
@@ -283,7 +290,7 @@ fn collision(backend: Box<dyn Backend>, config: SolverConfig, rate: u32) -> [f64
 
 /// Settings with which every impulse acts where its arms say: one sweep a step, before anything moves.
 fn impulses_in_place() -> SolverConfig {
-    SolverConfig { substeps: 1, relax: 0, recycle_distance: 0.0, ..SolverConfig::default() }
+    SolverConfig { substeps: 1, relax: 0, recycle_distance: 0.0, ..SolverConfig::default().without_sleep() }
 }
 
 /// Measured 1e-7, and 3.4e-6 at 1024 steps a second, at which positions before the impact are exact sums.
@@ -300,8 +307,8 @@ fn an_isolated_collision_keeps_momentum(open: Open) {
 fn substeps_keep_linear_momentum_exactly_and_angular_momentum_to_first_order_in_the_step(open: Open) {
     let backend = open();
     let name = backend.name();
-    let [linear, coarse] = collision(backend, SolverConfig::default(), 60);
-    let [_, fine] = collision(reference(), SolverConfig::default(), 240);
+    let [linear, coarse] = collision(backend, SolverConfig::default().without_sleep(), 60);
+    let [_, fine] = collision(reference(), SolverConfig::default().without_sleep(), 240);
     below(&format!("{name}, momentum"), linear, 1e-6);
     below(&format!("{name}, angular momentum at 60 steps a second"), coarse, 1e-2);
     below(&format!("{name}, angular momentum at 240 steps a second"), fine, 2.5e-3);
@@ -337,7 +344,7 @@ fn balls_that_meet_head_on_part_as_newton_says(open: Open) {
 
 /// At 240 substeps a second.
 fn tumble(backend: Box<dyn Backend>, first: f32) -> Tumble {
-    let config = SolverConfig { substeps: 4, ..SolverConfig::default() };
+    let config = SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() };
     Tumble::new(first, |world| Ok(simulation(world, config, backend))).expect("a tumble")
 }
 

@@ -60,7 +60,8 @@ fn pile() -> Scene {
 /// A step of the pile on the floor.
 fn lying() -> (StepProblem, StepPlan) {
     let scene = pile();
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     for _ in 0..40 {
         simulation.step(scene.dt).expect("the reference runs");
     }
@@ -117,7 +118,8 @@ fn a_comparison_names_the_step_the_pass_and_the_kernel() {
     };
     let mut finished = 0;
     let scene = pile();
-    let found = compare(&scene, &SolverConfig::default(), &mut open, 3, || finished += 1).expect("both run");
+    let found =
+        compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 3, || finished += 1).expect("both run");
     assert_eq!((finished, found.steps.len()), (3, 3));
     assert_eq!(found.steps[0].bodies, scene.world.dynamic_count());
     let first = found.first.expect("a difference");
@@ -154,7 +156,7 @@ fn a_difference_that_no_pass_makes_is_still_a_difference() {
         opened += 1;
         Ok(if which == 0 { reference() } else { Box::new(Once(opened == 2)) })
     };
-    let found = compare(&scene, &SolverConfig::default(), &mut open, 3, || ()).expect("both run");
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 3, || ()).expect("both run");
     let expected = FirstDifference { step: 1, stage: Stage::NotRepeated { not_repeated: true } };
     assert_eq!((found.steps[0].bodies, found.first), (1, Some(expected)));
 }
@@ -182,7 +184,7 @@ impl Backend for Hidden {
 #[test]
 fn rows_that_differ_before_the_first_pass_are_named() {
     let mut open = |which| -> Result<Box<dyn Backend>> { Ok(if which == 0 { reference() } else { Box::new(Hidden) }) };
-    let found = compare(&pile(), &SolverConfig::default(), &mut open, 40, || ()).expect("both run");
+    let found = compare(&pile(), &SolverConfig::default().without_sleep(), &mut open, 40, || ()).expect("both run");
     let first = found.first.expect("a difference");
     assert_eq!(first.stage, Stage::Rows { rows: "contacts" }, "preloads follow from impulses");
     assert_eq!(first.to_string(), format!("step {}, before the first pass: contacts of the problem", first.step));
@@ -190,7 +192,8 @@ fn rows_that_differ_before_the_first_pass_are_named() {
 
 #[test]
 fn equal_backends_agree_in_every_bit_of_every_step() {
-    let found = compare(&pile(), &SolverConfig::default(), &mut |_| Ok(reference()), 50, || ()).expect("both run");
+    let found = compare(&pile(), &SolverConfig::default().without_sleep(), &mut |_| Ok(reference()), 50, || ())
+        .expect("both run");
     assert!(found.steps.iter().all(|d| *d == Difference::default()));
     assert_eq!(found.first, None);
 }

@@ -66,7 +66,7 @@ fn slid(rule: FrictionRule, heading: f64, open: Open) -> f64 {
     let mut world = slope(FRAC_PI_6, heading, 0.3);
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).friction(0.3).position(0.0, 0.2, 0.0);
     let block = world.add(block);
-    let config = SolverConfig { friction: rule, ..SolverConfig::default() };
+    let config = SolverConfig { friction: rule, ..SolverConfig::default().without_sleep() };
     let end = run(world, config, 1.0, 240, open).bodies[block].position;
     f64::from(end.x).hypot(f64::from(end.z))
 }
@@ -91,7 +91,7 @@ fn what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc(open: 
         let mut world = slope(20_f64.to_radians(), 0.5, 0.5);
         let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).position(0.0, 0.2, 0.0);
         let block = world.add(block);
-        let config = SolverConfig { friction: rule, ..SolverConfig::default() };
+        let config = SolverConfig { friction: rule, ..SolverConfig::default().without_sleep() };
         let end = run(world, config, 10.0, 60, open).bodies[block].position;
         f64::from(end.x).hypot(f64::from(end.z))
     };
@@ -105,7 +105,7 @@ fn a_block_stops_sliding_and_spinning_in_the_same_frame(open: Open) {
     let mut world = floor(0.4);
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.5)).friction(0.4).position(0.0, 0.1, 0.0);
     let block = world.add(block.velocity(Vec3::X * 2.0, Vec3::Y * 3.0));
-    let mut simulation = simulation(world, SolverConfig::default(), open);
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep(), open);
     let (mut slides, mut spins) = (0_i32, 0_i32);
     for step in 1..=360 {
         simulation.step(1.0 / 240.0).unwrap();
@@ -121,7 +121,7 @@ fn a_block_stops_sliding_and_spinning_in_the_same_frame(open: Open) {
 fn a_ball_rolls_down_a_slope_at_five_sevenths_of_free_sliding(open: Open) {
     let mut world = slope(FRAC_PI_6, 0.0, 0.5);
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-    let end = run(world, SolverConfig::default(), 2.0, 240, open);
+    let end = run(world, SolverConfig::default().without_sleep(), 2.0, 240, open);
     let (body, seconds) = (&end.bodies[ball], 2.0);
     holds("distance", f64::from(body.position.x), 0.5 * 5.0 / 7.0 * G * FRAC_PI_6.sin() * seconds * seconds, 5e-3);
     // It rolls: the point below it stands still.
@@ -135,7 +135,7 @@ fn peaks(height: f32, e: f32, rate: u32, count: usize, open: Open) -> Vec<f64> {
     world.bodies[0].material.restitution = e;
     let ball = Body::dynamic().shape(Shape::ball(0.1)).friction(0.0).restitution(e).position(0.0, height + 0.1, 0.0);
     let ball = world.add(ball);
-    let mut simulation = simulation(world, SolverConfig::default(), open);
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep(), open);
     let (mut found, mut before) = (Vec::new(), 0.0_f32);
     for _ in 0..20 * rate {
         simulation.step(1.0 / rate as f32).unwrap();
@@ -167,7 +167,7 @@ fn a_perfectly_elastic_ball_keeps_its_energy(open: Open) {
     world.add(ball.position(0.0, 5.0, 0.0));
     let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
     let exact = energy(&world);
-    let config = SolverConfig::default();
+    let config = SolverConfig::default().without_sleep();
     let mut simulation = simulation(world, config, open);
     let mut sum = 0.0;
     for _ in 0..20_000 {
@@ -188,7 +188,7 @@ fn the_last_ball_of_a_cradle_leaves_with_the_speed_of_the_first(open: Open) {
         world.add(ball.position(x, 0.0, 0.0));
     }
     world.bodies[0].linear_velocity.x = 2.0;
-    let config = SolverConfig { restitution_threshold: 0.1, ..SolverConfig::default() };
+    let config = SolverConfig { restitution_threshold: 0.1, ..SolverConfig::default().without_sleep() };
     // One impact after another: a step moves a ball by less than a gap.
     let end = run(world, config, 2.0, 9600, open);
     let speeds: Vec<f32> = end.bodies.iter().map(|b| b.linear_velocity.x).collect();
@@ -222,7 +222,7 @@ fn a_heavy_top_precesses_at_the_rate_of_its_spin(open: Open) {
     let top = top.position(center.x, center.y, center.z).rotation(turn);
     let top = world.add(top.velocity(angular.cross(center), angular));
     world.join(BallJoint::to_world(top, Vec3::new(0.0, -(l as f32), 0.0), Vec3::ZERO));
-    let mut simulation = simulation(world, SolverConfig::default(), open);
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep(), open);
     let (mut turned, mut before) = (0.0_f64, f64::from(center.z).atan2(f64::from(center.x)));
     let seconds = 2.0;
     for _ in 0..960 {
@@ -242,7 +242,7 @@ fn every_interface_of_a_tower_carries_what_stands_on_it(open: Open) {
     for i in 0..n {
         world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
     }
-    let config = SolverConfig::default();
+    let config = SolverConfig::default().without_sleep();
     let substep = 1.0 / 60.0 / f64::from(config.substeps);
     let mut simulation = simulation(world, config, open);
     for _ in 0..900 {
@@ -271,7 +271,7 @@ fn overhang_stands(share: f32, open: Open) -> bool {
     }
     let start = world.clone();
     // Stiff enough that the sag does not decide: boards of 1 m sink by micrometers.
-    let config = SolverConfig { substeps: 32, ..SolverConfig::default() };
+    let config = SolverConfig { substeps: 32, ..SolverConfig::default().without_sleep() };
     let end = run(world, config, 10.0, 60, open);
     (2..5).all(|i| end.bodies[i].position.distance(start.bodies[i].position) < 0.05)
 }

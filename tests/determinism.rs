@@ -28,7 +28,8 @@ fn pile(backend: fn() -> Box<dyn Backend>, seed: u32, steps: u32, threads: usize
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
         let scene = Scene::find("pile", &["n=300".into(), format!("seed={seed}")]).expect("the scene");
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend()).expect("good settings");
+        let mut simulation =
+            Simulation::new(scene.world, SolverConfig::default().without_sleep(), backend()).expect("good settings");
         let mut stats = StepStats::default();
         for _ in 0..steps {
             stats = simulation.step(scene.dt).expect("a step");
@@ -67,7 +68,7 @@ fn the_number_of_threads_changes_no_bit_of_any_shape() {
                     Some(parameter).filter(|p| !p.is_empty()).map(Into::into).into_iter().collect();
                 let scene = Scene::find(name, &parameters).expect("the scene");
                 let mut simulation =
-                    Simulation::new(scene.world, SolverConfig::default(), cpu()).expect("a simulation");
+                    Simulation::new(scene.world, SolverConfig::default().without_sleep(), cpu()).expect("a simulation");
                 let touched: usize = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").computed).sum();
                 assert!(touched > 0, "{name}: nothing touches");
                 hash(&simulation.world)
@@ -104,7 +105,7 @@ fn a_settled_pile_reuses_its_contacts_and_a_new_one_computes_them() {
 fn reused_contacts_hold_as_well_as_new_ones() {
     let heights = |recycle_distance: f32| {
         let scene = Scene::find("tower", &["n=8".into()]).expect("the scene");
-        let config = SolverConfig { recycle_distance, ..SolverConfig::default() };
+        let config = SolverConfig { recycle_distance, ..SolverConfig::default().without_sleep() };
         let mut simulation = Simulation::new(scene.world, config, cpu()).expect("good settings");
         let mut computed = 0;
         for _ in 0..300 {
@@ -123,7 +124,8 @@ fn reused_contacts_hold_as_well_as_new_ones() {
 #[test]
 fn a_reused_manifold_keeps_the_masses_that_its_arms_have() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), cpu()).expect("a simulation");
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), cpu()).expect("a simulation");
     let mut reused = 0;
     for _ in 0..80 {
         let stats = simulation.step(1.0 / 60.0).expect("a step");
@@ -169,7 +171,7 @@ fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
 fn what_a_reused_contact_carries_stays_with_it() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
         let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-        let config = SolverConfig { friction_at, ..SolverConfig::default() };
+        let config = SolverConfig { friction_at, ..SolverConfig::default().without_sleep() };
         let mut simulation = Simulation::new(scene.world, config, cpu()).expect("a simulation");
         let (mut carried, mut ended) = (0, 0);
         for step in 0..100 {

@@ -71,7 +71,7 @@ fn assert_same(scene: &Scene, config: &SolverConfig, steps: u32, what: &str) {
 }
 
 fn a_falling_pile_has_the_bits_of_the_reference_in_exact_mode() {
-    assert_same(&pile(), &SolverConfig::default(), 60, "pile");
+    assert_same(&pile(), &SolverConfig::default().without_sleep(), 60, "pile");
 }
 
 /// One body of every shape, all of which bounce, and a chain of long links: every kernel has work.
@@ -118,21 +118,23 @@ const LANDED: u32 = 80;
 
 fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
     for rule in RULES {
-        let mut config = SolverConfig::default();
+        let mut config = SolverConfig::default().without_sleep();
         rule.iter().for_each(|assignment| config.set(assignment).expect("a setting"));
         assert_same(&mixture(), &config, LANDED, &rule.join(" "));
     }
 }
 
 fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
-    let config = SolverConfig { friction_at: drystone::config::FrictionAt::Manifold, ..SolverConfig::default() };
+    let config =
+        SolverConfig { friction_at: drystone::config::FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
     let scene = Scene::find("slide", &["mu=0".into()]).expect("a scene of the catalogue");
     assert_same(&scene, &config, 20, "slide without friction");
 }
 
 fn a_mixture_has_work_for_every_kernel() {
     let scene = mixture();
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     for _ in 0..LANDED {
         simulation.step(scene.dt).expect("the reference runs");
     }
@@ -147,7 +149,8 @@ fn a_mixture_has_work_for_every_kernel() {
 /// the first contact and rest. Each step begins from the reference's state: trajectories part, single steps do not.
 fn apart_during_a_fall(mut step: impl FnMut(&StepProblem, &StepPlan) -> StepProblem) -> Vec<f64> {
     let scene = pile();
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("good settings");
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     let mut apart = Vec::new();
     for now in 1..=100 {
         let (problem, plan) = simulation.next_problem(scene.dt).expect("a step");
@@ -230,7 +233,8 @@ fn any_adapter_can_be_measured_against_the_processor() {
 fn a_device_tells_how_long_it_was_at_what() {
     let (gpu, bandwidth) = gpu::timed(gpu::plain());
     let scene = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu)).expect("good settings");
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
     for step in 1..=60 {
         let start = std::time::Instant::now();
         let stats = simulation.step(scene.dt).expect("a step");
@@ -252,7 +256,7 @@ fn a_device_tells_how_long_it_was_at_what() {
 fn a_small_world_in_one_dispatch_has_the_bits_of_the_reference() {
     for name in ["tower", "stack", "chain", "slide", "roll"] {
         let scene = Scene::find(name, &[]).expect("a scene of the catalogue");
-        assert_same(&scene, &SolverConfig::default(), 30, name);
+        assert_same(&scene, &SolverConfig::default().without_sleep(), 30, name);
     }
 }
 
@@ -260,8 +264,10 @@ fn a_small_world_in_one_dispatch_has_the_bits_of_the_reference() {
 fn kernels_that_are_timed_have_the_bits_of_the_reference() {
     let (gpu, _) = gpu::timed(gpu::exact());
     let scene = mixture();
-    let mut ours = Simulation::new(scene.world.clone(), SolverConfig::default(), reference()).expect("good settings");
-    let mut theirs = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu)).expect("good settings");
+    let mut ours = Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference())
+        .expect("good settings");
+    let mut theirs =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
     for _ in 0..LANDED {
         ours.step(scene.dt).expect("the reference runs");
         theirs.step(scene.dt).expect("the GPU runs");

@@ -32,7 +32,7 @@ fn rod_period(dt: f32, open: Open) -> f64 {
     let center = turn * Vec3::new(0.0, -0.5, 0.0);
     let rod = world.add(rod.position(center.x, center.y, center.z));
     world.join(BallJoint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
-    let mut simulation = simulate(world, SolverConfig::default(), open);
+    let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
     let (mut crossings, mut before) = (Vec::new(), center.x);
     for step in 1.. {
         simulation.step(dt).unwrap();
@@ -73,7 +73,7 @@ fn every_joint_of_a_hanging_chain_carries_what_hangs_on_it(open: Open) {
         };
         above = Some(link);
     }
-    let config = SolverConfig::default();
+    let config = SolverConfig::default().without_sleep();
     let substep = 1.0 / 60.0 / config.substeps as f32;
     let mut simulation = simulate(world, config, open);
     for _ in 0..1200 {
@@ -103,7 +103,7 @@ fn tied_bodies_pass_through_each_other_unless_asked_not_to(open: Open) {
         let mut joint = BallJoint::new(a, Vec3::new(0.45, 0.0, 0.0), b, Vec3::new(-0.45, 0.0, 0.0));
         joint.collide = collide;
         world.join(joint);
-        let mut simulation = simulate(world, SolverConfig::default(), open);
+        let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
         let stats = simulation.step(1.0 / 60.0).unwrap();
         stats.manifolds
     };
@@ -115,7 +115,7 @@ fn a_kinematic_board_reaches_the_pose_that_it_is_sent_to(open: Open) {
     let mut world = World::new();
     let board = world.add(Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0)));
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.2)).position(0.0, 0.3, 0.0));
-    let mut simulation = simulate(world, SolverConfig::default(), open);
+    let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
     let target = Quat::from_rotation_z(0.2);
     for step in 1..=60 {
         let part = Quat::IDENTITY.slerp(target, step as f32 / 60.0);

@@ -12,7 +12,7 @@ fn against_reference(
     threads: usize,
 ) -> Comparison {
     let scene = Scene::find_spec(scene).unwrap();
-    let mut config = SolverConfig::default();
+    let mut config = SolverConfig::default().without_sleep();
     settings.iter().for_each(|s| config.set(s).unwrap());
     let mut open = |which: usize| Ok(if which == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { backend() });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

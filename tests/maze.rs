@@ -32,7 +32,7 @@ fn reference() -> Box<dyn Backend> {
 }
 
 fn game(map: Map, backend: Box<dyn Backend>) -> Game {
-    Game::new(map, SolverConfig::default(), backend).expect("a game")
+    Game::new(map, SolverConfig::default().without_sleep(), backend).expect("a game")
 }
 
 /// The script in tests/maze of that name. `drystone play maze easy --pilot tests/maze/easy.txt` makes the one that wins anew.
@@ -86,7 +86,8 @@ fn roll_over(floor: Body) -> (f32, f32) {
     world.add(floor.rotation(tilt));
     let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(RADIUS)));
     world.bodies[ball].position = tilt * Vec3::new(-0.97, RADIUS, -0.97);
-    let mut simulation = Simulation::new(world, SolverConfig::default(), reference()).expect("a simulation");
+    let mut simulation =
+        Simulation::new(world, SolverConfig::default().without_sleep(), reference()).expect("a simulation");
     let up = tilt * Vec3::Y;
     let (mut hop, mut slip) = (0.0_f32, 0.0_f32);
     for step in 0..240 {

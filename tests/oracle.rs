@@ -117,8 +117,8 @@ fn exact(problem: &ContactProblem) -> Solution {
 /// A pile of six boxes as it lands.
 fn pile() -> ContactProblem {
     let scene = Scene::find("pile", &["n=6".into()]).expect("a scene of the catalogue");
-    let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("it is sound");
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
+        .expect("it is sound");
     for _ in 0..30 {
         simulation.step(1.0 / 60.0).expect("a step");
     }

@@ -38,7 +38,7 @@ const PERCENT: f64 = 0.2;
 fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Picture {
     let reference = Box::new(drystone::Reference::<f32>::new());
     let mut simulation =
-        Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect("a simulation");
+        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference).expect("a simulation");
     for _ in 0..steps {
         simulation.step(scene.dt).expect("a step");
     }

@@ -33,7 +33,7 @@ fn brick() -> Shape {
 
 /// A row under the default settings.
 fn plan_of(shape: &Shape, friction: f32, restitution: f32) -> (StepPlan, u64) {
-    let (plan, bytes, _) = planned(row(shape, friction, restitution), SolverConfig::default());
+    let (plan, bytes, _) = planned(row(shape, friction, restitution), SolverConfig::default().without_sleep());
     (plan, bytes)
 }
 
@@ -45,7 +45,7 @@ fn says(plan: &StepPlan, word: &str) -> bool {
 #[test]
 fn the_plan_of_a_tower_reads_as_the_step_is_told() {
     let scene = Scene::find("tower", &[]).expect("the scene");
-    let (plan, ..) = planned(scene.world, SolverConfig::default());
+    let (plan, ..) = planned(scene.world, SolverConfig::default().without_sleep());
     // Three colors between boxes: two would do for a chain, if its contacts did not choose in an order without a pattern. One for
     // the floor. All are small, so that one workgroup sweeps them.
     let first = "integrate_velocities\nwarm_start(disc friction) over colors 0..4\n";
@@ -61,7 +61,13 @@ solve_contacts(disc friction) over colors 0..4
 #[test]
 fn settings_are_in_the_plan() {
     let scene = Scene::find("tower", &[]).expect("the scene");
-    let config = SolverConfig { substeps: 1, iterations: 2, relax: 0, fuse_colors_below: 0, ..SolverConfig::default() };
+    let config = SolverConfig {
+        substeps: 1,
+        iterations: 2,
+        relax: 0,
+        fuse_colors_below: 0,
+        ..SolverConfig::default().without_sleep()
+    };
     let (plan, ..) = planned(scene.world, config);
     let expected = "\
 integrate_velocities
@@ -114,7 +120,7 @@ fn only_round_surfaces_are_solved_as_round() {
 fn a_world_that_touches_nothing_is_only_integrated() {
     let mut world = row(&cube(), 0.5, 0.5);
     world.bodies.remove(0);
-    let (plan, ..) = planned(world, SolverConfig { substeps: 2, ..SolverConfig::default() });
+    let (plan, ..) = planned(world, SolverConfig { substeps: 2, ..SolverConfig::default().without_sleep() });
     assert_eq!(
         plan.to_string(),
         "integrate_velocities\nintegrate_positions\nintegrate_velocities(carry)\nintegrate_positions\n"
@@ -125,7 +131,7 @@ fn a_world_that_touches_nothing_is_only_integrated() {
 #[test]
 fn contacts_that_find_no_color_are_counted_and_solved_all_the_same() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let config = SolverConfig { max_colors: 1, ..SolverConfig::default() };
+    let config = SolverConfig { max_colors: 1, ..SolverConfig::default().without_sleep() };
     let (_, _, mut simulation) = planned(scene.world.clone(), config);
     let mut stats = drystone::StepStats::default();
     for _ in 0..600 {
@@ -144,7 +150,7 @@ fn contacts_that_find_no_color_are_counted_and_solved_all_the_same() {
 #[test]
 fn a_pile_needs_no_more_colors_than_there_are() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let (_, _, mut simulation) = planned(scene.world, SolverConfig::default());
+    let (_, _, mut simulation) = planned(scene.world, SolverConfig::default().without_sleep());
     for _ in 0..120 {
         assert_eq!(simulation.step(scene.dt).expect("a step").overflow, 0);
     }

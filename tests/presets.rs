@@ -7,8 +7,8 @@ use drystone::{Cpu, Scene, Simulation, metrics};
 /// Deepest overlap at any time and at the end [m], and bodies that are not in place, after `seconds` of a tower.
 fn tower(preset: Preset, seconds: u32, parameters: &[String]) -> (f64, f64, usize) {
     let scene = Scene::find("tower", parameters).expect("a scene");
-    let mut simulation =
-        Simulation::new(scene.world.clone(), preset.config(), Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation = Simulation::new(scene.world.clone(), preset.config().without_sleep(), Box::new(Cpu::new()))
+        .expect("a simulation");
     let (mut deepest, mut last) = (0.0_f64, 0.0);
     for step in 1..=60 * seconds {
         simulation.step(scene.dt).expect("a step");
@@ -61,7 +61,7 @@ fn reference_holds_what_it_promises() {
 /// The substeps that the load of a scene asks for, and the deepest overlap with them at any time and after 1 s [m].
 fn with_at_most(most: f64, parameters: &[String]) -> (u32, f64, f64) {
     let scene = Scene::find("tower", parameters).expect("a scene");
-    let mut config = Preset::default().config();
+    let mut config = Preset::default().config().without_sleep();
     let load = Load::heaviest(&scene.world, &config).expect("a load");
     config.substeps = load.substeps(most, scene.dt, &config).expect("substeps");
     let substeps = config.substeps;

@@ -66,7 +66,7 @@ fn assert_same(both: &mut [Simulation; 2], what: &str) {
 
 fn what_is_asked_for_has_the_bits_of_the_reference() {
     let scene = pile(100);
-    let mut both = both(&scene, &SolverConfig::default());
+    let mut both = both(&scene, &SolverConfig::default().without_sleep());
     let (mut computed, mut reused) = (0, 0);
     for step in 1..=120 {
         let stats = both.each_mut().map(|s| s.step(scene.dt).expect("a step"));
@@ -95,7 +95,7 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
 
 fn what_somebody_changes_between_two_steps_reaches_the_device() {
     let scene = pile(60);
-    let mut both = both(&scene, &SolverConfig::default());
+    let mut both = both(&scene, &SolverConfig::default().without_sleep());
     for step in 1..=100 {
         for simulation in &mut both {
             match step {
@@ -103,10 +103,12 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
                 50 => simulation.world.bodies[40].position.y += 0.01,
                 60 => simulation.world.bodies[20].force.x = 1e4,
                 70 => simulation.world.gravity.x = 2.0,
-                80 => simulation.set_config(SolverConfig { substeps: 4, ..SolverConfig::default() }).expect("good"),
-                90 => {
-                    simulation.set_config(SolverConfig { warm_start: false, ..SolverConfig::default() }).expect("good")
-                }
+                80 => simulation
+                    .set_config(SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() })
+                    .expect("good"),
+                90 => simulation
+                    .set_config(SolverConfig { warm_start: false, ..SolverConfig::default().without_sleep() })
+                    .expect("good"),
                 _ => {}
             }
             simulation.step(scene.dt).expect("a step");
@@ -142,7 +144,7 @@ fn islands_fall_asleep_and_wake_with_their_impulses() {
 
 fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
     let scene = pile(60);
-    let mut both = both(&scene, &SolverConfig::default());
+    let mut both = both(&scene, &SolverConfig::default().without_sleep());
     for step in 1..=60 {
         if step == 40 {
             both[1].set_backend(Box::new(Reference::<f32>::new()));
@@ -182,8 +184,8 @@ impl Backend for Confused {
 
 fn two_rows_in_each_others_places_are_found() {
     let scene = pile(60);
-    let [mut ours, _] = both(&scene, &SolverConfig::default());
-    let mut theirs = simulation(&scene, &SolverConfig::default(), Box::new(Confused(gpu::exact())));
+    let [mut ours, _] = both(&scene, &SolverConfig::default().without_sleep());
+    let mut theirs = simulation(&scene, &SolverConfig::default().without_sleep(), Box::new(Confused(gpu::exact())));
     for _ in 0..80 {
         ours.step(scene.dt).expect("a step");
         theirs.step(scene.dt).expect("a step");
@@ -193,7 +195,7 @@ fn two_rows_in_each_others_places_are_found() {
 
 /// What each of the last steps of a scene moved to the device and back, and the simulation.
 fn traffic_of(scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation) {
-    let mut simulation = simulation(scene, &SolverConfig::default(), Box::new(gpu::plain()));
+    let mut simulation = simulation(scene, &SolverConfig::default().without_sleep(), Box::new(gpu::plain()));
     let mut all: Vec<_> = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
     (all.split_off((steps - last) as usize), simulation)
 }

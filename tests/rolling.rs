@@ -13,7 +13,7 @@ fn error(angle: f32, config: SolverConfig, backend: Box<dyn Backend>) -> f64 {
 #[test]
 fn the_disc_is_right_in_every_direction() {
     for angle in [90.0, 60.0] {
-        let error = error(angle, SolverConfig::default(), Box::new(Cpu::new()));
+        let error = error(angle, SolverConfig::default().without_sleep(), Box::new(Cpu::new()));
         println!("{angle} degrees: {error:.1e}");
         assert!(error < 1e-5, "{angle} degrees: {error:e}");
     }
@@ -21,7 +21,7 @@ fn the_disc_is_right_in_every_direction() {
 
 #[test]
 fn in_box_mode_a_plate_that_is_pushed_across_its_tangents_does_not_move() {
-    let config = || SolverConfig { friction: FrictionRule::Box, ..SolverConfig::default() };
+    let config = || SolverConfig { friction: FrictionRule::Box, ..SolverConfig::default().without_sleep() };
     let across = error(60.0, config(), Box::new(Reference::<f32>::new()));
     println!("60 degrees, box: {across:.4}");
     assert!((across - 3.145).abs() < 0.005, "{across}");
@@ -51,7 +51,8 @@ fn a_ball_rolls_on_a_board_that_tilts_as_on_paper() {
     let (rate, radius, g) = (20.0_f32.to_radians(), 0.015, 9.81);
     let mut world = turning_board(rate);
     let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(radius)).position(0.0, radius, 0.0));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation =
+        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let (mut paper, mut v, h) = (0.0, -f64::from(rate * radius), 1e-5);
     let mut time = 0.0;
     for _ in 0..60 {
@@ -73,7 +74,8 @@ fn a_block_on_a_board_that_tilts_slowly_slips_at_the_angle_of_friction() {
     let (rate, dt) = (4.0_f32.to_radians(), 1.0 / 60.0);
     let mut world = turning_board(rate);
     let block = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.05, 0.2)).position(0.0, 0.05, 0.0));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation =
+        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let mut angle = 0.0;
     while along_board(&simulation, block) < 1e-3 {
         simulation.step(dt).expect("a step");

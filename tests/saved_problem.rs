@@ -26,8 +26,8 @@ tests! {
 fn simulation(scene: &str, parameters: &[&str], steps: u32) -> Simulation {
     let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
     let scene = Scene::find(scene, &parameters).expect("a scene of the catalogue");
-    let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("it is sound");
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
+        .expect("it is sound");
     for _ in 0..steps {
         simulation.step(1.0 / 60.0).expect("a step");
     }
@@ -88,7 +88,7 @@ fn a_problem_says_what_the_bodies_are_about_to_do() {
     let falling = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).friction(0.5).position(0.0, 1.004, 0.0);
     world.add(falling.velocity(Vec3::NEG_Y, Vec3::ZERO));
     world.add(Body::dynamic().shape(Shape::ball(0.5)).position(50.0, 50.0, 0.0));
-    let config = SolverConfig { substeps: 4, ..SolverConfig::default() };
+    let config = SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() };
     let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("it is sound");
     let (problem, _) = simulation.step_with_contacts("plate", 0.1).expect("no joints");
 

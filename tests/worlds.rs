@@ -36,14 +36,14 @@ fn end(scene: &Scene, backend: fn() -> Box<dyn Backend>, config: &SolverConfig, 
 
 #[test]
 fn every_copy_of_a_world_goes_as_it_goes_alone() {
-    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default() };
+    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
     let asleep = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
     for (name, parameters, config, steps) in [
-        ("pile", &["n=60"][..], SolverConfig::default(), 90),
+        ("pile", &["n=60"][..], SolverConfig::default().without_sleep(), 90),
         ("pile", &["n=27"], at_manifold, 60),
         ("tower", &["n=5"], asleep, 120),
-        ("bridge", &["planks=6", "boxes=2"], SolverConfig::default(), 60),
-        ("drop", &[], SolverConfig::default(), 60),
+        ("bridge", &["planks=6", "boxes=2"], SolverConfig::default().without_sleep(), 60),
+        ("drop", &[], SolverConfig::default().without_sleep(), 60),
     ] {
         for backend in [reference, cpu] {
             let alone = end(&scene(name, parameters, 1, None), backend, &config, steps);
@@ -60,9 +60,16 @@ fn every_copy_of_a_world_goes_as_it_goes_alone() {
 #[test]
 fn a_world_does_not_see_what_other_worlds_do() {
     let alone: Vec<_> = (1..=4)
-        .map(|seed| end(&scene("pile", &["n=60", &format!("seed={seed}")], 1, None), cpu, &SolverConfig::default(), 90))
+        .map(|seed| {
+            end(
+                &scene("pile", &["n=60", &format!("seed={seed}")], 1, None),
+                cpu,
+                &SolverConfig::default().without_sleep(),
+                90,
+            )
+        })
         .collect();
-    let all = end(&scene("pile", &["n=60"], 4, Some("seed")), cpu, &SolverConfig::default(), 90);
+    let all = end(&scene("pile", &["n=60"], 4, Some("seed")), cpu, &SolverConfig::default().without_sleep(), 90);
     let whole = |world: &World| bits(world, 0..world.bodies.len());
     for (bodies, alone) in all.parts().zip(&alone) {
         assert_eq!(bits(&all, bodies), whole(alone));
@@ -75,7 +82,8 @@ fn the_number_of_threads_changes_no_bit_of_many_worlds() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let world = end(&scene("pile", &["n=30"], 12, Some("seed")), cpu, &SolverConfig::default(), 80);
+            let world =
+                end(&scene("pile", &["n=30"], 12, Some("seed")), cpu, &SolverConfig::default().without_sleep(), 80);
             bits(&world, 0..world.bodies.len())
         })
     };
@@ -87,7 +95,7 @@ fn the_number_of_threads_changes_no_bit_of_many_worlds() {
 #[test]
 fn bodies_of_different_worlds_never_meet() {
     let mut towers = scene("tower", &["n=3"], 3, None);
-    let apart = SolverConfig::default();
+    let apart = SolverConfig::default().without_sleep();
     let contacts = |scene: &Scene| {
         let mut simulation = Simulation::new(scene.world.clone(), apart.clone(), cpu()).expect("a simulation");
         let stats = simulation.step(scene.dt).expect("a step");

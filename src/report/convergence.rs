@@ -101,8 +101,13 @@ fn runs(page: &mut String) -> Result<()> {
             // Momentum begins with the third sweep.
             let methods = if sweeps < 3 { &[Method::Plain][..] } else { &[Method::Plain, Method::Accelerated] };
             for &method in methods {
-                let config =
-                    SolverConfig { substeps, iterations: sweeps, relax: sweeps, method, ..SolverConfig::default() };
+                let config = SolverConfig {
+                    substeps,
+                    iterations: sweeps,
+                    relax: sweeps,
+                    method,
+                    ..SolverConfig::default().without_sleep()
+                };
                 let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new()))?;
                 let mut report = RunReport::new(&scene, &simulation);
                 for _ in 0..steps {
@@ -153,7 +158,8 @@ pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
     for (name, parameters, step) in STEPS {
         let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
         let scene = Scene::find(name, &parameters)?;
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()))?;
+        let mut simulation =
+            Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
         for _ in 1..step {
             simulation.step(scene.dt)?;
         }

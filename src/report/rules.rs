@@ -61,7 +61,7 @@ pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
 const SHEET: &str = "substeps=1 iterations=20 relax=0 stabilization=baumgarte";
 
 fn settings(text: &str) -> Result<SolverConfig> {
-    let mut config = SolverConfig::default();
+    let mut config = SolverConfig::default().without_sleep();
     text.split_whitespace().try_for_each(|assignment| config.set(assignment))?;
     config.check()?;
     Ok(config)

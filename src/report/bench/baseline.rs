@@ -57,7 +57,7 @@ mod tests {
     fn measured() -> Bench {
         let open = || Ok(vec![Box::new(crate::Cpu::new()) as Box<dyn Backend>]);
         let specs = ["tower:n=3".to_owned(), "pile:n=8,worlds=2".to_owned()];
-        bench(&specs, &SolverConfig::default(), &[1], &open, 3, &mut || ()).expect("a bench")
+        bench(&specs, &SolverConfig::default().without_sleep(), &[1], &open, 3, &mut || ()).expect("a bench")
     }
 
     #[test]

@@ -63,7 +63,7 @@ const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
 /// # Errors
 /// The pile is none, a pool cannot be made.
 pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
-    let config = SolverConfig::default();
+    let config = SolverConfig::default().without_sleep();
     let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;
     let problem = simulation.next_problem(dt)?.0;
     let pools: Result<Vec<_>> = threads
@@ -107,7 +107,7 @@ const MANY: u32 = 24;
 
 /// Time of so many sweeps [s].
 fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
-    let config = SolverConfig { substeps: 1, iterations: sweeps, relax: 0, ..SolverConfig::default() };
+    let config = SolverConfig { substeps: 1, iterations: sweeps, relax: 0, ..SolverConfig::default().without_sleep() };
     let plan = StepPlan::new(&config, problem);
     let mut problem = problem.clone();
     let begin = Instant::now();

@@ -238,7 +238,7 @@ impl Course {
                 backend: name,
                 adapter: way.pool.install(move || backend.adapter()),
                 threads: way.pool.current_num_threads(),
-                settings: config.unusual(&[]).join(" "),
+                settings: config.unusual(&["sleep_after"]).join(" "),
                 worlds: world.parts().len(),
                 bodies: world.dynamic_count(),
                 manifolds: stats.manifolds,

@@ -84,7 +84,7 @@ impl Setting {
 
 /// What a setting has no place for. As many relax sweeps as biased ones are what is expected.
 fn unusual(config: &SolverConfig) -> Vec<String> {
-    let said = ["substeps", "iterations", "method", "friction"];
+    let said = ["substeps", "iterations", "method", "friction", "sleep_after"];
     let mut more = config.unusual(&said);
     more.retain(|text| !text.starts_with("relax="));
     if config.relax != config.iterations {
@@ -137,7 +137,8 @@ mod tests {
 
     #[test]
     fn a_label_says_what_is_not_at_its_default() {
-        let mut config = SolverConfig { substeps: 4, friction: FrictionRule::Box, ..SolverConfig::default() };
+        let mut config =
+            SolverConfig { substeps: 4, friction: FrictionRule::Box, ..SolverConfig::default().without_sleep() };
         assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x1 box");
         config.set("contact_frequency=0.25").unwrap();
         config.set("relax=2").unwrap();
