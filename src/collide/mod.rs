@@ -5,9 +5,11 @@
 //! beside each other have a tree and pairs each, so that what one finds does not depend on the others.
 
 mod arena;
+mod facet;
 mod manifold;
 mod narrow;
 mod query;
+mod solid;
 
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
 pub use narrow::{Motion, Pair};

@@ -3,11 +3,13 @@
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
-use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use parry3d::query::TrackedContact;
 use parry3d::shape::{SharedShape, TypedShape};
 
+use super::facet::composite_contacts;
 use super::manifold::{Manifold, ManifoldPoint};
-use super::query::{Found, convex_contact};
+use super::query::{Found, convex_contact, flip};
+use super::solid::{Cutting, Search};
 use crate::math::{self, NormalMovement};
 use crate::random::mixed;
 use crate::world::Collider;
@@ -154,8 +156,8 @@ pub(super) struct Margins {
 /// Memory that one thread reuses from pair to pair.
 #[derive(Default)]
 pub(super) struct Scratch {
+    cutting: Cutting,
     one: Found,
-    again: Found,
     many: Vec<Found>,
     candidates: Vec<ManifoldPoint>,
     old: Vec<Manifold>,
@@ -285,14 +287,18 @@ impl Pair {
         let pose_a = Pose::from_parts(a.position, a.rotation) * ca.local;
         let pose_b = Pose::from_parts(b.position, b.rotation) * cb.local;
         let pos12 = pose_a.inv_mul(&pose_b);
-        let Scratch { one, again, many, candidates, old } = scratch;
-        let found: &[Found] = if ca.is_composite() || cb.is_composite() {
-            many.clear();
-            // An unsupported pair (two meshes) cannot occur: both would be fixed.
-            let _ = DefaultQueryDispatcher.contact_manifolds(&pos12, &*ca.shape, &*cb.shape, look, many, &mut None);
+        let Scratch { cutting, one, many, candidates, old } = scratch;
+        let search = Search { look, size };
+        many.clear();
+        let found: &[Found] = if ca.is_composite() {
+            composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, cutting, many);
+            many
+        } else if cb.is_composite() {
+            composite_contacts(&*cb.shape, &*ca.shape, &pos12.inverse(), search, cutting, many);
+            many.iter_mut().for_each(flip);
             many
         } else {
-            convex_contact((&ca.shape, &cb.shape), &pos12, look, size, one, again);
+            convex_contact((&ca.shape, &cb.shape), &pos12, search, cutting, one);
             std::slice::from_ref(one)
         };
 

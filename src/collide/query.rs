@@ -1,65 +1,163 @@
 //! parry's answer for one pair of convex shapes, and a second opinion where the first is known to go wrong.
 
+use glam::Vec3;
 use parry3d::math::Pose;
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d::shape::SharedShape;
 
+use super::facet::half_space_contact;
+use super::solid::{Cutting, Search, Solid, add_above, cut_to};
+
 /// parry's manifold, with nothing of ours in it.
 pub(super) type Found = ContactManifold<(), ()>;
 
 /// Overlap from which an answer is checked, relative to the thinner shape's smallest half extent.
-const DEEP: f32 = 0.05;
+pub(super) const DEEP: f32 = 0.05;
+/// How far a distance may be from that along its normal, likewise.
+const TRUE: f32 = 0.01;
+/// Cosine of the angle up to which two directions are the same, short of 1: 0.6 degrees.
+const SAME: f32 = 5e-5;
 /// How far the shapes are pushed apart for the second opinion, likewise.
 const PUSH: f32 = 0.02;
 
-/// Finds the contact of two convex shapes up to the distance `look`; b's pose is `pos12` as seen from a. `size` is the smallest
-/// half extent of the thinner one.
+/// Finds the contact of two convex shapes up to the distance `look`; b's pose is `pos12` as seen from a.
 ///
 /// Hulls that touch exactly, as the stones of an arch do, leave parry's search without a direction, and it can answer with
-/// any: overlaps of a meter between stones that only touch. A deep answer is therefore asked for again with the shapes pushed
-/// a little apart, along the line of their middles, and the shallower of the two is taken: true overlap stays deep.
+/// any: overlaps of a meter between stones that only touch. A cone that lies on a cuboid may get the direction to the cuboid's
+/// other side. An answer that is deep, or other than the distance along its own normal, which has a closed form, is therefore
+/// compared with two more: that with the shapes pushed a little apart, along the line of their middles, and that across the
+/// best face of either shape. No direction gives more than the true distance: what gives most is taken.
 pub(super) fn convex_contact(
     (a, b): (&SharedShape, &SharedShape),
     pos12: &Pose,
-    look: f32,
-    size: f32,
+    search: Search,
+    cutting: &mut Cutting,
     found: &mut Found,
-    again: &mut Found,
 ) {
     empty(found);
     if let (Some(box_a), Some(box_b)) = (a.as_cuboid(), b.as_cuboid()) {
-        return contact_manifold_cuboid_cuboid(pos12, box_a, box_b, look, found);
+        return contact_manifold_cuboid_cuboid(pos12, box_a, box_b, search.look, found);
     }
-    // Every pair of convex shapes is supported.
-    let ask = |pos12: &Pose, look: f32, found: &mut Found| {
-        let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, &**a, &**b, None, None, look, found);
-    };
-    ask(pos12, look, found);
-    let depth = deepest(found);
-    if depth > -DEEP * size || a.as_halfspace().is_some() || b.as_halfspace().is_some() {
-        return;
-    }
-    let middles = *pos12 * b.compute_local_aabb().center() - a.compute_local_aabb().center();
-    let Some(away) = middles.try_normalize() else { return };
-    let push = PUSH * size;
-    let mut apart = *pos12;
-    apart.translation += away * push;
-    empty(again);
-    ask(&apart, look + push, again);
-    let pushed = push * again.local_n1.dot(away);
-    if deepest(again) - pushed > depth + PUSH * size {
-        again.points.iter_mut().for_each(|p| p.dist -= pushed);
-        std::mem::swap(found, again);
-    }
+    *found = searched_contact((a, b), pos12, search, cutting);
 }
 
 /// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
-/// then starts: what one pair touches with would depend on the pair before it, and so on the number of threads.
+/// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
 fn empty(manifold: &mut Found) {
     let mut points = std::mem::take(&mut manifold.points);
     points.clear();
     *manifold = Found { points, ..Found::new() };
+}
+
+/// The contact of two shapes that are not both cuboids.
+fn searched_contact(
+    (a, b): (&SharedShape, &SharedShape),
+    pos12: &Pose,
+    search: Search,
+    cutting: &mut Cutting,
+) -> Found {
+    let Search { look, size } = search;
+    let mut found = Found::new();
+    // A half-space reaches further than any other shape.
+    if let Some(plane) = a.as_halfspace() {
+        if half_space_contact(plane.normal, &**b, pos12, cutting, &mut found).is_none() {
+            ask((a, b), pos12, look, &mut found);
+        }
+        return found;
+    }
+    ask((a, b), pos12, look, &mut found);
+    let (Some(map_a), Some(map_b)) = (a.as_support_map(), b.as_support_map()) else { return found };
+    let along = |d: Vec3| {
+        let own = pos12.rotation.inverse() * -d;
+        d.dot(*pos12 * map_b.local_support_point(own) - map_a.local_support_point(d))
+    };
+    let is_true = |found: &Found, distance: f32| {
+        if found.points.is_empty() { distance > look } else { (deepest(found) - distance).abs() < TRUE * size }
+    };
+    let mut best = along(found.local_n1);
+    let mut found_is_true = is_true(&found, best);
+    // parry's other points of a round rim may be those of its far side.
+    let is_round = |shape: &SharedShape| shape.as_cone().is_some() || shape.as_cylinder().is_some();
+    let rims = is_round(a) || is_round(b);
+    if found_is_true && best > -DEEP * size && (found.points.is_empty() || !rims) {
+        return found;
+    }
+    // Where the points are wrong, others along as good a direction are better.
+    let is_better =
+        |distance: f32, best: f32, is_true: bool| distance > best + if is_true { PUSH } else { -TRUE } * size;
+    let is_deep = !found_is_true || best < -DEEP * size;
+    let middles = *pos12 * b.compute_local_aabb().center() - a.compute_local_aabb().center();
+    if let Some(away) = middles.try_normalize().filter(|_| is_deep) {
+        let push = PUSH * size;
+        let mut apart = *pos12;
+        apart.translation += away * push;
+        let mut again = Found::new();
+        ask((a, b), &apart, look + push, &mut again);
+        let (distance, pushed) = (along(again.local_n1), push * again.local_n1.dot(away));
+        again.points.iter_mut().for_each(|p| p.dist -= pushed);
+        if is_better(distance, best, found_is_true) && is_true(&again, distance) {
+            (found, best, found_is_true) = (again, distance, true);
+        }
+    }
+    let (Some(solid_a), Some(solid_b)) = (Solid::new(&**a, Pose::IDENTITY), Solid::new(&**b, *pos12)) else {
+        return found;
+    };
+    let mut across = None;
+    let mut consider = |d: Vec3, of_b: bool| {
+        let distance = along(d);
+        let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - TRUE * size;
+        if is_same || is_better(distance, best, found_is_true) {
+            (best, found_is_true, across) = (distance, true, Some((d, of_b)));
+        }
+    };
+    solid_a.each_normal(|normal| consider(normal, false));
+    solid_b.each_normal(|normal| consider(-normal, true));
+    match across {
+        Some((d, false)) => found = face_contact(&solid_a, &solid_b, d, search, cutting),
+        Some((d, true)) => {
+            found = face_contact(&solid_b, &solid_a, -d, search, cutting);
+            flip(&mut found);
+        }
+        None => {}
+    }
+    found
+}
+
+/// parry's answer. Every pair of convex shapes is supported.
+fn ask((a, b): (&SharedShape, &SharedShape), pos12: &Pose, look: f32, found: &mut Found) {
+    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, &**a, &**b, None, None, look, found);
+}
+
+/// The contact of `other` across the face of `solid` with the unit normal `face`.
+fn face_contact(solid: &Solid, other: &Solid, face: Vec3, search: Search, cutting: &mut Cutting) -> Found {
+    let Cutting { polygon, patch, uncut, corners } = cutting;
+    solid.feature(face, patch);
+    other.feature(-face, polygon);
+    cut_to(polygon, uncut, patch, face);
+    other.corners(-face, corners);
+    add_above(polygon, corners, patch, face);
+    let origin = solid.furthest(face);
+    if polygon.iter().all(|corner| face.dot(corner.0 - origin) - other.radius > search.look) {
+        polygon.push((other.furthest(-face), 0));
+    }
+    let mut found = Found::new();
+    found.local_n1 = solid.pose.rotation.inverse() * face;
+    found.local_n2 = other.pose.rotation.inverse() * -face;
+    let contacts = other.contacts(polygon, [face, face, origin]);
+    found.points.extend(contacts.filter(|contact| contact.dist <= search.look));
+    found.points.iter_mut().for_each(|point| point.local_p1 = solid.pose.inverse_transform_point(point.local_p1));
+    found
+}
+
+/// Exchanges the two shapes.
+pub(super) fn flip(found: &mut Found) {
+    std::mem::swap(&mut found.local_n1, &mut found.local_n2);
+    std::mem::swap(&mut found.subshape1, &mut found.subshape2);
+    for point in &mut found.points {
+        std::mem::swap(&mut point.local_p1, &mut point.local_p2);
+        std::mem::swap(&mut point.fid1, &mut point.fid2);
+    }
 }
 
 /// Separation of the deepest point; infinite without points.
@@ -92,8 +190,9 @@ mod tests {
             for i in 0..count - 1 {
                 let angle = |k: i32| width * k as f32;
                 let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
-                let (mut found, mut again) = (Found::new(), Found::new());
-                convex_contact((&a, &b), &Pose::IDENTITY, 0.002, 0.05, &mut found, &mut again);
+                let search = Search { look: 0.002, size: 0.05 };
+                let mut found = Found::new();
+                convex_contact((&a, &b), &Pose::IDENTITY, search, &mut Cutting::default(), &mut found);
                 let depth = deepest(&found);
                 assert!(depth.is_finite(), "{count} stones, joint {i}: no contact");
                 worst = worst.max(-depth);
@@ -108,25 +207,26 @@ mod tests {
     fn an_answer_does_not_depend_on_the_pair_before_it() {
         let width = std::f32::consts::PI / 17.0;
         let angle = |k: i32| width * k as f32;
-        let answer = |found: &mut Found, again: &mut Found, i: i32| {
+        let answer = |cutting: &mut Cutting, found: &mut Found, i: i32| {
             let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
-            convex_contact((&a, &b), &Pose::IDENTITY, 0.002, 0.05, found, again);
+            convex_contact((&a, &b), &Pose::IDENTITY, Search { look: 0.002, size: 0.05 }, cutting, found);
             let points = found.points.iter().map(|p| (p.local_p1, p.local_p2, p.dist, p.fid1, p.fid2));
             (found.local_n1, found.local_n2, points.collect::<Vec<_>>())
         };
-        let (mut found, mut again) = (Found::new(), Found::new());
+        let (mut cutting, mut found) = (Cutting::default(), Found::new());
         for i in 0..15 {
-            let after_another = answer(&mut found, &mut again, i);
-            assert_eq!(after_another, answer(&mut Found::new(), &mut Found::new(), i), "joint {i}");
+            let after_another = answer(&mut cutting, &mut found, i);
+            assert_eq!(after_another, answer(&mut Cutting::default(), &mut Found::new(), i), "joint {i}");
         }
     }
 
     #[test]
     fn true_overlap_stays_as_deep_as_it_is() {
         let (a, b) = (SharedShape::cylinder(0.5, 0.5), SharedShape::cylinder(0.5, 0.5));
-        let (mut found, mut again) = (Found::new(), Found::new());
         let pos12 = Pose::translation(0.0, 0.8, 0.0);
-        convex_contact((&a, &b), &pos12, 0.02, 0.5, &mut found, &mut again);
+        let search = Search { look: 0.02, size: 0.5 };
+        let mut found = Found::new();
+        convex_contact((&a, &b), &pos12, search, &mut Cutting::default(), &mut found);
         assert!((deepest(&found) + 0.2).abs() < 1e-3, "{} m", deepest(&found));
     }
 }

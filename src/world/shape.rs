@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
-use parry3d::shape::{SharedShape, TriMeshFlags, TypedShape};
+use parry3d::shape::{HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
 use super::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result};
@@ -90,6 +90,7 @@ impl Shape {
     }
 
     /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` [m].
+    /// Like a mesh it has one side, the upper one, and bodies do not stumble over the edges between its triangles.
     ///
     /// # Errors
     /// Fewer than two rows or columns, rows of unequal length, or a height or scale that is no length.
@@ -107,7 +108,8 @@ impl Shape {
         }
         // parry stores columns one after another.
         let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
-        Ok(Self(SharedShape::heightfield(parry3d::utils::Array2::new(rows, columns, data), scale)))
+        let data = parry3d::utils::Array2::new(rows, columns, data);
+        Ok(Self(SharedShape::heightfield_with_flags(data, scale, HeightFieldFlags::FIX_INTERNAL_EDGES)))
     }
 
     /// Refuses a shape without extent, one larger than [`MOST_LENGTH`], or one whose numbers are none.

@@ -1,0 +1,186 @@
+//! Convex solids as seen from a direction: how far they reach, and with which face.
+
+use glam::Vec3;
+use parry3d::math::Pose;
+use parry3d::query::TrackedContact;
+use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
+
+/// How exactly a distance is known, relative to the thinner shape's smallest half extent.
+pub(super) const EXACT: f32 = 1e-3;
+
+/// Settings of one search.
+#[derive(Clone, Copy)]
+pub(super) struct Search {
+    /// Distance up to which contacts are sought [m].
+    pub look: f32,
+    /// Smallest half extent of the thinner shape [m].
+    pub size: f32,
+}
+
+/// A corner of a polygon, and the number that marks it from step to step.
+pub(super) type Corner = (Vec3, u32);
+
+/// Memory that polygons are cut in.
+#[derive(Default)]
+pub(super) struct Cutting {
+    pub polygon: Vec<Corner>,
+    pub patch: Vec<Corner>,
+    pub uncut: Vec<Corner>,
+    pub corners: Vec<Corner>,
+}
+
+/// Keeps the part of `polygon` with n · x <= `limit`. Corners that the cut adds are numbered by their edge and by `cut`.
+pub(super) fn cut(polygon: &mut Vec<Corner>, uncut: &mut Vec<Corner>, normal: Vec3, limit: f32, cut: u32) {
+    std::mem::swap(polygon, uncut);
+    polygon.clear();
+    let beyond = |corner: Corner| normal.dot(corner.0) - limit;
+    for (i, &from) in uncut.iter().enumerate() {
+        let to = uncut[(i + 1) % uncut.len()];
+        if beyond(from) <= 0.0 {
+            polygon.push(from);
+        }
+        if (beyond(from) <= 0.0) != (beyond(to) <= 0.0) {
+            // From the inside out, so that a segment, a polygon of two corners, is cut at the same place on its way back.
+            let (inside, outside) = if beyond(from) <= 0.0 { (from, to) } else { (to, from) };
+            let share = beyond(inside) / (beyond(inside) - beyond(outside));
+            let number = inside.1.wrapping_mul(31).wrapping_add(outside.1).wrapping_mul(8).wrapping_add(cut + 1);
+            polygon.push((inside.0.lerp(outside.0, share), number));
+        }
+    }
+    polygon.dedup_by_key(|corner| corner.0);
+    if polygon.len() > 1 && polygon[0].0 == polygon[polygon.len() - 1].0 {
+        polygon.pop();
+    }
+}
+
+/// Keeps the part of `polygon` that lies above or below the polygon `base`, as seen along `normal`.
+pub(super) fn cut_to(polygon: &mut Vec<Corner>, uncut: &mut Vec<Corner>, base: &[Corner], normal: Vec3) {
+    each_side(base, normal, |i, out, limit| cut(polygon, uncut, out, limit, i));
+}
+
+/// Calls `with` on the number and the half-space n · x <= limit of each side of the prism over `base` along `normal`.
+fn each_side(base: &[Corner], normal: Vec3, mut with: impl FnMut(u32, Vec3, f32)) {
+    let next = |i: usize| base[(i + 1) % base.len()].0;
+    // Faces of parry's run around either way.
+    let around: Vec3 = base.iter().enumerate().map(|(i, at)| (at.0 - base[0].0).cross(next(i) - base[0].0)).sum();
+    let normal = if around.dot(normal) < 0.0 { -normal } else { normal };
+    for (i, from) in base.iter().enumerate() {
+        let out = (next(i) - from.0).cross(normal);
+        with(i as u32, out, out.dot(from.0));
+    }
+}
+
+/// Adds the corners `more` that lie above or below `base`, as seen along `normal`, and are not yet in `polygon`.
+pub(super) fn add_above(polygon: &mut Vec<Corner>, more: &[Corner], base: &[Corner], normal: Vec3) {
+    for corner in more {
+        let mut is_new = polygon.iter().all(|old| old.1 != corner.1);
+        each_side(base, normal, |_, out, limit| is_new &= out.dot(corner.0) <= limit);
+        if is_new {
+            polygon.push(*corner);
+        }
+    }
+}
+
+/// A flat polygon.
+pub(super) struct Patch<'a>(pub &'a [Corner]);
+
+impl SupportMap for Patch<'_> {
+    fn local_support_point(&self, d: Vec3) -> Vec3 {
+        let furthest = self.0.iter().max_by(|p, q| p.0.dot(d).total_cmp(&q.0.dot(d)));
+        furthest.map_or(Vec3::ZERO, |corner| corner.0)
+    }
+}
+
+/// A convex shape at a pose: a solid that is rounded off by `radius`.
+pub(super) struct Solid<'a> {
+    shape: &'a dyn Shape,
+    pub map: &'a dyn PolygonalFeatureMap,
+    pub radius: f32,
+    pub pose: Pose,
+}
+
+impl<'a> Solid<'a> {
+    /// None for a ball.
+    pub fn new(shape: &'a dyn Shape, pose: Pose) -> Option<Self> {
+        let (map, radius) = shape.as_polygonal_feature_map()?;
+        Some(Self { shape, map, radius, pose })
+    }
+
+    /// The point of the solid that lies furthest in the direction `d`.
+    pub fn furthest(&self, d: Vec3) -> Vec3 {
+        self.pose * self.map.local_support_point(self.pose.rotation.inverse() * d)
+    }
+
+    /// Writes the face or edge of the solid that lies best across `d` at its furthest corner in that direction.
+    pub fn feature(&self, d: Vec3, polygon: &mut Vec<Corner>) {
+        polygon.clear();
+        let own = self.pose.rotation.inverse() * d;
+        let Some(hull) = self.shape.as_convex_polyhedron() else {
+            let mut feature = PolygonalFeature::default();
+            self.map.local_support_feature(own, &mut feature);
+            let corners = feature.vertices.iter().zip(feature.vids).take(feature.num_vertices);
+            return polygon.extend(corners.map(|(&at, id)| (self.pose * at, id.0)));
+        };
+        // parry gives the first four corners of the face: a prism of eight sides tips over them into the floor.
+        let points = hull.points();
+        let furthest = (0..points.len()).max_by(|&i, &j| points[i].dot(own).total_cmp(&points[j].dot(own)));
+        let Some(vertex) = furthest.map(|i| hull.vertices()[i]) else { return };
+        let first = vertex.first_adj_face_or_edge as usize;
+        let around = &hull.faces_adj_to_vertex()[first..first + vertex.num_adj_faces_or_edge as usize];
+        let faces = around.iter().map(|&i| &hull.faces()[i as usize]);
+        let Some(face) = faces.max_by(|f, g| f.normal.dot(own).total_cmp(&g.normal.dot(own))) else { return };
+        let first = face.first_vertex_or_edge as usize;
+        let corners = &hull.vertices_adj_to_face()[first..first + face.num_vertices_or_edges as usize];
+        polygon.extend(corners.iter().map(|&i| (self.pose * points[i as usize], PackedFeatureId::vertex(i).0)));
+    }
+
+    /// Writes the corners besides those of its feature in the direction `d` that may touch next when the solid turns: tip
+    /// and rim of a cone, both rims of a cylinder.
+    pub fn corners(&self, d: Vec3, corners: &mut Vec<Corner>) {
+        corners.clear();
+        let own = self.pose.rotation.inverse() * d;
+        let rim = |radius: f32| radius * Vec3::new(own.x, 0.0, own.z).normalize_or(Vec3::X);
+        // The numbers are those of parry's features.
+        let pair = |low: Vec3, high: Vec3| {
+            [(low, 1), (high, 11)].map(|(at, i)| (self.pose * at, PackedFeatureId::vertex(i).0))
+        };
+        match self.shape.as_typed_shape() {
+            TypedShape::Cylinder(c) => {
+                corners.extend(pair(rim(c.radius) - c.half_height * Vec3::Y, rim(c.radius) + c.half_height * Vec3::Y));
+            }
+            TypedShape::Cone(c) => {
+                corners.extend(pair(rim(c.radius) - c.half_height * Vec3::Y, c.half_height * Vec3::Y))
+            }
+            _ => {}
+        }
+    }
+
+    /// Calls `with` on the normal of each flat face.
+    pub fn each_normal(&self, mut with: impl FnMut(Vec3)) {
+        let mut with = |own: Vec3| with(self.pose.rotation * own);
+        match self.shape.as_typed_shape() {
+            TypedShape::ConvexPolyhedron(hull) => hull.faces().iter().for_each(|face| with(face.normal)),
+            TypedShape::Cuboid(_) => {
+                Vec3::AXES.into_iter().for_each(|axis| [axis, -axis].into_iter().for_each(&mut with))
+            }
+            TypedShape::Cylinder(_) => [Vec3::Y, Vec3::NEG_Y].into_iter().for_each(with),
+            TypedShape::Cone(_) => with(Vec3::NEG_Y),
+            _ => {}
+        }
+    }
+
+    /// The corners of `polygon`, a feature of the solid, as contacts along `normal` with the plane of `face` through `origin`.
+    /// The first points lie in that plane; the others are the solid's, in its own frame.
+    pub fn contacts<'b>(
+        &'b self,
+        polygon: &'b [Corner],
+        [normal, face, origin]: [Vec3; 3],
+    ) -> impl Iterator<Item = TrackedContact<()>> + 'b {
+        polygon.iter().map(move |&(at, number)| {
+            let height = face.dot(at - origin) / face.dot(normal);
+            let on_surface = self.pose.inverse_transform_point(at - normal * self.radius);
+            let features = [PackedFeatureId::face(0), PackedFeatureId(number)];
+            TrackedContact::new(at - normal * height, on_surface, features[0], features[1], height - self.radius)
+        })
+    }
+}
