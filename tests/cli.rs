@@ -241,6 +241,25 @@ fn the_reader_of_a_pipe_may_stop_reading() {
     }
 }
 
+/// Nobody reads standard error any more, as after `2>&1 | head -0`: the command does its work all the same.
+#[test]
+fn nobody_needs_to_read_standard_error() {
+    for (arguments, code) in [
+        ("run drop --steps 1", 0),
+        ("run tower --steps 1 --max-penetration 1mm", 0),
+        ("run sphere-plane --steps 1 --max-penetration 1mm", 0),
+        ("run nowhere", 2),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        command.args(arguments.split(' ')).env("DRYSTONE_ADAPTER", "none");
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+        drop(child.stderr.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", text(&output.stdout));
+        assert_eq!(output.stdout.is_empty(), code != 0, "{arguments}");
+    }
+}
+
 #[test]
 fn the_catalogue_is_listed_with_its_parameters() {
     let folder = Folder::new();

@@ -232,15 +232,15 @@ fn step_with_contacts(
 /// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
 fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
     let Some(load) = Load::heaviest(&scene.world, config) else {
-        eprintln!("substeps {}: no body of {} bears another", config.substeps, scene.name);
+        say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));
         return Ok(());
     };
     config.substeps = load.substeps(most, scene.dt, config)?;
     let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
     let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
-    eprintln!(
+    say(format_args!(
         "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"
-    );
+    ));
     Ok(())
 }
 
@@ -281,6 +281,11 @@ fn print(text: impl Display) -> Result<()> {
     }
 }
 
+/// Prints a line to standard error. Nothing depends on a reader of it: `eprintln!` would panic without one.
+fn say(text: impl Display) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 /// Prints a value as JSON on one line.
 fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(serde_json::to_string(value).expect("reports serialize"))
@@ -308,7 +313,7 @@ pub fn main() -> std::process::ExitCode {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(e) => {
             // One line, whatever the caller's names are made of.
-            eprintln!("drystone: {}", e.to_string().replace(char::is_control, " "));
+            say(format_args!("drystone: {}", e.to_string().replace(char::is_control, " ")));
             e.exit_code().into()
         }
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{SceneArgs, SleepArgs, print, progress};
+use super::{SceneArgs, SleepArgs, print, progress, say};
 use crate::backend::{BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
@@ -91,7 +91,7 @@ impl RenderArgs {
     fn shoot(&self, scene: Scene, config: SolverConfig, frames: u32, quiet: bool) -> Result<Film> {
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), false)?;
         if !quiet {
-            eprintln!("{why}");
+            say(why);
         }
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{BackendArgs, SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
+use super::{BackendArgs, SceneArgs, SleepArgs, print, print_json, progress, say, step_with_contacts};
 use crate::backend::choose;
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
@@ -85,7 +85,7 @@ impl RunArgs {
         self.scene.set_threads(self.backend.choice);
         let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
-        eprintln!("{why}");
+        say(why);
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
