@@ -41,8 +41,8 @@ impl CompareArgs {
             Ok(backend)
         };
         let bar = progress(scene.steps, self.scene.json);
-        let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc(1))?;
-        bar.finish_and_clear();
+        let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc())?;
+        bar.finish();
         if self.scene.json {
             return print_json(&serde_json::json!({
                 "scene": scene.name, "backends": named, "exact": exact, "bodies": bodies, "dt": scene.dt,
