@@ -59,7 +59,7 @@ impl Ranged for Decades {
         let (low, high) = decades(&self.0);
         // Between decades only where there are few of them, and some decades only where there are many.
         let steps: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let every = (high - low) as usize / MOST_DECADES + 1;
+        let every = ((high - low) as usize).div_ceil(MOST_DECADES).max(1);
         let all = (low..=high).step_by(every).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
         all.filter(|x| *x >= 0.999 * self.0.start && *x <= 1.001 * self.0.end).collect()
     }
