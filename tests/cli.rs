@@ -340,6 +340,12 @@ fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
     }
     assert!(!printed.contains("fastest"), "{printed}");
 
+    // One body after another: the ball that was thrown rolls on when the stack sleeps.
+    let some = folder.output("run throw --steps 350");
+    assert!(some.contains("10 of 11 bodies, the first after ") && some.contains("(body 11 \"ball\")"), "{some}");
+    let all = folder.output("run drop");
+    assert!(all.contains("all bodies after ") && all.contains(", the first after "), "{all}");
+
     let awake = folder.json("run tower -p n=3 --steps 60 --no-sleep --json");
     assert_eq!((&awake["awake_steps"], &awake["first_asleep_step"]), (&60.into(), &Value::Null));
     assert_eq!((&awake["manifolds"], &awake["points"]), (&3.into(), &12.into()));

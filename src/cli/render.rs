@@ -71,6 +71,7 @@ impl RenderArgs {
     }
 
     fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
+        Output::check(out)?;
         let (scene, mut config) = args.load()?;
         self.sleep.apply(&mut config);
         args.set_threads(self.backend);

@@ -40,17 +40,25 @@ impl Drop for Ffmpeg {
 }
 
 impl Output {
+    /// Refuses a name whose ending says no form, before anything is made for it.
+    ///
+    /// # Errors
+    /// It is such a name.
+    pub fn check(path: &Path) -> Result<()> {
+        let known = path.extension().is_some_and(|e| e == "png" || e == "gif" || e == "mp4");
+        if path.file_name().is_some() && (known || is_folder(path)) { Ok(()) } else { Err(unknown(path)) }
+    }
+
     /// Opens `path` for pictures of `size`, `rate` of them a second; its ending says in which form: `.png`, `.gif`, `.mp4`, or a
     /// slash for a folder of numbered PNGs.
     ///
     /// # Errors
     /// Another ending, a place that cannot be written, or no ffmpeg for `.mp4`.
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
-        path.file_name().ok_or_else(|| unknown(path))?;
+        Self::check(path)?;
         let draft = Draft::of(path)?;
-        let folder = path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR]);
         let kind = match path.extension().and_then(|e| e.to_str()) {
-            _ if folder => {
+            _ if is_folder(path) => {
                 std::fs::create_dir(draft.place()).map_err(Error::file(path))?;
                 Kind::Frames(0)
             }
@@ -132,6 +140,10 @@ impl Output {
         }
         draft.keep()
     }
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR])
 }
 
 fn unknown(path: &Path) -> Error {
