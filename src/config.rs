@@ -366,7 +366,8 @@ fn word(rule: &impl Serialize) -> String {
     serde_json::to_value(rule).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// The message of a TOML error without its drawing of the text.
+/// The message of a TOML error without its drawing of the text, and without the list of all settings.
 fn first_line(e: &toml::de::Error) -> String {
-    e.message().lines().collect::<Vec<_>>().join(" ")
+    let message = e.message().lines().collect::<Vec<_>>().join(" ");
+    crate::suggest::shorten(&message, "`drystone settings` lists all")
 }

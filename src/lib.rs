@@ -38,6 +38,7 @@ pub mod kernels;
 pub mod load;
 pub mod math;
 pub mod maze;
+mod memory;
 pub mod metrics;
 pub mod plan;
 pub mod preset;
@@ -50,6 +51,7 @@ pub mod simulation;
 pub mod sleep;
 pub mod solver;
 pub mod stats;
+mod suggest;
 #[cfg(feature = "view")]
 pub mod view;
 pub mod world;

@@ -23,6 +23,11 @@ impl Folder {
         self
     }
 
+    fn with_folder(self, name: &str) -> Self {
+        std::fs::create_dir(self.path().join(name)).expect("a folder");
+        self
+    }
+
     fn run(&self, arguments: &[&str]) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
         command.args(arguments).current_dir(self.path()).env("DRYSTONE_ADAPTER", "none");
@@ -109,7 +114,19 @@ fn every_kth_step_of_every_body_that_can_move_is_written_as_csv() {
 
 /// What is typed, and what the one line that refuses it must name.
 const REFUSED: &[(&[&str], &[&str])] = &[
-    (&["run", "nowhere"], &["nowhere", "pile"]),
+    (&["run", "nowhere"], &["nowhere", "drystone scenes"]),
+    (&["run", "pyle"], &["\"pyle\"", "did you mean \"pile\"?"]),
+    (&["run", "pile", "-p", "sead=3"], &["did you mean \"seed\"?", "known: n, jitter, seed, ratio"]),
+    (&["run", "pile", "--worlds", "2", "--vary", "sede"], &["\"sede\"", "did you mean \"seed\"?"]),
+    (
+        &["run", "fixed.json", "--worlds", "1000000000"],
+        &["1000000000 worlds of 0 dynamic bodies", "at most 4000000 worlds"],
+    ),
+    (&["run", "drop", "--dt", "-0.01"], &["--dt -0.01", "more than 0"]),
+    (&["run", "drop", "--dt", "-1e-3"], &["--dt -0.001", "more than 0"]),
+    (&["run", "drop", "--set", "substep=1"], &["did you mean \"substeps\"?", "drystone settings"]),
+    (&["run", "drop", "--set", "friction=dics"], &["did you mean \"disc\"?"]),
+    (&["run", "near.json"], &["near.json", "body 0", "`positon`", "did you mean \"position\"?", "scenes --schema"]),
     (&["run", "."], &["\".\""]),
     (&["run", "pile", "-p", "m=1"], &["pile", "\"m\"", "jitter"]),
     (&["run", "pile", "-p", "n"], &["pile", "\"n\"", "key=value"]),
@@ -139,6 +156,7 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["run", "good.json", "-p", "n=1"], &["good.json", "n=1"]),
     (&["run", "good.json", "--out", "nowhere/motion.csv"], &["nowhere/motion.csv"]),
     (&["run", "good.json", "--out", "."], &[".: "]),
+    (&["run", "good.json", "--out", "folder"], &["folder: ", "directory"]),
     (&["compare", "drop", "--backends", "reference"], &["--backends", "1 were given"]),
     (&["compare", "drop", "--backends", "reference,cpu,cpu"], &["--backends", "3 were given"]),
 ];
@@ -154,6 +172,9 @@ fn folder_of_bad_files() -> Folder {
         .with("torn.json", r#"{"version": 1, "bodies": ["#)
         .with("negative.json", negative)
         .with("two.json", r#"{"version": 2}"#)
+        .with("fixed.json", r#"{"version": 1, "bodies": [{"kind": "fixed"}]}"#)
+        .with("near.json", r#"{"version": 1, "bodies": [{"kind": "fixed", "positon": [0, 0, 0]}]}"#)
+        .with_folder("folder")
         .with("good.json", GOOD)
 }
 
@@ -173,6 +194,7 @@ fn bad_input_ends_in_one_line_that_names_it_and_leaves_no_file_behind() {
         for part in named {
             assert!(line.contains(part), "{arguments:?}: {part:?} is not in: {line}");
         }
+        assert!(line.len() < 250, "{arguments:?}: {line}");
         assert!(output.stdout.is_empty(), "{arguments:?}");
         assert_eq!(folder.files(), before, "{arguments:?}");
     }
@@ -216,6 +238,209 @@ fn usage_errors_end_with_the_same_code() {
     }
 }
 
+/// What clap refuses, with what it should say.
+#[test]
+fn a_slip_in_a_name_and_a_number_out_of_range_are_answered() {
+    let cases: &[(&str, &[&str])] = &[
+        ("rnu drop", &["'rnu'", "'run'"]),
+        ("report ruels", &["'ruels'", "'rules'"]),
+        ("play mzae", &["'mzae'", "'maze'"]),
+        ("pile", &["'pile'", "did you mean `drystone run pile`?"]),
+        ("pile -p n=3", &["did you mean `drystone run pile`?"]),
+        ("run drop --stpes 3", &["'--stpes'", "'--steps'"]),
+        ("run drop --preset blanced", &["'blanced'", "'balanced'"]),
+        ("run drop --steps -1", &["--steps", "-1 is not in 0.."]),
+        ("run drop --substeps -2", &["--substeps", "-2 is not in 0.."]),
+        ("run drop --threads -1", &["--threads", "-1 is not in 0..=1024"]),
+        ("run drop --max-penetration -1mm", &["must be more than 0"]),
+    ];
+    for (arguments, named) in cases {
+        let output = Folder::new().run(&arguments.split(' ').collect::<Vec<_>>());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        for part in *named {
+            assert!(said.contains(part), "{arguments}: {part:?} is not in: {said}");
+        }
+    }
+    let said = text(&Folder::new().run(&["hrad"]).stderr);
+    assert!(said.contains("'hard'"), "{said}");
+    let said = text(&Folder::new().run(&["walk"]).stderr);
+    assert!(!said.contains("similar") && !said.contains("did you mean"), "{said}");
+    for (arguments, named) in [
+        ("hard --case kapal", "did you mean \"kapla\"?"),
+        ("play maze esay --script x", "did you mean \"easy\"?"),
+        ("solve none.contacts --tolerance -1", "--tolerance -1: must be more than 0"),
+    ] {
+        let output = Folder::new().run(&arguments.split(' ').collect::<Vec<_>>());
+        assert!(text(&output.stderr).contains(named), "{arguments}: {}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn help_fits_a_hundred_columns_and_short_help_a_page() {
+    let folder = Folder::new();
+    let commands = folder.output("-h");
+    let listed = commands.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| l.starts_with("  "));
+    let names: Vec<_> = listed.filter_map(|l| l.split_whitespace().next()).filter(|name| *name != "help").collect();
+    assert!(names.len() >= 11 && names.contains(&"run"), "{names:?}");
+    let all = names.into_iter().chain(["play maze", "report rules", "report convergence"]);
+    for name in all {
+        let pages = ["-h", "--help"].map(|h| folder.output(&format!("{name} {h}")));
+        for page in &pages {
+            let longest = page.lines().max_by_key(|l| l.chars().count()).expect("a line");
+            assert!(longest.chars().count() <= 100, "{name}: {longest}");
+        }
+        let lines = pages.each_ref().map(|p| p.lines().count());
+        assert!(lines[0] <= 44 && lines[0] <= lines[1], "{name}: {lines:?}");
+        if name == "run" {
+            let headings = ["Arguments:", "Scene:", "Settings of the solver:", "What it runs on:", "Output:"];
+            assert!(headings.iter().all(|h| pages[0].lines().any(|l| l == *h)), "{}", pages[0]);
+            assert!(lines[1] > lines[0] + 20, "{lines:?}");
+        }
+    }
+}
+
+#[test]
+fn the_settings_are_listed_as_a_file_that_gives_them() {
+    let folder = Folder::new();
+    let listed = folder.output("settings");
+    let of = |arguments: &str, folder: &Folder| folder.json(arguments)["config"].clone();
+    let usual = of("run drop --steps 0 --no-sleep --json", &folder);
+    for key in keys(&usual) {
+        let line = listed.lines().position(|l| l.starts_with(&format!("{key} = "))).unwrap_or_else(|| panic!("{key}"));
+        assert!(listed.lines().nth(line - 1).is_some_and(|l| l.starts_with("# ") && l.len() > 10), "{key}");
+    }
+    assert!(listed.contains(" One of none, slip, box, disc."), "{listed}");
+    let folder = folder.with("all.toml", &listed);
+    assert_eq!(of("run drop --steps 0 --no-sleep --json --config all.toml", &folder), usual);
+    assert!(folder.output("settings --preset fast").contains("\nsubsteps = 4\n"));
+}
+
+/// A world that fell asleep: what its steps cost while it was awake, since when it sleeps and what it lies on.
+#[test]
+fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
+    let folder = Folder::new();
+    let report = folder.json("run tower -p n=3 --steps 200 --json");
+    let number = |key: &str| report[key].as_u64().unwrap_or_else(|| panic!("{key} in {report}"));
+    let (all, first, awake) = (number("all_asleep_step"), number("first_asleep_step"), number("awake_steps"));
+    assert!(30 < all && all < 200 && first == all && awake == all, "{first} {all} {awake}");
+    assert_eq!((number("asleep"), number("manifolds"), number("points")), (3, 3, 12));
+    assert_eq!((array(&report, "step_ms").len(), &report["fastest"]), (200, &Value::Null));
+    let ms = |value: &Value| value.as_f64().expect("a time");
+    // Of the steps in which the tower slept none counts.
+    let steps: Vec<f64> = array(&report, "step_ms").iter().map(ms).collect();
+    let least = steps[..awake as usize].iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(ms(&report["awake_ms"]["min"]), least);
+    assert!(array(&report, "stage_ms").iter().all(|s| ms(&s["median"]) <= ms(&report["awake_ms"]["median"])));
+
+    let printed = folder.output("run tower -p n=3 --steps 200");
+    let when = format!("all bodies after {:.2} s", all as f64 / 60.0);
+    for part in ["3 manifolds, 12 points", &when, &format!("of {awake} steps with a body awake"), "nothing moves"] {
+        assert!(printed.contains(part), "{part} is not in: {printed}");
+    }
+    assert!(!printed.contains("fastest"), "{printed}");
+
+    // One body after another: the ball that was thrown rolls on when the stack sleeps.
+    let some = folder.output("run throw --steps 350");
+    assert!(some.contains("10 of 11 bodies, the first after ") && some.contains("(body 11 \"ball\")"), "{some}");
+    let all = folder.output("run drop");
+    assert!(all.contains("all bodies after ") && all.contains(", the first after "), "{all}");
+
+    let awake = folder.json("run tower -p n=3 --steps 60 --no-sleep --json");
+    assert_eq!((&awake["awake_steps"], &awake["first_asleep_step"]), (&60.into(), &Value::Null));
+    assert_eq!((&awake["manifolds"], &awake["points"]), (&3.into(), &12.into()));
+    assert!(folder.output("run tower -p n=3 --steps 60 --no-sleep").contains("fastest (body "));
+}
+
+/// Vulkan's loader brings libwayland, which complains where there is no desktop.
+#[test]
+fn adapters_are_listed_without_a_word_where_there_is_no_desktop() {
+    if std::env::var("DRYSTONE_ADAPTER").is_ok_and(|name| name == "none") {
+        return eprintln!("not run: DRYSTONE_ADAPTER=none says that no GPU is wanted");
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+    let output = command.arg("adapters").env_remove("XDG_RUNTIME_DIR").output().expect("the command starts");
+    assert_eq!(text(&output.stderr), "");
+    assert!(text(&output.stdout).contains("buffer"), "{}", text(&output.stdout));
+}
+
+#[test]
+fn what_was_there_is_replaced_with_a_word() {
+    let folder = Folder::new();
+    let said = |arguments: &str| {
+        let output = folder.run(&arguments.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stderr)
+    };
+    let run = "run tower -p n=2 --steps 3 --out motion.csv --save-problem 2:two.contacts";
+    assert!(!said(run).contains("replaced"));
+    let first = std::fs::read(folder.path().join("motion.csv")).expect("the motion");
+    let second = said(run);
+    for name in ["motion.csv: replaced", "two.contacts: replaced"] {
+        assert!(second.lines().any(|l| l.starts_with(name)), "{name} is not in: {second}");
+    }
+    assert_eq!(std::fs::read(folder.path().join("motion.csv")).expect("the motion"), first);
+    // A run that is refused leaves what was there.
+    let refused =
+        folder.run(&["run", "tower", "--steps", "3", "--out", "motion.csv", "--save-problem", "9:x.contacts"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert_eq!(std::fs::read(folder.path().join("motion.csv")).expect("the motion"), first);
+    assert_eq!(folder.files(), ["motion.csv", "two.contacts"]);
+}
+
+/// Ended by its user in the middle of a run: the file of before is there, whole, and nothing else.
+#[cfg(unix)]
+#[test]
+fn a_run_that_is_interrupted_leaves_no_half_of_a_file() {
+    let folder = Folder::new().with("motion.csv", "of before\n");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+    command.args("run pile -p n=64 --steps 1000000 --no-sleep --out motion.csv".split(' '));
+    command.current_dir(folder.path()).env("DRYSTONE_ADAPTER", "none").stderr(Stdio::null());
+    let mut child = command.spawn().expect("the command starts");
+    let written = || {
+        let entries = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("an entry"));
+        entries.map(|e| e.metadata().map_or(0, |m| m.len())).sum::<u64>()
+    };
+    while written() < 100_000 {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert_eq!(folder.files(), ["motion.csv"]);
+    assert_eq!(std::fs::read_to_string(folder.path().join("motion.csv")).expect("the file"), "of before\n");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_does_not_fit_into_memory_is_refused_before_it_is_built() {
+    let limited = |arguments: &str| {
+        let line = format!("ulimit -v 4000000; exec {} {arguments}", env!("CARGO_BIN_EXE_drystone"));
+        Command::new("sh").args(["-c", &line]).env("DRYSTONE_ADAPTER", "none").output().expect("sh")
+    };
+    for (arguments, named) in [
+        ("run pile -p n=4000000", "pile: 4000000 bodies: at least 8.0 GB of memory, of which 4"),
+        ("run tower -p n=1 --worlds 4000000", "tower: 4000000 worlds of 2 bodies: at least 16.0 GB"),
+        ("bench drum:n=1000000,worlds=4", "4 worlds of 1000001 bodies: at least 8.0 GB"),
+    ] {
+        let output = limited(arguments);
+        let said = text(&output.stderr);
+        assert_eq!((output.status.code(), said.lines().count()), (Some(3), 1), "{arguments}: {said}");
+        assert!(said.contains(named), "{arguments}: {said}");
+    }
+    let output = limited("run pile -p n=50 --steps 1");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_long_build_is_announced() {
+    let output = Folder::new().run(&["run", "joint-grid", "-p", "n=450", "--steps", "0"]);
+    assert!(text(&output.stderr).lines().any(|l| l == "building 202500 bodies ..."), "{}", text(&output.stderr));
+    let output = Folder::new().run(&["run", "joint-grid", "-p", "n=4", "--steps", "0"]);
+    assert!(output.status.success() && !text(&output.stderr).contains("building"));
+}
+
 /// A body so fast that its numbers leave the finite range: said by name, with a code of failure, after the report.
 #[test]
 fn numbers_that_cannot_be_used_are_an_error() {
@@ -238,6 +463,25 @@ fn the_reader_of_a_pipe_may_stop_reading() {
         drop(child.stdout.take());
         let output = child.wait_with_output().expect("it ends");
         assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
+    }
+}
+
+/// Nobody reads standard error any more, as after `2>&1 | head -0`: the command does its work all the same.
+#[test]
+fn nobody_needs_to_read_standard_error() {
+    for (arguments, code) in [
+        ("run drop --steps 1", 0),
+        ("run tower --steps 1 --max-penetration 1mm", 0),
+        ("run sphere-plane --steps 1 --max-penetration 1mm", 0),
+        ("run nowhere", 2),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        command.args(arguments.split(' ')).env("DRYSTONE_ADAPTER", "none");
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+        drop(child.stderr.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", text(&output.stdout));
+        assert_eq!(output.stdout.is_empty(), code != 0, "{arguments}");
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::cell::Cell;
 use std::path::Path;
+use std::sync::mpsc;
+use std::time::Duration;
 
 use drystone::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
 use drystone::{Error, Result, Scene, SolverConfig};
@@ -108,4 +110,35 @@ fn a_folder_with_other_rows_is_refused_and_left_alone() {
     let empty = tempfile::tempdir().unwrap();
     let message = Report::read(empty.path()).map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("no rows to draw"), "{message}");
+}
+
+/// Numbers that no run gives, but a file may hold: each in each column that is a number, the page is drawn within seconds.
+#[test]
+fn a_page_is_drawn_of_any_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("scenes.csv")).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let first: Vec<&str> = lines[1].split(',').collect();
+    let real = |k: &usize| first[*k].contains(['.', 'e']) && first[*k].parse::<f64>().is_ok();
+    let columns: Vec<usize> = (0..first.len()).filter(real).collect();
+    assert!(columns.len() >= 10, "{columns:?}");
+    for number in ["1.7976931348623157e308", "-1.7976931348623157e308", "4.9e-324", "1e-310", "inf", "NaN", "0.0"] {
+        for &column in &columns {
+            let mut cells = first.clone();
+            cells[column] = number;
+            let other = tempfile::tempdir().unwrap();
+            let changed = [&lines[..1], &[&cells.join(",")], &lines[2..]].concat().join("\n");
+            std::fs::write(other.path().join("scenes.csv"), changed).unwrap();
+            let (done, when_done) = mpsc::channel();
+            std::thread::spawn(move || {
+                let drawn = Report::read(other.path()).and_then(|report| report.write(other.path()));
+                done.send(drawn.map(|page| std::fs::metadata(page).unwrap().len())).unwrap();
+            });
+            let name = lines[0].split(',').nth(column).unwrap();
+            let drawn = when_done.recv_timeout(Duration::from_secs(20));
+            let length = drawn.unwrap_or_else(|_| panic!("{name} = {number}: not drawn")).unwrap();
+            assert!(length < 1_000_000, "{name} = {number}: {length} bytes");
+        }
+    }
 }

@@ -14,12 +14,14 @@ use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, be
 /// Arguments of `drystone bench`.
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Scenes, as `name:key=value,worlds=N,...`; the standard ones if none is named.
+    /// Scenes, as name:key=value,worlds=N; the standard ones if none is named.
     scenes: Vec<String>,
     /// Smaller scenes and fewer turns, if none is named and --turns is not given.
     #[arg(long)]
     quick: bool,
-    /// Measure how far sweeps of a pile of 15,000 boxes are from what memory and arithmetic can do, instead.
+    /// Measure how far sweeps are from what the machine can do, instead.
+    ///
+    /// Of a pile of 15,000 boxes, against what memory and arithmetic can do.
     #[arg(long, conflicts_with_all = ["scenes", "quick", "set", "baseline", "csv", "backend"])]
     limits: bool,
     /// How often each scene has its turn of 10 steps.
@@ -31,10 +33,12 @@ pub struct BenchArgs {
     /// Numbers of threads; 0 is one a core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: Vec<u16>,
-    /// Any setting of the solver, as key=value; may be given several times.
+    /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Show ratios to what --json printed earlier, and mark what became slower or faster beyond the spread.
+    /// Show ratios to what --json printed earlier.
+    ///
+    /// What became slower or faster beyond the spread is marked.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -53,7 +57,7 @@ impl BenchArgs {
         if self.limits {
             return self.print_limits(&threads);
         }
-        let mut config = SolverConfig::default();
+        let mut config = SolverConfig::default().without_sleep();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
         config.check()?;
         // Read before minutes are spent.
@@ -67,8 +71,8 @@ impl BenchArgs {
             self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
         };
         let bar = progress(specs.len() as u32 * (1 + u32::from(turns)), self.json || self.csv);
-        let now = bench(&specs, &config, &threads, &open, turns.into(), &mut || bar.inc(1))?;
-        bar.finish_and_clear();
+        let now = bench(&specs, &config, &threads, &open, turns.into(), &mut || bar.inc())?;
+        bar.finish();
         if self.json {
             return print_json(&now);
         }
@@ -90,8 +94,8 @@ impl BenchArgs {
     fn print_limits(&self, threads: &[usize]) -> Result<()> {
         let turns = self.turns.unwrap_or(9);
         let bar = progress(threads.len() as u32 * u32::from(turns), self.json);
-        let rows = limits(15_000, threads, turns.into(), &mut || bar.inc(1))?;
-        bar.finish_and_clear();
+        let rows = limits(15_000, threads, turns.into(), &mut || bar.inc())?;
+        bar.finish();
         let machine = Machine::this();
         if self.json {
             return print_json(&serde_json::json!({"machine": machine, "rows": rows}));

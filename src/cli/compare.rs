@@ -30,7 +30,7 @@ impl CompareArgs {
         let &[a, b] = &self.backends[..] else {
             return Err(Error::input(format!("--backends: two are compared, {} were given", self.backends.len())));
         };
-        let (scene, config) = self.scene.load()?;
+        let (scene, config) = self.scene.load_awake()?;
         self.scene.set_threads(BackendChoice::Auto);
         let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.exact));
         let bodies = scene.world.dynamic_count();
@@ -41,8 +41,8 @@ impl CompareArgs {
             Ok(backend)
         };
         let bar = progress(scene.steps, self.scene.json);
-        let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc(1))?;
-        bar.finish_and_clear();
+        let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc())?;
+        bar.finish();
         if self.scene.json {
             return print_json(&serde_json::json!({
                 "scene": scene.name, "backends": named, "exact": exact, "bodies": bodies, "dt": scene.dt,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{print, step_with_contacts};
+use super::{print, replacing, step_with_contacts};
 use crate::backend::cpu::Cpu;
 use crate::config::SolverConfig;
 use crate::contacts::ContactProblem;
@@ -15,9 +15,11 @@ use crate::simulation::Simulation;
 /// Arguments of `drystone export`.
 #[derive(Args)]
 pub struct ExportArgs {
-    /// A scene: a name of the catalogue, or a scene file that ends in .json. Or a contact problem: any other file.
+    /// A scene, or a contact problem.
+    ///
+    /// A scene is a name of the catalogue, or a scene file that ends in .json; any other file is a contact problem.
     source: String,
-    /// Parameter of the scene, as key=value; may be given several times.
+    /// Parameter of the scene; may be given several times.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
     parameter: Vec<String>,
     /// What step N of the scene asks of the velocities; 1 is the first.
@@ -34,7 +36,7 @@ impl ExportArgs {
         let path = Path::new(&self.source);
         let is_scene = CATALOGUE.iter().any(|e| e.name == self.source) || path.extension().is_none_or(|e| e == "json");
         let problem = if is_scene { self.of_scene()? } else { self.of_file(path)? };
-        problem.write_fclib(&self.fclib)?;
+        replacing(&self.fclib, || problem.write_fclib(&self.fclib))?;
         let (bodies, contacts) = (problem.bodies.len(), problem.contacts.len());
         print(format_args!("{}: {bodies} bodies, {contacts} contacts", self.fclib.display()))
     }
@@ -55,7 +57,8 @@ impl ExportArgs {
             return Err(Error::input(format!("{}: which step of the scene? Say --step N", self.source)));
         };
         let scene = Scene::find(&self.source, &self.parameter)?;
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()))?;
+        let mut simulation =
+            Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
         for _ in 1..step {
             simulation.step(scene.dt)?;
         }

@@ -14,13 +14,15 @@ use crate::report::hard_cases;
 /// Arguments of `drystone hard`.
 #[derive(Args)]
 pub struct HardArgs {
-    /// Run this case, H1 to H12 or another that --list names; may be given several times. All, if none is.
+    /// Run this case, such as H3; may be given several times.
+    ///
+    /// All are run if none is named; --list names them.
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
     /// Settings by name.
     #[arg(long, value_enum, default_value_t)]
     preset: Preset,
-    /// Any setting of the solver, as key=value; may be given several times.
+    /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// What runs the sweeps.
@@ -32,7 +34,9 @@ pub struct HardArgs {
     /// List the cases and run none.
     #[arg(long)]
     list: bool,
-    /// Run every preset on the CPU and `balanced` on every backend, and write the page of all into this directory.
+    /// Write the page of all cases into this directory.
+    ///
+    /// Runs every preset on the CPU, and `balanced` on every backend.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json"])]
     page: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -52,17 +56,17 @@ impl HardArgs {
             return cases.iter().try_for_each(|c| print(format_args!("{:<10}  {}", c.name, c.summary)));
         }
         if let Some(directory) = &self.page {
-            let bar = super::progress_of("case", hard_cases::count(&cases), false);
+            let bar = super::Progress::new("case", hard_cases::count(&cases), false);
             let page = hard_cases::page(&cases, |what| {
-                bar.set_message(what.to_owned());
-                bar.inc(1);
+                bar.set_message(what);
+                bar.inc();
             })?;
-            bar.finish_and_clear();
+            bar.finish();
             let path = directory.join("hard-cases.md");
             crate::files::write(&path, page.as_bytes())?;
             return print(path.display());
         }
-        let mut config = self.preset.config();
+        let mut config = self.preset.config().without_sleep();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
         config.check()?;
         let setup = Setup { config, open: &|| self.backend.open(false) };

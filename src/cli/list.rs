@@ -2,10 +2,13 @@
 
 use clap::Args;
 use comfy_table::{Table, presets};
+use serde_json::Value;
 
 use super::{print, print_json};
 use crate::backend::gpu::adapters;
+use crate::config::SolverConfig;
 use crate::error::Result;
+use crate::preset::Preset;
 use crate::scenes::{CATALOGUE, schema};
 
 /// Arguments of `drystone scenes`.
@@ -41,6 +44,43 @@ impl ScenesArgs {
         }
         Ok(())
     }
+}
+
+/// Arguments of `drystone settings`.
+#[derive(Args)]
+pub struct SettingsArgs {
+    /// Print those of this preset.
+    #[arg(long, value_enum, default_value_t)]
+    preset: Preset,
+}
+
+impl SettingsArgs {
+    /// Lists the settings with their values, as TOML, and what each is.
+    pub fn run(&self) -> Result<()> {
+        let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
+        let schema = schemars::schema_for!(SolverConfig).to_value();
+        let properties = schema["properties"].as_object().expect("a struct has properties");
+        for (name, property) in properties {
+            let value = match &config[name] {
+                // As it was written, without what f64 sees of its rounding.
+                toml::Value::Float(x) => format!("{:?}", *x as f32),
+                value => value.to_string(),
+            };
+            // The first sentence: the others say why.
+            let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+            let sentence = text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first);
+            print(format_args!("# {sentence}.{}\n{name} = {value}\n", words(&schema, property)))?;
+        }
+        Ok(())
+    }
+}
+
+/// The words that a setting takes: ` One of a, b.`, or nothing.
+fn words(schema: &Value, property: &Value) -> String {
+    let named = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name]);
+    let words = named.and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array())).into_iter().flatten();
+    let words: Vec<_> = words.filter_map(|w| w["const"].as_str().or_else(|| w.as_str())).collect();
+    if words.is_empty() { String::new() } else { format!(" One of {}.", words.join(", ")) }
 }
 
 /// Arguments of `drystone adapters`.

@@ -7,6 +7,7 @@ mod export;
 mod hard;
 mod list;
 mod play;
+mod progress;
 #[cfg(feature = "view")]
 mod render;
 mod report;
@@ -19,23 +20,28 @@ pub use report::SurveyArgs;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use self::progress::Progress;
 use crate::backend::BackendChoice;
 use crate::config::{Method, SolverConfig};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::load::Load;
+use crate::memory;
 use crate::preset::Preset;
-use crate::scenes::Scene;
+use crate::scenes::{CATALOGUE, Scene};
 use crate::simulation::{Simulation, check_step_length};
 use crate::stats::StepStats;
+use crate::suggest::nearest;
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
-#[command(name = "drystone", version, about, max_term_width = 110)]
+#[command(name = "drystone", version, about, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -74,6 +80,8 @@ enum Command {
     Report(report::ReportArgs),
     /// List the scenes of the catalogue with their parameters.
     Scenes(list::ScenesArgs),
+    /// List the settings of the solver, as a file for --config.
+    Settings(list::SettingsArgs),
     /// List the adapters that can run the shaders.
     Adapters(list::AdaptersArgs),
 }
@@ -93,50 +101,77 @@ impl NotBuilt {
     }
 }
 
+/// Headings of options in the help.
+mod heading {
+    pub(super) const SCENE: &str = "Scene";
+    pub(super) const SETTINGS: &str = "Settings of the solver";
+    pub(super) const MACHINE: &str = "What it runs on";
+    pub(super) const OUTPUT: &str = "Output";
+}
+use heading::{MACHINE, OUTPUT, SCENE, SETTINGS};
+
 /// A scene, and how to solve it.
 #[derive(Args)]
 struct SceneArgs {
-    /// Name of a scene of the catalogue, or path of a scene file.
+    /// A scene of the catalogue, or a scene file.
+    ///
+    /// `drystone scenes` lists the catalogue.
     scene: String,
-    /// Parameter of the scene, as key=value; may be given several times.
-    #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
+    /// Parameter of the scene; may be given several times.
+    #[arg(short, long = "parameter", value_name = "KEY=VALUE", help_heading = SCENE)]
     parameter: Vec<String>,
-    /// Steps; the scene says how many if this does not.
-    #[arg(long)]
+    /// Steps, if not as many as the scene says.
+    #[arg(long, help_heading = SCENE, value_parser = clap::value_parser!(u32).range(0..))]
     steps: Option<u32>,
-    /// Length of a step in seconds; the scene says if this does not.
-    #[arg(long, value_name = "SECONDS")]
+    /// Length of a step, if not what the scene says.
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
     dt: Option<f32>,
     /// Settings by name, before --set and the others.
-    #[arg(long, value_enum, conflicts_with = "config", default_value_t)]
+    #[arg(long, value_enum, conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
     preset: Preset,
-    /// Choose the substeps so that what stands overlaps no deeper at rest, as 1mm or 0.001 (meters); a heavy load
-    /// that comes on at once swings up to twice as deep.
-    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "substeps")]
+    /// Choose the substeps by the overlap of what stands, as 1mm.
+    ///
+    /// A bare number is in meters. A heavy load that comes on at once swings up to twice as deep.
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = length,
+        allow_hyphen_values = true,
+        conflicts_with = "substeps",
+        help_heading = SETTINGS
+    )]
     max_penetration: Option<f64>,
     /// Substeps of a step.
-    #[arg(long)]
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     substeps: Option<u32>,
     /// Biased sweeps of a substep.
-    #[arg(long)]
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     iterations: Option<u32>,
     /// Relax sweeps of a substep.
-    #[arg(long)]
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     relax: Option<u32>,
-    /// What is done with the sweeps of a substep.
-    #[arg(long, value_enum)]
+    /// What the sweeps do.
+    #[arg(long, value_enum, help_heading = SETTINGS)]
     method: Option<Method>,
-    /// Any setting of the solver, as key=value; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    /// Any setting; may be given several times.
+    ///
+    /// `drystone settings` lists them.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = SETTINGS)]
     set: Vec<String>,
     /// Settings from a TOML file, before --set and the others.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
     config: Option<PathBuf>,
-    /// Threads for everything that runs on the CPU; 0 is one a core.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    /// Threads on the CPU; 0 is one a core.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        value_parser = clap::value_parser!(u16).range(0..=1024),
+        help_heading = MACHINE
+    )]
     threads: u16,
     /// Print one JSON object instead of a table.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     json: bool,
 }
 
@@ -144,18 +179,20 @@ struct SceneArgs {
 #[derive(Args)]
 struct BackendArgs {
     /// What runs the sweeps.
-    #[arg(long = "backend", value_name = "BACKEND", value_enum, default_value_t)]
+    #[arg(long = "backend", value_name = "BACKEND", value_enum, default_value_t, help_heading = MACHINE)]
     choice: BackendChoice,
     /// Ask the GPU for the reference's results to the last bit.
-    #[arg(long)]
+    #[arg(long, help_heading = MACHINE)]
     exact: bool,
 }
 
-/// What is run for its result may sleep; what is run for a comparison may not.
+/// Scenes that run for their result.
 #[derive(Args)]
 struct SleepArgs {
-    /// Let nothing fall asleep: without it what was slow for half a second does (--set sleep_after, sleep_speed).
-    #[arg(long)]
+    /// Let nothing fall asleep.
+    ///
+    /// Without it what was slow for half a second does, until it is touched: --set sleep_after=0.5, sleep_speed=0.01.
+    #[arg(long, help_heading = SETTINGS)]
     no_sleep: bool,
 }
 
@@ -163,24 +200,27 @@ impl SleepArgs {
     fn apply(&self, config: &mut SolverConfig) {
         if self.no_sleep {
             config.sleep_after = 0.0;
-        } else if config.sleep_after == 0.0 {
-            config.sleep_after = 0.5;
         }
     }
 }
 
 impl SceneArgs {
-    /// The scene with its step length, and the settings.
-    fn load(&self) -> Result<(Scene, SolverConfig)> {
-        self.load_worlds(1, None)
+    /// The scene with its step length, and the settings for a comparison: nothing sleeps unless `--set sleep_after` says so.
+    fn load_awake(&self) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?.without_sleep(), 1, None)
     }
 
-    /// The same for some worlds of the scene: [`Scene::find_worlds`].
-    fn load_worlds(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
-        let mut config = match &self.config {
-            Some(path) => SolverConfig::from_toml_file(path)?,
-            None => self.preset.config(),
-        };
+    /// The scene, or some worlds of it ([`Scene::find_worlds`]), with its step length, and the settings.
+    fn load(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?, worlds, vary)
+    }
+
+    /// The settings that the others change.
+    fn base(&self) -> Result<SolverConfig> {
+        self.config.as_deref().map_or_else(|| Ok(self.preset.config()), SolverConfig::from_toml_file)
+    }
+
+    fn load_from(&self, mut config: SolverConfig, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
         for assignment in &self.set {
             config.set(assignment)?;
         }
@@ -191,11 +231,12 @@ impl SceneArgs {
         }
         config.method = self.method.unwrap_or(config.method);
         config.check()?;
-        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
         if let Some(dt) = self.dt {
             check_step_length(dt).map_err(|e| Error::input(format!("--{e}")))?;
-            scene.dt = dt;
         }
+        announce(&self.scene, &self.parameter, worlds);
+        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
+        scene.dt = self.dt.unwrap_or(scene.dt);
         scene.steps = self.steps.unwrap_or(scene.steps);
         if let Some(most) = self.max_penetration {
             choose_substeps(&mut config, &scene, most)?;
@@ -227,18 +268,32 @@ fn step_with_contacts(
     }
 }
 
+/// Worlds with fewer bodies are built before anybody wonders.
+const MANY_BODIES: u64 = 200_000;
+
+/// Says that a world is built, where that takes a while.
+fn announce(scene: &str, parameters: &[String], worlds: usize) {
+    let Some(entry) = CATALOGUE.iter().find(|e| e.name == scene) else { return };
+    // What is wrong with the parameters is said by who builds.
+    let bodies = entry.body_count(parameters).unwrap_or(0).saturating_mul(worlds as u64);
+    // What does not fit is refused before anything is built.
+    if bodies >= MANY_BODIES && memory::check(bodies as f64 * memory::BODY, scene).is_ok() {
+        say(format_args!("building {bodies} bodies ..."));
+    }
+}
+
 /// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
 fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
     let Some(load) = Load::heaviest(&scene.world, config) else {
-        eprintln!("substeps {}: no body of {} bears another", config.substeps, scene.name);
+        say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));
         return Ok(());
     };
     config.substeps = load.substeps(most, scene.dt, config)?;
     let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
     let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
-    eprintln!(
+    say(format_args!(
         "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"
-    );
+    ));
     Ok(())
 }
 
@@ -256,19 +311,19 @@ fn length(text: &str) -> std::result::Result<f64, String> {
     if meters > 0.0 && meters.is_finite() { Ok(meters) } else { Err("must be more than 0".into()) }
 }
 
-/// A progress bar on a terminal, nothing elsewhere.
-fn progress(steps: u32, quiet: bool) -> indicatif::ProgressBar {
-    progress_of("step", steps.into(), quiet)
+/// Over the steps of a run.
+fn progress(steps: u32, quiet: bool) -> Progress {
+    Progress::new("step", steps.into(), quiet)
 }
 
-/// A progress bar over `count` of what `unit` names.
-fn progress_of(unit: &str, count: u64, quiet: bool) -> indicatif::ProgressBar {
-    if quiet {
-        return indicatif::ProgressBar::hidden();
+/// Runs what writes a file, and says so if the file took the place of another.
+fn replacing<T>(path: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
+    let was_there = path.is_file();
+    let written = write()?;
+    if was_there {
+        say(format_args!("{}: replaced what was there", path.display()));
     }
-    let style = format!("{{bar:40}} {unit} {{pos}}/{{len}}  {{per_sec}}  {{eta}} left  {{msg}}");
-    let style = indicatif::ProgressStyle::with_template(&style).expect("a fixed template");
-    indicatif::ProgressBar::new(count).with_style(style)
+    Ok(written)
 }
 
 /// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
@@ -279,14 +334,56 @@ fn print(text: impl Display) -> Result<()> {
     }
 }
 
+/// Prints a line to standard error. Nothing depends on a reader of it: `eprintln!` would panic without one.
+fn say(text: impl Display) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 /// Prints a value as JSON on one line.
 fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(serde_json::to_string(value).expect("reports serialize"))
 }
 
-/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter.
+/// A command that takes a negative number for a value everywhere: what is out of range is refused as such, not as an argument
+/// that there is not. Of `-1e-3` clap knows no number: real numbers allow hyphens.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional() && !a.is_allow_hyphen_values_set();
+    let allow = |a: clap::Arg| if takes(&a) { a.allow_negative_numbers(true) } else { a };
+    command.mut_args(allow).mut_subcommands(with_negative_numbers)
+}
+
+/// The arguments of this process; ends it where they cannot be used, or help is asked for.
+fn arguments() -> Cli {
+    let command = with_negative_numbers(Cli::command());
+    let parsed = command.clone().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.unwrap_or_else(|mut error| {
+        let typed = match error.get(ContextKind::InvalidSubcommand) {
+            Some(ContextValue::String(typed)) if error.kind() == Usage::InvalidSubcommand => typed.clone(),
+            _ => error.exit(),
+        };
+        let mut place = &command;
+        for word in std::env::args().skip(1) {
+            place = place.find_subcommand(&word).unwrap_or(place);
+        }
+        if CATALOGUE.iter().any(|e| e.name == typed) {
+            let meant = format!("did you mean `drystone run {typed}`?");
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![meant.into()]));
+        } else if let Some(name) = nearest(&typed, place.get_subcommands().map(clap::Command::get_name)) {
+            error.insert(ContextKind::SuggestedSubcommand, ContextValue::String(name.into()));
+        }
+        error.exit()
+    })
+}
+
+/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 where
+/// somebody ended it.
 pub fn main() -> std::process::ExitCode {
-    let cli = Cli::parse();
+    let cli = arguments();
+    // Files that are not finished go away; fails only if somebody else handles signals already.
+    let _ = ctrlc::set_handler(|| {
+        files::discard_drafts();
+        std::process::exit(130);
+    });
     let result = match cli.command {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
@@ -300,13 +397,14 @@ pub fn main() -> std::process::ExitCode {
         Command::Bench(args) => args.run(),
         Command::Report(args) => args.run(),
         Command::Scenes(args) => args.run(),
+        Command::Settings(args) => args.run(),
         Command::Adapters(args) => args.run(),
     };
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(e) => {
             // One line, whatever the caller's names are made of.
-            eprintln!("drystone: {}", e.to_string().replace(char::is_control, " "));
+            say(format_args!("drystone: {}", e.to_string().replace(char::is_control, " ")));
             e.exit_code().into()
         }
     }

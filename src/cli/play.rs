@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{BackendArgs, print, print_json};
+use super::{BackendArgs, print, print_json, replacing};
 use crate::backend::choose;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
@@ -48,7 +48,7 @@ struct MazeArgs {
     json: bool,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Any setting of the solver, as key=value; may be given several times.
+    /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -64,7 +64,7 @@ impl PlayArgs {
 impl MazeArgs {
     fn run(&self) -> Result<()> {
         let map = Map::find(&self.board)?;
-        let mut config = SolverConfig::default();
+        let mut config = SolverConfig::default().without_sleep();
         self.set.iter().try_for_each(|assignment| config.set(assignment))?;
         let begin = |map, config| Game::new(map, config, choose(self.backend.choice, 1, self.backend.exact)?.0);
         if let Some(path) = &self.script {
@@ -79,7 +79,7 @@ impl MazeArgs {
         }
         if let Some(path) = &self.pilot {
             let script = pilot(begin(map, config)?)?;
-            files::write(path, script.text().as_bytes())?;
+            replacing(path, || files::write(path, script.text().as_bytes()))?;
             return print(path.display());
         }
         self.window(map, config)
@@ -100,7 +100,7 @@ impl MazeArgs {
             frames = vec![frames.swap_remove(frames.len() / 2)];
         }
         draw_game(&mut canvas, &map, &world, &frames, |picture| output.add(picture))?;
-        output.finish()?;
+        replacing(out, || output.finish())?;
         Ok(played)
     }
 

@@ -4,14 +4,21 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{SceneArgs, SleepArgs, print, progress};
+use super::{MACHINE, SceneArgs, SleepArgs, print, progress, replacing, say};
 use crate::backend::{BackendChoice, choose};
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::memory;
 use crate::scenes::{CATALOGUE, Scene};
 use crate::simulation::Simulation;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
+
+/// Bytes that a body takes in a frame: pose and color.
+const FRAME: f64 = 32.0;
+
+/// Heading of the options in the help.
+const PICTURES: &str = "Pictures";
 
 /// Arguments of `drystone render`.
 #[derive(Args)]
@@ -19,33 +26,37 @@ pub struct RenderArgs {
     #[command(flatten)]
     scene: Option<SceneArgs>,
     /// What runs the sweeps.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = MACHINE)]
     backend: BackendChoice,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// Where the pictures go: FILE.png, FILE.gif, FILE.mp4, or FOLDER/ for numbered PNGs.
-    #[arg(long, value_name = "PATH", required_unless_present = "gallery")]
+    /// FILE.png, FILE.gif, FILE.mp4, or FOLDER/ for numbered PNGs.
+    #[arg(long, help_heading = PICTURES, value_name = "PATH", required_unless_present = "gallery")]
     out: Option<PathBuf>,
-    /// Pictures, evenly spaced over the run; 1 shows its end. PNG takes 1, the others 60 unless told.
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Pictures, evenly spaced over the run.
+    ///
+    /// 1 shows its end. PNG takes 1, the others 60 unless told.
+    #[arg(long, help_heading = PICTURES, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
+    #[arg(long, help_heading = PICTURES, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
     size: (u32, u32),
     /// What bodies are colored by.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, help_heading = PICTURES, value_enum, default_value_t)]
     color: ColorBy,
     /// Turn of the camera around the scene, in degrees.
-    #[arg(long, value_name = "DEGREES", default_value_t = 30.0, allow_negative_numbers = true)]
+    #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 30.0)]
     yaw: f32,
     /// Height of the camera above the horizon, in degrees.
-    #[arg(long, value_name = "DEGREES", default_value_t = 25.0, allow_negative_numbers = true)]
+    #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 25.0)]
     pitch: f32,
-    /// Draw the motion in a CSV that `drystone run --out` wrote for this scene, instead of solving it again.
-    #[arg(long, value_name = "FILE")]
+    /// Draw the motion in a CSV that `drystone run --out` wrote.
+    ///
+    /// It must be of this scene, which is not solved again.
+    #[arg(long, help_heading = PICTURES, value_name = "FILE")]
     from: Option<PathBuf>,
-    /// Draw every scene of the catalogue into this folder, with a page that shows them.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "from", "frames", "SceneArgs"])]
+    /// Draw every scene of the catalogue into this folder, and a page.
+    #[arg(long, help_heading = PICTURES, value_name = "FOLDER", conflicts_with_all = ["out", "from", "frames", "SceneArgs"])]
     gallery: Option<PathBuf>,
 }
 
@@ -60,7 +71,8 @@ impl RenderArgs {
     }
 
     fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
-        let (scene, mut config) = args.load()?;
+        Output::check(out)?;
+        let (scene, mut config) = args.load(1, None)?;
         self.sleep.apply(&mut config);
         args.set_threads(self.backend);
         let png = out.extension().is_some_and(|e| e == "png");
@@ -83,7 +95,7 @@ impl RenderArgs {
             None => self.shoot(scene, config, frames, args.json)?,
         };
         film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
-        output.finish()?;
+        replacing(out, || output.finish())?;
         print(out.display())
     }
 
@@ -91,23 +103,24 @@ impl RenderArgs {
     fn shoot(&self, scene: Scene, config: SolverConfig, frames: u32, quiet: bool) -> Result<Film> {
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), false)?;
         if !quiet {
-            eprintln!("{why}");
+            say(why);
         }
-        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();
+        memory::check(FRAME * (scene.world.bodies.len() * kept.len()) as f64, format_args!("{} pictures", kept.len()))?;
+        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let bar = progress(scene.steps, quiet);
         let (steps, dt) = (scene.steps, scene.dt);
         let mut film = Film::new(scene, self.color);
         for step in 0..=steps {
             if step > 0 {
                 simulation.step(dt)?;
-                bar.inc(1);
+                bar.inc();
             }
             if kept.binary_search(&(step as usize)).is_ok() {
                 film.add(f64::from(step) * f64::from(dt), &mut simulation);
             }
         }
-        bar.finish_and_clear();
+        bar.finish();
         Ok(film)
     }
 

@@ -71,19 +71,19 @@ impl ReportArgs {
         match &self.page {
             None => self.survey.run(&[]),
             Some(Page::Rules { out }) => {
-                let bar = progress(RUNS as u32, false);
-                let report = rules(|| bar.inc(1))?;
-                bar.finish_and_clear();
+                let bar = super::progress(RUNS as u32, false);
+                let report = rules(|| bar.inc())?;
+                bar.finish();
                 report.write(out)?;
                 print(out.join("rules.md").display())
             }
             Some(Page::Convergence { out, problems }) => {
-                let bar = progress(0, false);
+                let bar = super::progress(0, false);
                 let page = convergence(problems.as_deref(), |problems| {
                     bar.set_length(problems as u64);
-                    bar.inc(1);
+                    bar.inc();
                 })?;
-                bar.finish_and_clear();
+                bar.finish();
                 std::fs::create_dir_all(out).map_err(Error::file(out))?;
                 let path = out.join("convergence.md");
                 files::write(&path, page.as_bytes())?;
@@ -121,15 +121,13 @@ impl SurveyArgs {
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();
         let adapter = adapters().into_iter().next().map(|a| a.to_string());
-        let style = indicatif::ProgressStyle::with_template("{bar:40} {percent} %  {eta} left  {msg}");
-        let bar = indicatif::ProgressBar::new(1).with_style(style.expect("a fixed template"));
+        let bar = progress::Progress::new(progress::PERCENT, 1, false);
         let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
         let report = survey.run(&Origin::here(adapter), &mut |&Progress { what, done, total }| {
-            bar.set_length(total);
-            bar.set_position(done);
-            bar.set_message(what.to_owned());
+            bar.set_message(what);
+            bar.set(done, total);
         })?;
-        bar.finish_and_clear();
+        bar.finish();
         Ok(report)
     }
 }

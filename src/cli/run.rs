@@ -6,7 +6,8 @@ use std::str::FromStr;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{BackendArgs, SceneArgs, SleepArgs, print, print_json, progress, step_with_contacts};
+use super::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs};
+use super::{print, print_json, progress, replacing, say, step_with_contacts};
 use crate::backend::choose;
 use crate::error::{Error, Result};
 use crate::report::{RunReport, Trajectory};
@@ -20,25 +21,33 @@ pub struct RunArgs {
     scene: SceneArgs,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Take the time of each kernel by the clock of the GPU; a software adapter is slower with it.
-    #[arg(long)]
+    /// Take the time of each kernel by the clock of the GPU.
+    ///
+    /// A software adapter is slower with it.
+    #[arg(long, help_heading = MACHINE)]
     kernel_times: bool,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// Run so many worlds of the scene beside each other, as one problem; their bodies never meet.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    worlds: usize,
-    /// Let each world have one more of a parameter of the scene than the one before, such as `seed`; else all are the same.
-    #[arg(long, value_name = "KEY", requires = "worlds")]
+    /// So many worlds of the scene, as one problem.
+    ///
+    /// They stand beside each other: their bodies never meet.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = SCENE)]
+    worlds: u32,
+    /// Let each world have one more of this parameter, such as seed.
+    ///
+    /// One more than the world before; without it all are the same.
+    #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
     vary: Option<String>,
-    /// Write poses and velocities of the bodies that can move, as CSV.
-    #[arg(long, value_name = "FILE")]
+    /// Write the motion of the bodies that can move, as CSV.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out: Option<PathBuf>,
     /// Write every K-th step.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, help_heading = OUTPUT, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-    /// Write what step STEP (1 is the first) asks of the velocities as a contact problem, for `drystone solve`.
-    #[arg(long, value_name = "STEP:FILE")]
+    /// Write what a step asks as a contact problem, for `drystone solve`.
+    ///
+    /// What it asks of the velocities; step 1 is the first.
+    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT)]
     save_problem: Option<SaveProblem>,
 }
 
@@ -79,13 +88,13 @@ impl SaveProblem {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load_worlds(self.worlds, self.vary.as_deref())?;
+        let (scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
-        eprintln!("{why}");
+        say(why);
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let mut report = RunReport::new(&scene, &simulation);
@@ -96,21 +105,21 @@ impl RunArgs {
                 let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
                     Some(save) => {
                         let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
-                        problem.write(&save.file)?;
+                        replacing(&save.file, || problem.write(&save.file))?;
                         stats
                     }
                     None => simulation.step(scene.dt)?,
                 };
                 report.add(&stats);
-                bar.inc(1);
+                bar.inc();
             }
             if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {
                 trajectory.write(step, scene.dt, &simulation.world)?;
             }
         }
-        bar.finish_and_clear();
-        if let Some(trajectory) = trajectory {
-            trajectory.finish()?;
+        bar.finish();
+        if let (Some(trajectory), Some(path)) = (trajectory, &self.out) {
+            replacing(path, || trajectory.finish())?;
         }
         report.measure(&scene, &mut simulation);
         if self.scene.json {

@@ -18,13 +18,15 @@ const MOST_SWEEPS: u32 = 40_000;
 /// Arguments of `drystone solve`.
 #[derive(Args)]
 pub struct SolveArgs {
-    /// A contact problem; the format is in docs/contacts-format.md.
+    /// A contact problem, as `run --save-problem` writes it, or FCLIB's.
+    ///
+    /// docs/contacts-format.md describes the format.
     file: PathBuf,
     /// Sweeps.
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     sweeps: u32,
     /// Sweep until the error e_vel is less than this, at most 40000 times.
-    #[arg(long, value_name = "ERROR", conflicts_with = "sweeps")]
+    #[arg(long, value_name = "ERROR", allow_hyphen_values = true, conflicts_with = "sweeps")]
     tolerance: Option<f64>,
     /// What is done with the sweeps.
     #[arg(long, value_enum, default_value = "accelerated")]
@@ -32,8 +34,10 @@ pub struct SolveArgs {
     /// In which order they go over the contacts.
     #[arg(long, value_enum, default_value_t)]
     order: Order,
-    /// How often they go over a manifold before the next one; unless told, 2 by manifolds and 1 by contacts.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=16))]
+    /// How often they go over a manifold before the next one.
+    ///
+    /// Unless told, 2 by manifolds and 1 by contacts.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
     /// What runs them; errors are always measured in f64.
     #[arg(long, value_enum, default_value = "f64")]

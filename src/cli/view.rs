@@ -23,7 +23,7 @@ pub struct ViewArgs {
 impl ViewArgs {
     /// Shows the scene until the window is closed.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load()?;
+        let (scene, mut config) = self.scene.load(1, None)?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         window::run(Box::new(Live::new(scene, config, self.backend.choice, self.backend.exact, self.color)?))

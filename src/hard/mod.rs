@@ -11,6 +11,7 @@ use crate::metrics;
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::stats::largest;
+use crate::suggest::hint;
 use crate::world::World;
 
 pub use bodies::{Tumble, flip_time, rolling_error};
@@ -253,7 +254,8 @@ impl Case {
     pub fn find(name: &str) -> Result<&'static Self> {
         Self::ALL.iter().find(|c| c.name.eq_ignore_ascii_case(name)).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|c| c.name).collect();
-            Error::input(format!("--case {name}: unknown; known: {}", known.join(", ")))
+            let hint = hint(name, known.iter().copied(), "`drystone hard --list` lists the cases");
+            Error::input(format!("--case {name}: unknown{hint}"))
         })
     }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::suggest::hint;
 
 /// What is at one place of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,8 +53,9 @@ impl Map {
         }
         let path = Path::new(name_or_path);
         if path.extension().is_none() && !path.exists() {
-            let known = BOARDS.map(|b| b.0).join(", ");
-            return Err(Error::input(format!("{name_or_path:?} is no board (known: {known}) and no file")));
+            let known = BOARDS.map(|b| b.0);
+            let hint = hint(name_or_path, known, format_args!("known boards: {}", known.join(", ")));
+            return Err(Error::input(format!("{name_or_path:?} is no board and no file{hint}")));
         }
         let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
         Self::parse(name_or_path, &text)

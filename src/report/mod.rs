@@ -13,6 +13,6 @@ mod trajectory;
 
 pub use convergence::{convergence, problems};
 pub use rules::{RUNS, RulesReport, rules};
-pub use run::{RunReport, StageRow, Standing};
+pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
 pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};
 pub use trajectory::Trajectory;

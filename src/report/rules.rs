@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::backend::cpu::Reference;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::metrics::{Penetration, drift, in_place, in_place_count, rms_speed};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
@@ -32,10 +33,9 @@ impl RulesReport {
         std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
         for (name, text) in &self.pictures {
             let path = pictures.join(name);
-            std::fs::write(&path, text).map_err(Error::file(&path))?;
+            files::write(&path, text.as_bytes())?;
         }
-        let path = directory.join("rules.md");
-        std::fs::write(&path, &self.page).map_err(Error::file(&path))
+        files::write(&directory.join("rules.md"), self.page.as_bytes())
     }
 }
 

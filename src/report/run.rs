@@ -32,18 +32,26 @@ pub struct RunReport {
     pub config: SolverConfig,
     /// Wall time of each step [ms].
     pub step_ms: Vec<f64>,
-    /// Wall time of each stage, median and least over the steps [ms].
+    /// Steps in which a body was awake; in the others nothing is done.
+    pub awake_steps: u32,
+    /// Wall time of these, median and least [ms].
+    pub awake_ms: Option<Spread>,
+    /// Wall time of each stage, median and least over these [ms].
     pub stage_ms: Vec<StageRow>,
-    /// Time of each kernel by the clock of the device, if it was asked for, median and least over the steps [ms].
+    /// Time of each kernel by the clock of the device, if it was asked for, median and least over these [ms].
     pub kernel_ms: Vec<KernelRow>,
     /// Bytes a second that the device reads and writes when it copies [B/s], if it was asked for times.
     pub copy_bandwidth: Option<f64>,
-    /// Manifolds of the last step.
+    /// Manifolds at the end, those that bodies sleep on among them.
     pub manifolds: usize,
-    /// Contact points of the last step.
+    /// Their contact points.
     pub points: usize,
     /// Bodies that sleep at the end.
     pub asleep: usize,
+    /// The first step after which a body slept.
+    pub first_asleep_step: Option<u32>,
+    /// The step after which all bodies slept, if they still do at the end.
+    pub all_asleep_step: Option<u32>,
     /// Joints.
     pub joints: usize,
     /// Largest distance between the anchors of a joint at the end [m]; none if the scene has no joints.
@@ -52,7 +60,7 @@ pub struct RunReport {
     pub sweeps: Option<u64>,
     /// Sweeps that the plans of all steps held, where the settings have a tolerance; else none.
     pub planned_sweeps: Option<u64>,
-    /// Colors of the last step.
+    /// Colors of the last step in which a body was awake, as all that follows of a last step.
     pub colors: usize,
     /// Most manifolds of any step that found no color and were swept alone.
     pub overflow: usize,
@@ -74,8 +82,8 @@ pub struct RunReport {
     pub penetration_mean: f64,
     /// Speed of the fastest body at the end [m/s].
     pub speed_max: f64,
-    /// Which body that is.
-    pub fastest: String,
+    /// Which body that is; none if none moves.
+    pub fastest: Option<String>,
     /// Root mean square speed at the end [m/s].
     pub speed_rms: f64,
     /// Kinetic energy at the end [J].
@@ -92,6 +100,8 @@ pub struct RunReport {
     pub non_finite: usize,
     /// The first such body.
     pub first_non_finite: Option<String>,
+    #[serde(skip)]
+    awake_times: Vec<f64>,
     #[serde(skip)]
     stage_times: Vec<[f64; 5]>,
     #[serde(skip)]
@@ -111,6 +121,29 @@ pub struct Standing {
     pub bodies: usize,
     /// Those of them that are in place.
     pub in_place: usize,
+}
+
+/// Some times [ms].
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Spread {
+    /// The middle one.
+    pub median: f64,
+    /// The least.
+    pub min: f64,
+}
+
+impl Spread {
+    /// None of no times.
+    fn of(times: &[f64]) -> Option<Self> {
+        let min = times.iter().copied().reduce(f64::min)?;
+        Some(Self { median: median(times), min })
+    }
+}
+
+impl std::fmt::Display for Spread {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.3} median, {:.3} least", self.median, self.min)
+    }
 }
 
 /// Time of one kernel over a run [ms].
@@ -152,12 +185,16 @@ impl RunReport {
             dt: scene.dt,
             config: simulation.config().clone(),
             step_ms: Vec::new(),
+            awake_steps: 0,
+            awake_ms: None,
             stage_ms: Vec::new(),
             kernel_ms: Vec::new(),
             copy_bandwidth: None,
             manifolds: 0,
             points: 0,
             asleep: 0,
+            first_asleep_step: None,
+            all_asleep_step: None,
             joints: scene.world.joints.len(),
             joint_gap: None,
             sweeps: None,
@@ -173,7 +210,7 @@ impl RunReport {
             penetration_p95: 0.0,
             penetration_mean: 0.0,
             speed_max: 0.0,
-            fastest: String::new(),
+            fastest: None,
             speed_rms: 0.0,
             kinetic_energy: 0.0,
             energy_gained: 0.0,
@@ -182,6 +219,7 @@ impl RunReport {
             standing: Vec::new(),
             non_finite: 0,
             first_non_finite: None,
+            awake_times: Vec::new(),
             stage_times: Vec::new(),
             kernel_times: Vec::new(),
             energy_before: energy(&scene.world),
@@ -192,8 +230,21 @@ impl RunReport {
     /// Takes in one step.
     pub fn add(&mut self, stats: &StepStats) {
         let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+        let step_ms = ms(stats.times.total());
         self.steps += 1;
-        self.step_ms.push(ms(stats.times.total()));
+        self.step_ms.push(step_ms);
+        self.asleep = stats.asleep;
+        if self.asleep > 0 {
+            self.first_asleep_step.get_or_insert(self.steps);
+        }
+        let all_sleep = self.asleep > 0 && self.asleep == self.bodies;
+        self.all_asleep_step = all_sleep.then(|| self.all_asleep_step.unwrap_or(self.steps));
+        // No pass was planned: everything slept when the step began.
+        if self.asleep > 0 && stats.dispatches == 0 {
+            return;
+        }
+        self.awake_steps += 1;
+        self.awake_times.push(step_ms);
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
         for kernel in &stats.kernels {
             match self.kernel_times.iter_mut().find(|known| known.0.kernel == kernel.kernel) {
@@ -206,7 +257,6 @@ impl RunReport {
         }
         self.manifolds = stats.manifolds;
         self.points = stats.points;
-        self.asleep = stats.asleep;
         if self.config.tolerance > 0.0 {
             *self.sweeps.get_or_insert(0) += u64::from(stats.sweeps);
             *self.planned_sweeps.get_or_insert(0) += u64::from(stats.planned_sweeps);
@@ -222,25 +272,28 @@ impl RunReport {
 
     /// Measures how the run ended.
     pub fn measure(&mut self, scene: &Scene, simulation: &mut Simulation) {
-        let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+        self.awake_ms = Spread::of(&self.awake_times);
         let names = StepStats::default().times.stages().map(|s| s.0);
         let stage = |(i, stage): (usize, &'static str)| {
             let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
-            StageRow { stage, median: median(&times), min: least(&times) }
+            Spread::of(&times).map(|Spread { median, min }| StageRow { stage, median, min })
         };
-        self.stage_ms = names.into_iter().enumerate().map(stage).filter(|row| row.min.is_finite()).collect();
+        self.stage_ms = names.into_iter().enumerate().filter_map(stage).collect();
         let bandwidth = self.copy_bandwidth;
         let kernel = |(last, times): &(KernelTime, Vec<f64>)| {
             let share = |bandwidth: f64| last.bytes as f64 / last.time.as_secs_f64() / bandwidth;
             KernelRow {
                 kernel: last.kernel,
                 median: median(times),
-                min: least(times),
+                min: times.iter().copied().fold(f64::INFINITY, f64::min),
                 bytes: last.bytes,
                 share_of_copying: bandwidth.filter(|_| last.bytes > 0 && !last.time.is_zero()).map(share),
             }
         };
         self.kernel_ms = self.kernel_times.iter().map(kernel).collect();
+        if self.asleep > 0 {
+            (self.manifolds, self.points) = contacts(simulation);
+        }
         let penetration = simulation.penetration();
         let world = &simulation.world;
         let (speed, body) = fastest(world);
@@ -248,7 +301,7 @@ impl RunReport {
         self.penetration_p95 = penetration.p95;
         self.penetration_mean = penetration.mean;
         self.speed_max = speed;
-        self.fastest = body_name(world, body);
+        self.fastest = (speed != 0.0).then(|| body_name(world, body));
         self.speed_rms = rms_speed(world);
         self.kinetic_energy = world.kinetic_energy();
         self.energy_gained = energy(world) - self.energy_before;
@@ -276,7 +329,7 @@ impl RunReport {
         let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
         row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
         if self.worlds > 1 {
-            let steps = self.worlds as f64 / (1e-3 * median(&self.step_ms));
+            let steps = self.worlds as f64 / (1e-3 * median(&self.awake_times));
             row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
         }
         row("backend", format!("{}: {}", self.backend, self.adapter));
@@ -284,18 +337,23 @@ impl RunReport {
             "steps",
             format!("{} of {:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps", self.steps, self.dt * 1e3),
         );
-        row(
-            "contacts",
-            format!(
-                "{} manifolds, {} points, {} colors, {:.0} % reused",
-                self.manifolds,
-                self.points,
-                self.colors,
-                100.0 * self.reused
-            ),
-        );
-        if self.asleep > 0 {
-            row("asleep", format!("{} bodies", self.asleep));
+        let (manifolds, points) = (self.manifolds, self.points);
+        if self.asleep == 0 {
+            let (colors, reused) = (self.colors, 100.0 * self.reused);
+            row("contacts", format!("{manifolds} manifolds, {points} points, {colors} colors, {reused:.0} % reused"));
+        } else {
+            row("contacts", format!("{manifolds} manifolds, {points} points, with those that bodies sleep on"));
+            let after = |step: u32| format!("after {:.2} s", f64::from(step) * f64::from(self.dt));
+            let first =
+                self.first_asleep_step.map_or_else(String::new, |first| format!(", the first {}", after(first)));
+            row(
+                "asleep",
+                match self.all_asleep_step {
+                    Some(all) if self.first_asleep_step == Some(all) => format!("all bodies {}", after(all)),
+                    Some(all) => format!("all bodies {}{first}", after(all)),
+                    None => format!("{} of {} bodies{first}", self.asleep, self.bodies),
+                },
+            );
         }
         if let Some(gap) = self.joint_gap {
             row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
@@ -306,9 +364,12 @@ impl RunReport {
         if self.overflow > 0 {
             row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
         }
-        let least = self.step_ms.iter().copied().fold(f64::INFINITY, f64::min);
-        if least.is_finite() {
-            row("ms a step", format!("{:.3} median, {least:.3} least", median(&self.step_ms)));
+        if let Some(times) = self.awake_ms {
+            let which = match self.steps - self.awake_steps {
+                0 => String::new(),
+                _ => format!(", of {} steps with a body awake", self.awake_steps),
+            };
+            row("ms a step", format!("{times}{which}"));
         }
         for stage in &self.stage_ms {
             row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
@@ -334,14 +395,13 @@ impl RunReport {
                 self.penetration_mean * 1e3
             ),
         );
+        let (rms, most) = (self.speed_rms * 1e3, self.speed_max * 1e3);
         row(
             "speed",
-            format!(
-                "{:.3} mm/s rms, {:.3} mm/s fastest ({})",
-                self.speed_rms * 1e3,
-                self.speed_max * 1e3,
-                self.fastest
-            ),
+            match &self.fastest {
+                Some(body) => format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})"),
+                None => "0 mm/s: nothing moves".into(),
+            },
         );
         row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
         if let Some(escaped) = self.escaped {
@@ -364,6 +424,14 @@ impl RunReport {
 
 fn energy(world: &World) -> f64 {
     world.kinetic_energy() + world.potential_energy()
+}
+
+/// Manifolds of bodies that can be pushed, and their points, whether they sleep or not.
+fn contacts(simulation: &mut Simulation) -> (usize, usize) {
+    let (world, pairs) = simulation.world_and_pairs();
+    let moves = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
+    let of_bodies = pairs.filter(|p| moves(p.body_a) || moves(p.body_b)).flat_map(|p| &p.manifolds);
+    of_bodies.fold((0, 0), |(manifolds, points), m| (manifolds + 1, points + m.points().len()))
 }
 
 /// A body's own name and its index.

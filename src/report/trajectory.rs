@@ -1,15 +1,16 @@
 //! The motion of a run as CSV.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::world::{BodyKind, World};
 
-/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes.
+/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes. The file is
+/// there when it is finished.
 pub struct Trajectory {
     path: PathBuf,
-    writer: csv::Writer<File>,
+    writer: csv::Writer<files::Writer>,
 }
 
 impl Trajectory {
@@ -18,8 +19,7 @@ impl Trajectory {
     /// # Errors
     /// It cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
-        let file = File::create(path).map_err(Error::file(path))?;
-        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(file) };
+        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(files::Writer::create(path)?) };
         let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
         let written = trajectory.writer.write_record(header.split(' '));
         trajectory.check(written)?;
@@ -42,12 +42,13 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Ends the file.
+    /// Ends the file and gives it its name.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn finish(mut self) -> Result<()> {
-        self.writer.flush().map_err(Error::file(&self.path))
+    pub fn finish(self) -> Result<()> {
+        let unwritten = |e: csv::IntoInnerError<_>| Error::file(&self.path)(e.into_error());
+        self.writer.into_inner().map_err(unwritten)?.finish()
     }
 
     fn check(&self, written: csv::Result<()>) -> Result<()> {

@@ -2,6 +2,8 @@
 
 use super::Scene;
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::suggest::hint;
 
 /// Most dynamic bodies a scene of the catalogue can be asked for.
 pub(super) const MOST_BODIES: f64 = 4e6;
@@ -49,7 +51,9 @@ pub struct Entry {
     pub summary: &'static str,
     /// What can be changed about it.
     pub parameters: &'static [Parameter],
-    /// Takes one value for each parameter, in their order.
+    /// Dynamic bodies for one value of each parameter, in their order.
+    pub(super) bodies: fn(&[f64]) -> f64,
+    /// Takes the same values.
     pub(super) build: fn(&[f64]) -> Result<Scene>,
 }
 
@@ -66,7 +70,21 @@ impl Entry {
     /// # Errors
     /// No `=`, an unknown key, or a value out of its range.
     pub fn build(&self, assignments: &[String]) -> Result<Scene> {
-        self.values(assignments).and_then(|v| (self.build)(&v)).map_err(|e| e.within(self.name))
+        let build = |values: Vec<f64>| {
+            let bodies = (self.bodies)(&values);
+            memory::check(bodies * memory::BODY, format_args!("{}: {bodies} bodies", self.name))?;
+            (self.build)(&values)
+        };
+        self.values(assignments).and_then(build).map_err(|e| e.within(self.name))
+    }
+
+    /// Dynamic bodies that [`Entry::build`] makes, known before.
+    ///
+    /// # Errors
+    /// As there, but for values that contradict each other.
+    pub fn body_count(&self, assignments: &[String]) -> Result<u64> {
+        let values = self.values(assignments).map_err(|e| e.within(self.name))?;
+        Ok((self.bodies)(&values) as u64)
     }
 
     /// One value for each parameter, in their order.
@@ -78,7 +96,8 @@ impl Entry {
                 .ok_or_else(|| Error::input(format!("{assignment:?}: write it as key=value")))?;
             let index = self.parameters.iter().position(|p| p.name == key.trim()).ok_or_else(|| {
                 let known: Vec<_> = self.parameters.iter().map(|p| p.name).collect();
-                Error::input(format!("unknown parameter {key:?}; known: {}", known.join(", ")))
+                let hint = hint(key, known.iter().copied(), format_args!("known: {}", known.join(", ")));
+                Error::input(format!("unknown parameter {key:?}{hint}"))
             })?;
             values[index] = self.parameters[index].parse(value.trim())?;
         }
@@ -149,6 +168,8 @@ mod tests {
     fn an_unknown_parameter_lists_the_known_ones() {
         assert_eq!(refusal("pile", "count=3"), "pile: unknown parameter \"count\"; known: n, jitter, seed, ratio");
         assert_eq!(refusal("drop", "n=3"), "drop: unknown parameter \"n\"; known: height");
+        let meant = "pile: unknown parameter \"sede\"; did you mean \"seed\"? known: n, jitter, seed, ratio";
+        assert_eq!(refusal("pile", "sede=3"), meant);
     }
 
     #[test]
@@ -165,14 +186,28 @@ mod tests {
 
     #[test]
     fn no_range_allows_more_than_four_million_bodies() {
-        let most = |name: &str, parameter: usize| {
-            CATALOGUE.iter().find(|e| e.name == name).expect("a scene").parameters[parameter].range.1
-        };
-        assert!(most("pyramid", 0) * (most("pyramid", 0) + 1.0) / 2.0 <= MOST_BODIES);
-        assert!(most("wall", 0) * (most("wall", 1) + 0.5) <= MOST_BODIES);
-        assert!(most("joint-grid", 0).powi(2) <= MOST_BODIES);
-        assert!(most("tallest", 0) * (most("tallest", 0) + 1.0) / 2.0 <= MOST_BODIES);
-        assert!(most("pyramid-heavy", 0) * (most("pyramid-heavy", 0) + 1.0) / 2.0 + 1.0 <= MOST_BODIES);
+        for entry in CATALOGUE {
+            // The most towers are there with the smallest step.
+            let most = |p: &Parameter| if p.name == "step" { p.range.0 } else { p.range.1 };
+            let most: Vec<f64> = entry.parameters.iter().map(most).collect();
+            assert!((1.0..=MOST_BODIES).contains(&(entry.bodies)(&most)), "{}", entry.name);
+        }
+    }
+
+    #[test]
+    fn the_number_of_bodies_is_known_before_they_are_built() {
+        for entry in CATALOGUE {
+            let other = |p: &Parameter| match (p.whole, p.name) {
+                (true, "step") => "step=7".to_owned(),
+                (true, name) => format!("{name}={}", (p.default * 1.5).floor()),
+                (false, name) => format!("{name}={}", p.default),
+            };
+            for assignments in [Vec::new(), entry.parameters.iter().map(other).collect()] {
+                let scene = entry.build(&assignments).expect(entry.name);
+                let bodies = entry.body_count(&assignments).expect(entry.name);
+                assert_eq!(bodies, scene.world.dynamic_count() as u64, "{} {assignments:?}", entry.name);
+            }
+        }
     }
 
     #[test]

@@ -8,6 +8,11 @@ const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of t
 const MU: Parameter = Parameter::real("mu", 0.5, (0.0, 10.0), "friction of all bodies");
 const LIFTED: Parameter = Parameter::real("angle", 90.0, (0.0, 180.0), "start, lifted from where it hangs [degrees]");
 
+/// 1 + 2 + ... + n.
+fn triangle(n: f64) -> f64 {
+    n * (n + 1.0) / 2.0
+}
+
 /// Every scene that comes with the crate.
 pub static CATALOGUE: &[Entry] = &[
     Entry {
@@ -19,12 +24,14 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
             Parameter::real("ratio", 1.0, (1e-6, 1e6), "density of every other box relative to the others"),
         ],
+        bodies: |v| v[0],
         build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64, v[3] as f32)),
     },
     Entry {
         name: "pyramid",
         summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
         parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],
+        bodies: |v| triangle(v[0]),
         build: |v| Ok(boxes::pyramid(v[0] as usize)),
     },
     Entry {
@@ -34,6 +41,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 100, (1.0, 10_000.0), "number of pyramids"),
             Parameter::whole("base", 10, (1.0, 25.0), "boxes in the lowest row of each"),
         ],
+        bodies: |v| v[0] * triangle(v[1]),
         build: |v| Ok(boxes::many_pyramids(v[0] as usize, v[1] as usize)),
     },
     Entry {
@@ -44,6 +52,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
             Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
         ],
+        bodies: |v| v[0],
         build: |v| Ok(boxes::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
     },
     Entry {
@@ -53,24 +62,28 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
             Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
         ],
+        bodies: |v| v[0] * v[1] + (v[0] / 2.0).floor(),
         build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize)),
     },
     Entry {
         name: "drop",
         summary: "one of every shape falls on a half-space, a triangle mesh and a height field: each rests where it fell",
         parameters: &[Parameter::real("height", 2.0, (0.0, 20.0), "height of the fall [m]")],
+        bodies: |_| 7.0,
         build: |v| drop::drop(v[0] as f32),
     },
     Entry {
         name: "sphere-plane",
         summary: "a ball falls on a half-space: it comes to rest there",
         parameters: &[Parameter::real("height", 2.0, (0.0, 100.0), "height of the fall [m]")],
+        bodies: |_| 1.0,
         build: |v| Ok(basics::sphere_plane(v[0] as f32)),
     },
     Entry {
         name: "stack",
         summary: "a straight stack of cubes: it stands",
         parameters: &[Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes")],
+        bodies: |v| v[0],
         build: |v| Ok(stacks::aligned(v[0] as usize)),
     },
     Entry {
@@ -80,24 +93,28 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
             Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]"),
         ],
+        bodies: |v| v[0],
         build: |v| Ok(stacks::misaligned(v[0] as usize, v[1])),
     },
     Entry {
         name: "slide",
         summary: "a block on a slope: it sticks if tan(angle) < mu, else a = g (sin(angle) - mu cos(angle))",
         parameters: &[ANGLE, MU],
+        bodies: |_| 1.0,
         build: |v| Ok(basics::slide(v[0] as f32, v[1] as f32)),
     },
     Entry {
         name: "roll",
         summary: "a ball on a slope: it rolls with a = 5/7 g sin(angle), without slipping if tan(angle) < 7/2 mu",
         parameters: &[ANGLE, MU],
+        bodies: |_| 1.0,
         build: |v| Ok(basics::roll(v[0] as f32, v[1] as f32)),
     },
     Entry {
         name: "rolling",
         summary: "balls on a plate that is pushed over the ground: they roll on it, all along the push, as on paper",
         parameters: &[Parameter::real("angle", 60.0, (0.0, 360.0), "direction of the push, from x to z [degrees]")],
+        bodies: |_| 26.0,
         build: |v| Ok(basics::rolling(v[0] as f32)),
     },
     Entry {
@@ -107,6 +124,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
             Parameter::real("speed", 20.0, (5.0, 100.0), "horizontal speed of the ball [m/s]"),
         ],
+        bodies: |v| v[0] + 1.0,
         build: |v| Ok(basics::throw(v[0] as usize, v[1] as f32)),
     },
     Entry {
@@ -116,6 +134,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 30, (1.0, 2000.0), "cubes of the tallest tower"),
             Parameter::whole("step", 2, (1.0, 2000.0), "how many more cubes each tower has; at most n"),
         ],
+        bodies: |v| v[1] * triangle((v[0] / v[1]).floor()),
         build: |v| {
             if v[1] > v[0] {
                 return Err(Error::input(format!("step = {}: must be at most n = {}", v[1], v[0])));
@@ -130,6 +149,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
         ],
+        bodies: |v| v[0],
         build: |v| Ok(stacks::mass_ratio(v[0] as usize, v[1] as f32)),
     },
     Entry {
@@ -139,6 +159,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("length", 1.0, (0.1, 100.0), "distance from the joint to the center of the ball [m]"),
             LIFTED,
         ],
+        bodies: |_| 1.0,
         build: |v| Ok(jointed::pendulum(v[0] as f32, v[1] as f32)),
     },
     Entry {
@@ -149,6 +170,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("ratio", 10.0, (1e-6, 1e6), "mass of the end relative to a link"),
             LIFTED,
         ],
+        bodies: |v| v[0] + 1.0,
         build: |v| Ok(jointed::chain(v[0] as usize, v[1] as f32, v[2] as f32)),
     },
     Entry {
@@ -158,6 +180,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("planks", 20, (1.0, 1000.0), "number of planks"),
             Parameter::whole("boxes", 5, (0.0, 1000.0), "number of boxes; at most one a plank"),
         ],
+        bodies: |v| v[0] + v[1],
         build: |v| {
             if v[1] > v[0] {
                 return Err(Error::input(format!("boxes = {}: must be at most planks = {}", v[1], v[0])));
@@ -169,6 +192,7 @@ pub static CATALOGUE: &[Entry] = &[
         name: "joint-grid",
         summary: "n x n balls on ball joints swing down from one edge: joints stay closed, energy does not grow",
         parameters: &[Parameter::whole("n", 20, (1.0, 2000.0), "balls along each side")],
+        bodies: |v| v[0] * v[0],
         build: |v| Ok(jointed::grid(v[0] as usize)),
     },
     Entry {
@@ -178,6 +202,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("voussoirs", 17, (3.0, 201.0), "number of wedges"),
             Parameter::real("thickness", 0.15, (0.05, 0.5), "thickness relative to the mean radius"),
         ],
+        bodies: |v| v[0],
         build: |v| masonry::arch(v[0] as usize, v[1]),
     },
     Entry {
@@ -190,6 +215,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("length", 1.0, (0.01, 10.0), "length of a card [m]"),
             Parameter::real("thickness", 0.04, (1e-4, 0.1), "thickness of a card [m]; at most a fifth of the length"),
         ],
+        bodies: |v| 2.0 * triangle(v[0]) + v[0] - 1.0,
         build: |v| {
             if v[4] > 0.2 * v[3] {
                 return Err(Error::input(format!(
@@ -204,18 +230,21 @@ pub static CATALOGUE: &[Entry] = &[
         name: "aqueduct",
         summary: "arches of wedges side by side on piers of loose blocks, slabs on their crowns, no mortar: it stands",
         parameters: &[Parameter::whole("arches", 4, (1.0, 1000.0), "number of arches")],
+        bodies: |v| 4.0 * (v[0] - 1.0) + 11.0 * v[0],
         build: |v| masonry::aqueduct(v[0] as usize),
     },
     Entry {
         name: "kapla",
         summary: "a tower of equal planks, in each storey nine on end and six across: it stands",
         parameters: &[Parameter::whole("storeys", 7, (1.0, 1000.0), "number of storeys")],
+        bodies: |v| 15.0 * v[0],
         build: |v| Ok(masonry::kapla(v[0] as usize)),
     },
     Entry {
         name: "dominoes",
         summary: "a row of dominoes, the first one pushed: all fall",
         parameters: &[Parameter::whole("n", 30, (1.0, 10_000.0), "number of dominoes")],
+        bodies: |v| v[0],
         build: |v| Ok(masonry::dominoes(v[0] as usize)),
     },
     Entry {
@@ -225,6 +254,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("base", 10, (1.0, 2800.0), "cubes in the lowest row"),
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the cube on the tip relative to the others"),
         ],
+        bodies: |v| triangle(v[0]) + 1.0,
         build: |v| Ok(masonry::pyramid_heavy(v[0] as usize, v[1] as f32)),
     },
     Entry {
@@ -234,6 +264,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 200, (1.0, 1_000_000.0), "number of boxes"),
             Parameter::real("speed", 1.0, (-10.0, 10.0), "angular speed [rad/s]"),
         ],
+        bodies: |v| v[0],
         build: |v| Ok(drum::drum(v[0] as usize, v[1] as f32)),
     },
 ];

@@ -10,6 +10,7 @@ use serde_path_to_error::Segment;
 use super::joint::JointFile;
 use super::{CATALOGUE, Scene, check};
 use crate::error::{Error, Result};
+use crate::suggest::{hint, shorten};
 use crate::world::BodyKind;
 
 /// A scene as a file says it, before anything but its form is checked: version 1 of the format.
@@ -253,9 +254,8 @@ pub fn schema() -> Value {
 pub(super) fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
     let path = Path::new(name_or_path);
     if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
-        let known: Vec<_> = CATALOGUE.iter().map(|e| e.name).collect();
-        let known = known.join(", ");
-        return Err(Error::input(format!("{name_or_path:?} is neither a scene ({known}) nor a scene file")));
+        let hint = hint(name_or_path, CATALOGUE.iter().map(|e| e.name), "`drystone scenes` lists the scenes");
+        return Err(Error::input(format!("{name_or_path:?} is neither a scene nor a scene file{hint}")));
     }
     match parameters.first() {
         Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
@@ -271,6 +271,7 @@ fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) ->
         return check::unknown_version(version);
     }
     let message = error.inner().to_string().replace(char::is_control, " ");
+    let message = shorten(&message, "`drystone scenes --schema` lists all");
     let mut segments = error.path().iter();
     let place = match (segments.next(), segments.next()) {
         (Some(Segment::Map { key }), Some(&Segment::Seq { index })) if key == "bodies" => {

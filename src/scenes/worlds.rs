@@ -3,6 +3,8 @@
 use super::catalogue::MOST_BODIES;
 use super::{CATALOGUE, Group, Scene};
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::suggest::hint;
 
 impl Scene {
     /// `count` worlds of a scene as one, whose bodies never meet: see [`World::beside`](crate::World::beside). All are the
@@ -16,22 +18,36 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// As [`Scene::find`]; no world, more than four million dynamic bodies, or nothing of that name that is a whole number.
+    /// As [`Scene::find`]; no world, more than four million worlds or dynamic bodies, or nothing of that name that is a whole number.
     pub fn find_worlds(name_or_path: &str, parameters: &[String], count: usize, vary: Option<&str>) -> Result<Self> {
         let mut all = Self::find(name_or_path, parameters)?;
         let each = all.world.dynamic_count();
-        if count == 0 || each.saturating_mul(count) as f64 > MOST_BODIES {
+        // A world without dynamic bodies takes memory and time all the same.
+        if count == 0 || each.max(1).saturating_mul(count) > MOST_BODIES as usize {
             return Err(Error::input(format!(
-                "{count} worlds of {each} dynamic bodies: must be at least one world, and at most {MOST_BODIES} such bodies in all"
+                "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MOST_BODIES} worlds, and at most {MOST_BODIES} such bodies in all"
             )));
         }
-        let first = all.clone();
         let begin = vary.map(|key| whole(name_or_path, parameters, key)).transpose()?;
+        if count == 1 {
+            return Ok(all);
+        }
+        let bodies = all.world.bodies.len();
+        let what = format_args!("{name_or_path}: {count} worlds of {bodies} bodies");
+        memory::check((bodies * count) as f64 * memory::BODY, what)?;
+        let first = all.clone();
+        let mut dynamic = each;
         for k in 1..count {
             match (vary, begin) {
                 (Some(key), Some(begin)) => {
                     let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
-                    all.beside(&Self::find(name_or_path, &varied)?)?;
+                    let next = Self::find(name_or_path, &varied)?;
+                    dynamic += next.world.dynamic_count();
+                    if dynamic > MOST_BODIES as usize {
+                        let what = format!("{} of {count} worlds have {dynamic} dynamic bodies", k + 1);
+                        return Err(Error::input(format!("{what}: must be at most {MOST_BODIES} in all")));
+                    }
+                    all.beside(&next)?;
                 }
                 _ => all.beside(&first)?,
             }
@@ -74,9 +90,12 @@ impl Scene {
 
 /// The value of a parameter that is a whole number.
 fn whole(scene: &str, parameters: &[String], key: &str) -> Result<f64> {
-    let refusal = |known: &str| Error::input(format!("{scene} has no whole number {key:?} to vary; it has: {known}"));
-    let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal("none, being a file"))?;
+    let refusal = |known: &[&str], list: &str| {
+        let hint = hint(key, known.iter().copied(), format_args!("it has: {list}"));
+        Error::input(format!("{scene} has no whole number {key:?} to vary{hint}"))
+    };
+    let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal(&[], "none, being a file"))?;
     let known: Vec<_> = entry.parameters.iter().filter(|p| p.whole).map(|p| p.name).collect();
     let place = entry.parameters.iter().position(|p| p.whole && p.name == key);
-    Ok(entry.values(parameters)?[place.ok_or_else(|| refusal(&known.join(", ")))?])
+    Ok(entry.values(parameters)?[place.ok_or_else(|| refusal(&known, &known.join(", ")))?])
 }

@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 
 use super::canvas::Picture;
 use crate::error::{Error, Result};
+use crate::files::Draft;
 
 /// A place for pictures that is known to be writable; nothing is under its name until [`Output::finish`].
 pub struct Output {
@@ -38,47 +39,42 @@ impl Drop for Ffmpeg {
     }
 }
 
-/// A file or folder that goes away again unless it is kept.
-struct Draft(Option<PathBuf>);
-
-impl Drop for Draft {
-    fn drop(&mut self) {
-        if let Some(path) = &self.0 {
-            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
-        }
-    }
-}
-
 impl Output {
+    /// Refuses a name whose ending says no form, before anything is made for it.
+    ///
+    /// # Errors
+    /// It is such a name.
+    pub fn check(path: &Path) -> Result<()> {
+        let known = path.extension().is_some_and(|e| e == "png" || e == "gif" || e == "mp4");
+        if path.file_name().is_some() && (known || is_folder(path)) { Ok(()) } else { Err(unknown(path)) }
+    }
+
     /// Opens `path` for pictures of `size`, `rate` of them a second; its ending says in which form: `.png`, `.gif`, `.mp4`, or a
     /// slash for a folder of numbered PNGs.
     ///
     /// # Errors
     /// Another ending, a place that cannot be written, or no ffmpeg for `.mp4`.
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
-        let name = path.file_name().ok_or_else(|| unknown(path))?.to_string_lossy().into_owned();
-        let hidden = path.with_file_name(format!(".{}.{}", std::process::id(), name));
-        let draft = Draft(Some(hidden.clone()));
-        let create = || File::create(&hidden).map_err(|e| Error::file(path)(e));
-        let folder = path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR]);
+        Self::check(path)?;
+        let draft = Draft::of(path)?;
         let kind = match path.extension().and_then(|e| e.to_str()) {
-            _ if folder => {
-                std::fs::create_dir(&hidden).map_err(Error::file(path))?;
+            _ if is_folder(path) => {
+                std::fs::create_dir(draft.place()).map_err(Error::file(path))?;
                 Kind::Frames(0)
             }
-            Some("png") => Kind::Png(create()?),
+            Some("png") => Kind::Png(draft.create()?),
             Some("gif") => {
                 let side =
                     |s: u32| u16::try_from(s).map_err(|_| Error::input(format!("{s} pixels: a GIF has at most 65535")));
-                let mut encoder = gif::Encoder::new(BufWriter::new(create()?), side(size.0)?, side(size.1)?, &[])
+                let mut encoder = gif::Encoder::new(BufWriter::new(draft.create()?), side(size.0)?, side(size.1)?, &[])
                     .map_err(|e| failed(path, e))?;
                 encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| failed(path, e))?;
                 Kind::Gif(Box::new(encoder))
             }
             Some("mp4") => {
                 // That the place can be written shows before ffmpeg starts.
-                drop(create()?);
-                Kind::Mp4(ffmpeg(&hidden, size, rate)?)
+                drop(draft.create()?);
+                Kind::Mp4(ffmpeg(draft.place(), size, rate)?)
             }
             _ => return Err(unknown(path)),
         };
@@ -95,7 +91,7 @@ impl Output {
         match &mut self.kind {
             Kind::Png(file) => write_png(file, picture).map_err(|e| failed(path, e)),
             Kind::Frames(count) => {
-                let folder = self.draft.0.as_deref().unwrap_or(path);
+                let folder = self.draft.place();
                 let name = format!("{count:05}.png");
                 *count += 1;
                 let file = File::create(folder.join(&name)).map_err(Error::file(path.join(&name)))?;
@@ -119,7 +115,7 @@ impl Output {
     /// # Errors
     /// It cannot be written, or ffmpeg says no.
     pub fn finish(self) -> Result<()> {
-        let Self { path, mut draft, kind, .. } = self;
+        let Self { path, draft, kind, .. } = self;
         match kind {
             Kind::Gif(encoder) => {
                 let mut file = encoder.into_inner().map_err(|e| failed(&path, e))?;
@@ -134,8 +130,7 @@ impl Output {
             }
             Kind::Frames(_) if path.is_dir() => {
                 // A folder that is there keeps what else is in it.
-                let hidden = draft.0.as_deref().unwrap_or(&path);
-                for entry in std::fs::read_dir(hidden).map_err(Error::file(&path))? {
+                for entry in std::fs::read_dir(draft.place()).map_err(Error::file(&path))? {
                     let entry = entry.map_err(Error::file(&path))?;
                     std::fs::rename(entry.path(), path.join(entry.file_name())).map_err(Error::file(&path))?;
                 }
@@ -143,11 +138,12 @@ impl Output {
             }
             Kind::Png(_) | Kind::Frames(_) => {}
         }
-        if let Some(hidden) = draft.0.take() {
-            std::fs::rename(hidden, &path).map_err(Error::file(&path))?;
-        }
-        Ok(())
+        draft.keep()
     }
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR])
 }
 
 fn unknown(path: &Path) -> Error {

@@ -37,6 +37,9 @@ pub struct Frame<'a> {
 /// An axis over decades, with a key point at each and at its half.
 struct Decades(Range<f64>);
 
+/// Most decades that have a key point each.
+const MOST_DECADES: usize = 12;
+
 /// An axis from 0 to 1.
 struct Share;
 
@@ -46,15 +49,18 @@ impl Ranged for Decades {
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
         let (low, high) = (self.0.start.log10(), self.0.end.log10());
+        // What lies beyond the axis, such as infinity, is drawn at its end: pixels have no room for more.
+        let value = value.clamp(self.0.start, self.0.end);
         limit.0 + ((value.log10() - low) / (high - low) * f64::from(limit.1 - limit.0)).round() as i32
     }
 
     fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
         let decades = |r: &Range<f64>| (r.start.log10().floor() as i32, r.end.log10().ceil() as i32);
         let (low, high) = decades(&self.0);
-        // Between decades only where there are few of them.
+        // Between decades only where there are few of them, and some decades only where there are many.
         let steps: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let all = (low..=high).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
+        let every = ((high - low) as usize).div_ceil(MOST_DECADES).max(1);
+        let all = (low..=high).step_by(every).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
         all.filter(|x| *x >= 0.999 * self.0.start && *x <= 1.001 * self.0.end).collect()
     }
 
@@ -100,7 +106,9 @@ pub fn svg(frame: &Frame, series: &[Series]) -> String {
 fn decades(values: impl Iterator<Item = f64>) -> Decades {
     let fit = values.filter(|v| *v > 0.0 && v.is_finite());
     let (low, high) = fit.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    if low <= high { Decades(low / 1.3..high * 1.3) } else { Decades(0.1..10.0) }
+    // Both ends stay numbers that have a logarithm: 1.8e308 times 1.3 is infinite, and 1e-323 has lost its digits.
+    let ends = || (low / 1.3).max(f64::MIN_POSITIVE)..(high * 1.3).min(f64::MAX);
+    if low <= high { Decades(ends()) } else { Decades(0.1..10.0) }
 }
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
@@ -220,9 +228,9 @@ fn marker<'a>(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'sta
     }
 }
 
-/// A number as people write it: 0.001, 0.5, 20.
+/// A number as people write it: 0.001, 0.5, 20, 1e12.
 fn plain(x: &f64) -> String {
-    format!("{}", (x * 1e9).round() / 1e9)
+    if (1e-9..1e9).contains(x) || *x == 0.0 { format!("{}", (x * 1e9).round() / 1e9) } else { format!("{x:.0e}") }
 }
 
 #[cfg(test)]
@@ -241,6 +249,16 @@ mod tests {
         assert_eq!(keys(0.015, 0.6), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
         assert_eq!(keys(1e-3, 1e3), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
         assert_eq!(Decades(1e-3..1e3).map(&1.0, (0, 600)), 300);
+        assert_eq!(keys(1e-30, 1e6).len(), 13, "every third of 36 decades");
+    }
+
+    #[test]
+    fn an_axis_holds_the_least_and_the_largest_number() {
+        let Decades(ends) = decades([f64::MAX, f64::from_bits(1), f64::INFINITY].into_iter());
+        assert_eq!(ends, f64::MIN_POSITIVE..f64::MAX);
+        let axis = Decades(ends);
+        assert!(axis.key_points(plotters::coord::ranged1d::BoldPoints(10)).len() <= 13);
+        assert_eq!([0.0, 1e-320, 1.0, f64::MAX, f64::INFINITY].map(|x| axis.map(&x, (0, 616))), [0, 0, 308, 616, 616]);
     }
 
     #[test]
