@@ -22,8 +22,8 @@ fn settled(scene: &str, config: SolverConfig) -> (Simulation, f32) {
 }
 
 fn stages(c: &mut Criterion) {
-    let (mut simulation, dt) = settled("pile:n=1000", SolverConfig::default());
-    let (world, config) = (simulation.world.clone(), SolverConfig::default());
+    let (mut simulation, dt) = settled("pile:n=1000", SolverConfig::default().without_sleep());
+    let (world, config) = (simulation.world.clone(), SolverConfig::default().without_sleep());
     let anew = SolverConfig { recycle_distance: 0.0, ..config.clone() };
     let mut group = c.benchmark_group("a manifold");
     group.throughput(Throughput::Elements(simulation.next_problem(dt).expect("a step").0.contacts.len() as u64));
@@ -70,11 +70,11 @@ fn stages(c: &mut Criterion) {
 }
 
 fn kernels(c: &mut Criterion) {
-    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default() };
+    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
     for (title, scene, config) in [
-        ("pile:n=1000", "pile:n=1000", SolverConfig::default()),
+        ("pile:n=1000", "pile:n=1000", SolverConfig::default().without_sleep()),
         ("pile:n=1000, friction a manifold", "pile:n=1000", at_manifold),
-        ("joint-grid:n=40", "joint-grid:n=40", SolverConfig::default()),
+        ("joint-grid:n=40", "joint-grid:n=40", SolverConfig::default().without_sleep()),
     ] {
         let (mut simulation, dt) = settled(scene, config);
         let (problem, plan) = simulation.next_problem(dt).expect("a step");

@@ -83,7 +83,8 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[1].first_point", |p, _| p.contacts[1].first_point += 1),
         ("contacts[1].first_point", |p, _| {
             // One point more is taken for a patch, which every other contact lacks.
-            (p.points.push(p.points[0]), p.impulses.push(p.impulses[0]));
+            p.points.push(p.points[0]);
+            p.impulses.push(p.impulses[0]);
             p.params.point_count += 1;
         }),
         ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32 + 1),

@@ -48,8 +48,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => &joints,
             _ => &(0..0),
         };
-        if colors.start > colors.end || !colors.is_empty() && !(known.start <= colors.start && colors.end <= known.end)
-        {
+        if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
             return refuse(format!("colors {colors:?}: there are {known:?}"));
         }
         let over_contacts =

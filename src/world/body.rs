@@ -47,6 +47,11 @@ impl Material {
     }
 }
 
+/// Whether a quaternion is near unit length.
+fn is_rotation(q: Quat) -> bool {
+    (q.length() - 1.0).abs() <= 1e-3
+}
+
 /// A shape at a place on a body.
 #[derive(Clone, Debug)]
 pub struct Collider {
@@ -335,7 +340,7 @@ impl Body {
         if !is_place(self.position) {
             return refuse(format!("position = {}: must be at most {MOST_LENGTH:e} m in size", self.position));
         }
-        if !((self.rotation.length() - 1.0).abs() <= 1e-3) {
+        if !is_rotation(self.rotation) {
             return refuse(format!("rotation = {}: must have unit length", self.rotation));
         }
         for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
@@ -356,7 +361,7 @@ impl Body {
             if !is_place(*position) {
                 return refuse(format!("position = {position}: must be at most {MOST_LENGTH:e} m in size"));
             }
-            if !((rotation.length() - 1.0).abs() <= 1e-3) {
+            if !is_rotation(*rotation) {
                 return refuse(format!("rotation = {rotation}: must have unit length"));
             }
             if self.kind == BodyKind::Kinematic && shape.is_half_space() {
@@ -379,7 +384,7 @@ impl Body {
             ));
         }
         let MassProperties { center, principal_frame, .. } = self.mass;
-        if !is_place(center) || !((principal_frame.length() - 1.0).abs() <= 1e-3) {
+        if !is_place(center) || !is_rotation(principal_frame) {
             return refuse(format!(
                 "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
             ));

@@ -60,7 +60,7 @@ impl Entrant {
         let hertz = self.hertz(scene.dt);
         Ok(match self.engine {
             Engine::Drystone => {
-                let mut config = SolverConfig { substeps: self.substeps, ..SolverConfig::default() };
+                let mut config = SolverConfig { substeps: self.substeps, ..SolverConfig::default().without_sleep() };
                 config.contact_frequency = self.frequency.unwrap_or(config.contact_frequency);
                 self.set.iter().try_for_each(|assignment| config.set(assignment))?;
                 Box::new(Drystone::new(scene, "cpu", &config)?)

@@ -54,12 +54,12 @@ const DRYSTONE: usize = 0;
 const RAPIER: usize = 5;
 
 fn drystone(map: Map, substeps: u32) -> Result<Game> {
-    let config = SolverConfig { substeps, ..SolverConfig::default() };
+    let config = SolverConfig { substeps, ..SolverConfig::default().without_sleep() };
     Game::new(map, config, choose(BackendChoice::Cpu, 1, false)?.0)
 }
 
 fn drystone_gpu(map: Map) -> Result<Game> {
-    Game::new(map, SolverConfig::default(), choose(BackendChoice::Gpu, 1, false)?.0)
+    Game::new(map, SolverConfig::default().without_sleep(), choose(BackendChoice::Gpu, 1, false)?.0)
 }
 
 /// How often a game is played for its time, all players in turn; the GPU, which is slow here, plays once.
