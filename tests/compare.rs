@@ -145,3 +145,22 @@ fn one_bit_of_one_number_makes_a_body_differ() {
     let lost = changed(&|b| b.linear_velocity.y = f32::NAN);
     assert_eq!((lost.bodies, lost.velocity), (1, f64::INFINITY));
 }
+
+#[test]
+fn each_number_of_a_difference_is_of_its_own_quantity() {
+    let world = pile().world;
+    let changed = |change: &dyn Fn(&mut drystone::Body)| {
+        let mut other = world.clone();
+        change(&mut other.bodies[7]);
+        Difference::between(&world, &other)
+    };
+    let none = Difference { bodies: 1, ..Difference::default() };
+    let position = changed(&|b| b.position.y += 4.0);
+    assert!((position.position - 4.0).abs() < 1e-5, "{position:?}");
+    assert_eq!(position, Difference { position: position.position, ..none });
+    let rotation = changed(&|b| b.rotation.y += 0.5);
+    assert!((rotation.rotation - 0.5).abs() < 1e-6, "{rotation:?}");
+    assert_eq!(rotation, Difference { rotation: rotation.rotation, ..none });
+    assert_eq!(changed(&|b| b.linear_velocity.z = -2.0), Difference { velocity: 2.0, ..none });
+    assert_eq!(changed(&|b| b.angular_velocity.x = 0.25), Difference { angular_velocity: 0.25, ..none });
+}

@@ -149,3 +149,25 @@ fn a_pile_needs_no_more_colors_than_there_are() {
         assert_eq!(simulation.step(scene.dt).expect("a step").overflow, 0);
     }
 }
+
+/// Contacts have the last word: what a joint pushes into the ground is pushed out of it again.
+#[test]
+fn joints_are_swept_before_contacts() {
+    let mut world = row(&cube(), 0.5, 0.0);
+    world.join(drystone::BallJoint::new(1, Vec3::X, 2, -Vec3::X));
+    let config = SolverConfig { substeps: 1, iterations: 2, relax: 1, ..SolverConfig::default() };
+    let (plan, ..) = planned(world, config);
+    let expected = "\
+integrate_velocities
+warm_start_joints over colors 2
+warm_start(disc friction) over colors 0
+solve_joints(biased) over colors 2
+solve_contacts(biased) over colors 0
+solve_joints(biased) over colors 2
+solve_contacts(biased) over colors 0
+integrate_positions
+solve_joints() over colors 2
+solve_contacts(disc friction) over colors 0
+";
+    assert_eq!(plan.to_string(), expected);
+}

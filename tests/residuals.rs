@@ -159,3 +159,13 @@ fn the_units_do_not_matter_to_the_error_to_steer_by() {
     assert!((after.vmax / before.vmax / (length / time) - 1.0).abs() < 1e-12, "{before:?} became {after:?}");
     assert!((after.e_fclib / before.e_fclib - 1.0).abs() > 0.1, "which that with rho = 1 cannot say: {after:?}");
 }
+
+/// Without friction nothing but the sign of its normal impulse is wrong with a contact that pulls.
+#[test]
+fn a_pull_is_outside_of_the_cone_even_without_friction() {
+    let (mut problem, mut impulses) = tower_at_rest();
+    problem.contacts.iter_mut().for_each(|c| c.friction = 0.0);
+    assert_eq!(Residuals::of(&problem, &impulses).cone, 0.0);
+    impulses[5] = DVec3::X * -0.25;
+    assert_eq!(Residuals::of(&problem, &impulses).cone, 0.25);
+}

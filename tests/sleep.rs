@@ -228,3 +228,70 @@ fn every_domino_of_a_row_still_falls() {
     assert!(fallen(&without) > 5, "{}", fallen(&without));
     assert_eq!(fallen(&with), fallen(&without));
 }
+
+/// A cube without friction that slides over the floor without gravity, turning about the vertical, and what became of it.
+fn drifting(velocity: Vec3, spin: f32, config: SolverConfig) -> Simulation {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    world.add(floor().friction(0.0));
+    world.add(cube(0.0, 0.5).friction(0.0).velocity(velocity, Vec3::Y * spin));
+    simulation(world, config)
+}
+
+/// Islands are looked for in every eighth step: half a second is 30 steps, the next eighth is 32.
+#[test]
+fn what_is_still_falls_asleep_after_the_time_that_was_set() {
+    for (after, step) in [(0.5, 32), (0.25, 16), (1.0, 64)] {
+        let mut simulation = drifting(Vec3::ZERO, 0.0, SolverConfig { sleep_after: after, ..SolverConfig::default() });
+        assert_eq!(run(&mut simulation, step - 1).asleep, 0, "{after} s");
+        assert_eq!(run(&mut simulation, 1).asleep, 1, "{after} s");
+    }
+}
+
+/// The fastest point counts: a corner of the cube is sqrt(3)/2 m from its middle.
+#[test]
+fn speed_and_spin_just_above_the_limit_keep_awake() {
+    let limit = 0.02;
+    let config = || SolverConfig { sleep_speed: limit, ..sleepy() };
+    for (share, asleep) in [(0.95, 1), (1.05, 0)] {
+        let speed = share * limit;
+        assert_eq!(run(&mut drifting(Vec3::X * speed, 0.0, config()), 64).asleep, asleep, "{speed} m/s");
+        let spin = speed / 0.75_f32.sqrt();
+        assert_eq!(run(&mut drifting(Vec3::ZERO, spin, config()), 64).asleep, asleep, "{spin} rad/s");
+        let both = drifting(Vec3::X * 0.5 * speed, 0.5 * spin, config());
+        assert_eq!(run(&mut { both }, 64).asleep, asleep, "{spin} rad/s and {speed} m/s, half of each");
+    }
+}
+
+#[test]
+fn what_falls_asleep_stands_still() {
+    let mut simulation = drifting(Vec3::X * 5e-3, 5e-3, sleepy());
+    run(&mut simulation, 31);
+    let before = simulation.world.bodies[1].clone();
+    assert!(before.linear_velocity.x > 4e-3 && before.angular_velocity.y > 4e-3 && before.position.x > 2e-3);
+    assert_eq!(run(&mut simulation, 1).asleep, 1);
+    let after = &simulation.world.bodies[1];
+    assert_eq!((after.linear_velocity, after.angular_velocity), (Vec3::ZERO, Vec3::ZERO));
+}
+
+#[test]
+fn what_touches_nothing_never_sleeps() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    let alone = world.add(cube(0.0, 50.0));
+    world.add(floor());
+    let held = world.add(cube(0.0, 0.5));
+    let mut simulation = simulation(world, sleepy());
+    assert_eq!(run(&mut simulation, 120).asleep, 1);
+    assert!(!simulation.is_asleep(alone) && simulation.is_asleep(held));
+}
+
+/// In every single step: what falls asleep there is woken in the next one.
+#[test]
+fn what_a_moving_body_carries_is_never_asleep() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].linear_velocity = Vec3::new(5e-4, 0.0, 0.0);
+    for step in 0..120 {
+        assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
+    }
+}

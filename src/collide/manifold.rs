@@ -236,4 +236,19 @@ mod tests {
         let impulses: Vec<f32> = new.points().iter().map(|p| p.normal_impulse).collect();
         assert_eq!(impulses, [3.0, 5.0, 0.0]);
     }
+
+    #[test]
+    fn a_manifold_computed_anew_has_all_that_the_old_one_carried() {
+        let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
+        old.color = Some(5);
+        (old.twist_impulse, old.friction_impulse, old.preload, old.row_before) = (2.0, Vec3::X, 0.25, Some(7));
+        let own = &mut old.points_mut()[0];
+        (own.normal_impulse, own.friction_impulse, own.row_before) = (3.0, Vec3::Z, Some(9));
+        let mut new = Manifold::new(Vec3::Y, (0, 0), &[point(0.001, 0.0, 0.0)]);
+        new.inherit(&old, 0.01);
+        assert_eq!((new.color, new.twist_impulse, new.friction_impulse), (Some(5), 2.0, Vec3::X));
+        assert_eq!((new.preload, new.row_before), (0.25, Some(7)));
+        let own = &new.points()[0];
+        assert_eq!((own.normal_impulse, own.friction_impulse, own.row_before), (3.0, Vec3::Z, Some(9)));
+    }
 }
