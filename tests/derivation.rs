@@ -3,7 +3,7 @@
 
 use drystone::config::FrictionRule;
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::kernels::contact::{current_separation, normal_movement, restitute_contact, solve_contact};
+use drystone::kernels::contact::{current_separation, normal_movement, restitute_contact, solve_contact, warm_start};
 use drystone::kernels::friction::{solve_friction, solve_twist};
 use drystone::kernels::joint::joint_column;
 use drystone::kernels::pair::relative_velocity;
@@ -435,4 +435,34 @@ fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_conta
     // Too slow, and what no contact stopped.
     assert_eq!(bounced(-0.99, 0.2).0, 0.0);
     assert_eq!(bounced(-3.0, 0.0).0, 0.0);
+}
+
+/// M⁻¹ Gᵀ λ of the impulses that are carried over: of each point, or of the points and their patch.
+#[test]
+fn a_warm_start_is_the_impulses_times_their_rows() {
+    let s = slipping();
+    let (case, [t_1, t_2]) = (case(), s.tangents);
+    let impulse = Impulse { normal: 0.3, tangent_1: 0.2, tangent_2: -0.1, peak: 0.0 };
+    let patch_impulse = Impulse { normal: -0.4, tangent_1: 0.05, tangent_2: 0.15, peak: 0.0 };
+    let friction = |i: Impulse<f64>| t_1 * i.tangent_1 + t_2 * i.tangent_2;
+    for patch in [false, true] {
+        let mut pair = s.pair;
+        let (rules, points, impulses) =
+            (Rules { patch, ..with(FrictionRule::Disc) }, [s.point; 2], [impulse, patch_impulse]);
+        warm_start(
+            rules,
+            &mut pair,
+            &s.contact,
+            &points[..1 + usize::from(patch)],
+            &impulses[..1 + usize::from(patch)],
+        );
+        let linear = case.normal * impulse.normal + friction(if patch { patch_impulse } else { impulse });
+        let twist = if patch { case.normal * patch_impulse.normal } else { DVec3::ZERO };
+        for (i, (was, is, sign)) in [(s.pair.a, pair.a, -1.0), (s.pair.b, pair.b, 1.0)].into_iter().enumerate() {
+            let wide = |v: LaneVec3<f64>| DVec3::new(v.x, v.y, v.z);
+            let moved = wide(is.v) - wide(was.v) - sign * linear * case.inverse_mass[i];
+            let spun = wide(is.w) - wide(was.w) - sign * (case.inverse_inertia[i] * (case.r[i].cross(linear) + twist));
+            assert!(moved.length() < 1e-14 && spun.length() < 1e-13, "patch {patch}, body {i}: {moved} {spun}");
+        }
+    }
 }

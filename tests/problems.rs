@@ -1,7 +1,8 @@
 //! Contact problems of others: the solver takes as many sweeps as an independent program with the same methods and order.
 //!
-//! Runs where the environment variable DRYSTONE_PROBLEMS names a folder with `NAME.contacts` and a table `anchors.csv`: columns
-//! `problem`, `solver` (`pgs` or `accel`) and `it_1e-1` to `it_1e-3`, sweeps until e_vel is less than that.
+//! Ignored unless asked for, since the problems are not part of the crate: `cargo test --test problems -- --ignored`, with the
+//! environment variable DRYSTONE_PROBLEMS naming a folder with `NAME.contacts` and a table `anchors.csv`: columns `problem`,
+//! `solver` (`pgs` or `accel`) and `it_1e-1` to `it_1e-3`, sweeps until e_vel is less than that.
 
 mod common;
 
@@ -27,12 +28,8 @@ struct Anchor {
     sweeps: [u32; 3],
 }
 
-fn folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("DRYSTONE_PROBLEMS").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("not run: DRYSTONE_PROBLEMS names no folder");
-    }
-    folder
+fn folder() -> PathBuf {
+    std::env::var_os("DRYSTONE_PROBLEMS").map(PathBuf::from).expect("DRYSTONE_PROBLEMS names a folder of problems")
 }
 
 fn anchors(folder: &Path) -> Vec<(Anchor, ContactProblem)> {
@@ -75,8 +72,9 @@ fn ratios((anchor, problem): &(Anchor, ContactProblem), order: Order, backend: O
 }
 
 #[test]
+#[ignore = "needs a folder of problems in DRYSTONE_PROBLEMS"]
 fn contact_by_contact_sweeps_are_those_of_the_anchors() {
-    let Some(folder) = folder() else { return };
+    let folder = folder();
     for line in anchors(&folder).into_iter().filter(|line| line.0.method == Method::Plain) {
         for backend in backends() {
             let rounded = backend.is_some();
@@ -88,9 +86,10 @@ fn contact_by_contact_sweeps_are_those_of_the_anchors() {
 }
 
 #[test]
+#[ignore = "needs a folder of problems in DRYSTONE_PROBLEMS"]
 fn momentum_that_ends_with_a_step_back_saves_sweeps() {
     // That of the anchors ends with every step that is longer than the one before.
-    let Some(folder) = folder() else { return };
+    let folder = folder();
     let lines = anchors(&folder).into_iter().filter(|line| line.0.method == Method::Accelerated);
     let all: Vec<_> = lines.flat_map(|line| ratios(&line, Order::Contacts, None)).collect();
     println!("ratios {all:.2?}, median {:.3}", median(&all));
@@ -98,8 +97,9 @@ fn momentum_that_ends_with_a_step_back_saves_sweeps() {
 }
 
 #[test]
+#[ignore = "needs a folder of problems in DRYSTONE_PROBLEMS"]
 fn manifold_by_manifold_sweeps_are_no_more() {
-    let Some(folder) = folder() else { return };
+    let folder = folder();
     for method in [Method::Plain, Method::Accelerated] {
         let lines = anchors(&folder).into_iter().filter(|(anchor, _)| anchor.method == method);
         let all: Vec<_> = lines.flat_map(|line| ratios(&line, Order::Manifolds, None)).collect();
@@ -123,8 +123,9 @@ fn by_rounding(problem: &ContactProblem, order: Order, sweeps: u32) -> f64 {
 }
 
 #[test]
+#[ignore = "needs a folder of problems in DRYSTONE_PROBLEMS"]
 fn single_precision_leaves_the_errors_of_double_precision() {
-    let Some(folder) = folder() else { return };
+    let folder = folder();
     for (name, problem) in problems(&folder) {
         for order in [Order::Contacts, Order::Manifolds] {
             // A tonne on a kilogram: no impulses in f32 are nearer than those of f64 rounded, 1.8e-5.
@@ -141,8 +142,9 @@ fn single_precision_leaves_the_errors_of_double_precision() {
 }
 
 #[test]
+#[ignore = "needs a folder of problems in DRYSTONE_PROBLEMS"]
 fn acceleration_pays() {
-    let Some(folder) = folder() else { return };
+    let folder = folder();
     let (mut fewer, mut lower) = (Vec::new(), Vec::new());
     for (name, problem) in problems(&folder) {
         let sweeps = |method| sweeps_to(&problem, (method, Order::Manifolds), None, &ERRORS, MOST);

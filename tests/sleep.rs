@@ -295,3 +295,64 @@ fn what_a_moving_body_carries_is_never_asleep() {
         assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
     }
 }
+
+#[test]
+fn what_was_woken_stays_awake_for_the_time_that_was_set() {
+    let mut simulation = sleeping();
+    simulation.wake(1);
+    for step in 1..=30 {
+        let stats = run(&mut simulation, 1);
+        assert_eq!(stats.asleep, 3, "{step} steps are not half a second");
+    }
+    assert_eq!(run(&mut simulation, 8).asleep, 6);
+}
+
+/// Slow for 0.4 s, fast for one step, slow for 0.4 s: half a second is never in one piece.
+#[test]
+fn what_moves_now_and_then_does_not_sleep() {
+    let mut simulation = drifting(Vec3::ZERO, 0.0, sleepy());
+    for _ in 0..8 {
+        assert_eq!(run(&mut simulation, 24).asleep, 0);
+        simulation.world.bodies[1].linear_velocity.x = 0.1;
+        assert_eq!(run(&mut simulation, 1).asleep, 0);
+        simulation.world.bodies[1].linear_velocity.x = 0.0;
+    }
+}
+
+/// A cube with a ball on an arm of 2 m, which its middle hardly moves with.
+#[test]
+fn a_shape_on_a_long_arm_counts_with_its_arm() {
+    let limit = sleepy().sleep_speed;
+    for (share, asleep) in [(0.9, 1), (1.1, 0)] {
+        let mut world = World::new();
+        world.gravity = Vec3::ZERO;
+        world.add(floor().friction(0.0));
+        let ball = Shape::ball(0.5);
+        let arms = Body::dynamic().shape_at(ball.clone(), Vec3::X * 2.0, Quat::IDENTITY);
+        let arms = arms.shape_at(ball, Vec3::X * -2.0, Quat::IDENTITY).friction(0.0).position(0.0, 0.5, 0.0);
+        world.add(arms.velocity(Vec3::ZERO, Vec3::Y * share * limit / 2.5));
+        assert_eq!(run(&mut simulation(world, sleepy()), 64).asleep, asleep, "{share} of the limit");
+    }
+}
+
+/// A cube that drifts on and one that lies against it: one island.
+#[test]
+fn what_touches_what_moves_does_not_sleep() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    world.add(floor().friction(0.0));
+    world.add(cube(0.0, 0.5).friction(0.0));
+    world.add(cube(1.0, 0.5).friction(0.0).velocity(Vec3::Z * 0.1, Vec3::ZERO));
+    let mut simulation = simulation(world, sleepy());
+    for step in 0..120 {
+        assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
+    }
+}
+
+#[test]
+fn a_body_that_was_put_elsewhere_is_at_rest_again() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].position.x += 0.01;
+    assert_eq!(run(&mut simulation, 1).asleep, 0);
+    assert_eq!(run(&mut simulation, 120).asleep, 1);
+}

@@ -251,4 +251,13 @@ mod tests {
         let own = &new.points()[0];
         assert_eq!((own.normal_impulse, own.friction_impulse, own.row_before), (3.0, Vec3::Z, Some(9)));
     }
+
+    #[test]
+    fn points_in_a_line_become_its_ends() {
+        let points = [0.0, 1.0, 2.0, 3.0, 4.0].map(|x| point(x, 0.0, -0.001));
+        let m = Manifold::new(Vec3::Y, (0, 0), &points);
+        let mut ends: Vec<f32> = m.points().iter().map(|p| p.anchor_a.x).collect();
+        ends.sort_by(f32::total_cmp);
+        assert_eq!(ends, [0.0, 4.0]);
+    }
 }
