@@ -172,6 +172,8 @@ mod tests {
         after.bodies[0].position.x += 100.0;
         assert!((drift(&before, &after) - 5.0).abs() < 1e-6);
         assert_eq!(in_place_count(&before, &after), 1);
+        // A way down counts as one aside.
+        assert!(!in_place(&before.bodies[1], &before.bodies[1].clone().position(0.0, -0.6, 0.0)));
         assert_eq!(drift(&before, &before), 0.0);
     }
 }

@@ -6,7 +6,7 @@ use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use drystone::kernels::contact::{current_separation, normal_movement, restitute_contact, solve_contact, warm_start};
 use drystone::kernels::friction::{solve_friction, solve_twist};
 use drystone::kernels::joint::joint_column;
-use drystone::kernels::pair::relative_velocity;
+use drystone::kernels::pair::{relative_movement, relative_velocity};
 use drystone::kernels::{Body, Contact, Impulse, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3};
 use drystone::math::{Quat, Vec3 as LaneVec3, vec3};
 use drystone::problem::ContactRow;
@@ -406,8 +406,9 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
         let contact = Contact { normal: lane(case.normal), ..Contact::default() };
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, separation: -0.01, normal_mass: mass, ..Point::default() };
-        let mut impulses = [Impulse { normal: 0.1, ..Impulse::default() }];
+        let mut impulses = [Impulse { normal: 0.1, peak: 0.3, ..Impulse::default() }];
         solve_contact(rules, &parting, &mut pair, &contact, &[point], &mut impulses);
+        assert_eq!(impulses[0].peak, 0.3, "the largest so far stays");
         impulses[0].normal
     };
     assert!(mass > 0.11, "{mass}");
@@ -464,5 +465,18 @@ fn a_warm_start_is_the_impulses_times_their_rows() {
             let spun = wide(is.w) - wide(was.w) - sign * (case.inverse_inertia[i] * (case.r[i].cross(linear) + twist));
             assert!(moved.length() < 1e-14 && spun.length() < 1e-13, "patch {patch}, body {i}: {moved} {spun}");
         }
+    }
+}
+
+#[test]
+fn anchors_move_as_far_as_their_bodies_moved_and_turned() {
+    let case = case();
+    let (dp, turn) = (DVec3::new(0.1, -0.2, 0.3), DVec3::new(0.4, 0.7, -0.2));
+    for (moved, sign) in [(0, -1.0), (1, 1.0)] {
+        let pair = case.pair(moved, dp, turn);
+        let way = relative_movement(&pair, lane(case.r[0]), lane(case.r[1]));
+        let arm = case.r[moved];
+        let expected = (dp + DQuat::from_scaled_axis(turn) * arm - arm) * sign;
+        assert!(DVec3::new(way.x, way.y, way.z).distance(expected) < 1e-14, "body {moved}");
     }
 }

@@ -182,6 +182,9 @@ fn what_pushes_while_it_parts_counts_by_its_impulse_or_by_its_velocity_whichever
     // F/rho with rho = 2 is min(r / rho, u).
     assert!((of.vmax - 0.25).abs() < 1e-15 && (of.e_vel - 0.25 / 3.0).abs() < 1e-15, "{of:?}");
     assert!((of.e_fclib - 0.5 / 3.0).abs() < 1e-15 && (of.compl - 0.5 * parting).abs() < 1e-15, "{of:?}");
+    // Pushed by 10 N s it parts at 8 m/s, which is less than 10 and more than 10/2.
+    let of = Residuals::of(&problem, &[DVec3::X * 10.0]);
+    assert!((of.vmax - 5.0).abs() < 1e-14 && (of.e_fclib - 8.0 / 3.0).abs() < 1e-14, "{of:?}");
 }
 
 #[test]

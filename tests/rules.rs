@@ -1,12 +1,22 @@
 //! What single rules and settings do, each in a world that is small enough to be followed by hand.
 //!
-//! They run on the reference: the other backends have its bits, which `lanes` and `gpu` hold.
+//! They run on the reference: the other backends have its bits, which `lanes` and `gpu` hold, and the last of these for what a
+//! device carries from step to step.
 
+mod common;
+
+use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
+use common::gpu::gpu;
+use drystone::compare::Difference;
+
 use drystone::config::{FrictionAt, FrictionRule};
-use drystone::problem::PointRow;
-use drystone::{BallJoint, Body, Material, Reference, Shape, Simulation, SolverConfig, StepStats, World};
+use drystone::problem::{ContactRow, PointRow};
+use drystone::{
+    Backend, BallJoint, Body, Gpu, Material, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, StepStats,
+    World,
+};
 use glam::{Quat, Vec3};
 
 const G: f32 = 9.81;
@@ -196,8 +206,13 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
 
 /// A cube on a slope of 30 degrees that friction holds, after a second.
 fn on_a_slope(config: SolverConfig) -> Simulation {
+    on_a_slope_that_falls(Quat::IDENTITY, config)
+}
+
+/// The same with the slope turned about the vertical.
+fn on_a_slope_that_falls(turn: Quat, config: SolverConfig) -> Simulation {
     let mut world = World::new();
-    world.gravity = Quat::from_rotation_z(FRAC_PI_6) * Vec3::NEG_Y * G;
+    world.gravity = turn * Quat::from_rotation_z(FRAC_PI_6) * Vec3::NEG_Y * G;
     world.add(floor().friction(0.7));
     world.add(cube().friction(0.7));
     let mut simulation = simulation(world, config);
@@ -481,34 +496,140 @@ fn a_body_tumbles_about_its_principal_axes_wherever_they_lie_in_it() {
     assert!(apart < 1e-4 * spin.length(), "{} and {}", one.angular_velocity, other.angular_velocity);
 }
 
-/// Two neighbors in one row touch; then a third one joins them. All contacts of a body differ in color, and the old one keeps its
-/// own whether it is computed anew or not.
+/// While a pile comes down its contacts begin and end, are reused and are computed anew.
 #[test]
 fn a_contact_keeps_its_color_while_it_lasts() {
-    let mut world = World::new();
-    world.add(floor());
-    for (k, x) in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0].into_iter().enumerate() {
-        // Every second one is let down from a different height.
-        world.add(cube().position(x, 0.5 + 0.02 * (k % 2 * (k + 1)) as f32, 0.0));
-    }
-    let mut simulation = simulation(world, SolverConfig::default());
-    let mut known = std::collections::HashMap::new();
-    let mut begun = Vec::new();
-    for step in 0..120 {
-        run(&mut simulation, 1, DT);
-        let now: std::collections::HashMap<_, _> = simulation
-            .pairs()
-            .flat_map(|p| p.manifolds.iter().map(|m| ((p.body_a, p.body_b), m.color.expect("a color"))))
-            .collect();
+    let scene = Scene::find("pile", &["n=64".into()]).expect("the scene");
+    let mut simulation = simulation(scene.world, SolverConfig::default());
+    let mut known = HashMap::new();
+    let (mut kept, mut anew, mut begun) = (0, 0, 0);
+    for step in 0..90 {
+        anew += run(&mut simulation, 1, DT).computed;
+        let colors = simulation.pairs().flat_map(|p| p.manifolds.iter().map(|m| ((p.body_a, p.body_b), m.color)));
+        let now: HashMap<_, _> = colors.collect();
         for (pair, color) in &now {
             match known.get(pair) {
                 Some(before) => assert_eq!(color, before, "step {step}: {pair:?}"),
-                None => begun.push(step),
+                None => begun += 1,
             }
+            kept += usize::from(known.contains_key(pair));
         }
         known = now;
     }
-    assert!(begun.iter().any(|&step| step > 0) && begun.contains(&0), "contacts begin at {begun:?}");
+    assert!(kept > 1000 && anew > 1000 && begun > 100, "{kept} kept, {anew} computed, {begun} begun");
+}
+
+#[test]
+fn a_force_accelerates_by_its_share_of_the_mass() {
+    let mut world = empty();
+    let pushed = world.add(ball().total_mass(4.0));
+    world.bodies[pushed].force = Vec3::new(2.0, -8.0, 0.0);
+    let mut simulation = simulation(world, SolverConfig::default());
+    run(&mut simulation, 60, DT);
+    let velocity = simulation.world.bodies[pushed].linear_velocity;
+    assert!(velocity.distance(Vec3::new(0.5, -2.0, 0.0)) < 1e-4, "{velocity}");
+}
+
+/// A small ball on a large one, in either order: each row names which radius is whose.
+#[test]
+fn a_row_has_the_radius_of_each_of_its_surfaces() {
+    for radii in [[1.0, 0.2], [0.2, 1.0]] {
+        let mut world = empty();
+        for (radius, y) in radii.into_iter().zip([0.0, 1.2]) {
+            world.add(Body::dynamic().shape(Shape::ball(radius)).position(0.0, y, 0.0));
+        }
+        let mut simulation = simulation(world, SolverConfig::default());
+        let problem = simulation.next_problem(DT).0;
+        let [row] = problem.contacts[..] else { panic!("one contact") };
+        for (body, radius) in [(row.body_a, row.radius_a), (row.body_b, row.radius_b)] {
+            assert_eq!(radius, radii[body as usize]);
+        }
+    }
+}
+
+/// A slope that falls along neither tangent. Moved so far that its manifold is computed anew, the cube is held as before.
+#[test]
+fn friction_is_carried_over_whichever_way_a_surface_slopes() {
+    for angle in [0.3, 1.2, 2.5] {
+        let mut held = [FrictionAt::Points, FrictionAt::Manifold].map(|friction_at| {
+            let config = SolverConfig { friction_at, ..SolverConfig::default() };
+            on_a_slope_that_falls(Quat::from_rotation_y(angle), config)
+        });
+        for simulation in &mut held {
+            let before = friction(simulation.problem());
+            simulation.world.bodies[1].position.x += 0.02;
+            let after = friction(simulation.next_problem(DT).0);
+            assert!(before.length() > 5.0 && after.distance(before) < 1e-3 * before.length(), "{after}, not {before}");
+        }
+    }
+}
+
+/// The sum of the impulses along the tangents [N s].
+fn friction(problem: &StepProblem) -> Vec3 {
+    let along = |row: &ContactRow| {
+        let (t_1, t_2) = row.tangents();
+        // The patch, if there is one, is the row after the points.
+        let own =
+            row.first_point as usize..problem.impulses.len().min((row.first_point + row.point_count) as usize + 1);
+        problem.impulses[own].iter().map(|i| t_1 * i.tangent_1 + t_2 * i.tangent_2).sum::<Vec3>()
+    };
+    problem.contacts.iter().map(along).sum()
+}
+
+/// Steps of the reference and of a device that keeps its rows: the same bits in every one of them.
+fn same_on_a_device(world: World, config: &SolverConfig, steps: u32, change: impl Fn(u32, &mut World)) {
+    let Some(gpu) = gpu(true).filter(Gpu::is_exact) else { return };
+    let backends: [Box<dyn Backend>; 2] = [Box::new(Reference::<f32>::new()), Box::new(gpu)];
+    let mut both =
+        backends.map(|backend| Simulation::new(world.clone(), config.clone(), backend).expect("good settings"));
+    for step in 0..steps {
+        for simulation in &mut both {
+            change(step, &mut simulation.world);
+            simulation.step(DT).expect("a step");
+        }
+        let apart = Difference::between(&both[0].world, &both[1].world);
+        assert_eq!(apart, Difference::default(), "step {step}");
+    }
+}
+
+/// Cubes that slide down a slope, so that what holds them is carried over to manifolds that are computed anew.
+fn sliding() -> World {
+    let mut world = World::new();
+    world.gravity = Quat::from_rotation_y(0.4) * Quat::from_rotation_z(FRAC_PI_6) * Vec3::NEG_Y * G;
+    world.add(floor().friction(0.5));
+    for x in [0.0, 3.0, 6.0] {
+        world.add(cube().friction(0.5).position(x, 0.5, 0.0).velocity(Vec3::ZERO, Vec3::Y * x));
+    }
+    world
+}
+
+#[test]
+fn a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew() {
+    let config = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default() };
+    same_on_a_device(sliding(), &config, 40, |_, _| ());
+}
+
+#[test]
+fn a_device_carries_no_friction_that_a_surface_lost() {
+    // With sweeps that leave something of an impulse that is carried over, so that it shows.
+    let config = SolverConfig { relaxation: 0.5, ..SolverConfig::default() };
+    same_on_a_device(sliding(), &config, 40, |step, world| {
+        if step == 20 {
+            world.bodies.iter_mut().for_each(|body| body.material.friction = 0.0);
+            world.bodies[1].position.x += 0.02;
+        }
+    });
+}
+
+/// Where surfaces bounce, or friction has the direction of a slip, points change from step to step, and are sent.
+#[test]
+fn a_device_takes_the_points_that_are_sent() {
+    let mut bouncing = sliding();
+    bouncing.bodies.iter_mut().for_each(|body| body.material.restitution = 0.7);
+    bouncing.bodies[1].position.y += 1.0;
+    same_on_a_device(bouncing, &SolverConfig::default(), 40, |_, _| ());
+    let config = SolverConfig { friction: FrictionRule::Slip, ..SolverConfig::default() };
+    same_on_a_device(sliding(), &config, 40, |_, _| ());
 }
 
 #[test]

@@ -260,4 +260,15 @@ mod tests {
         ends.sort_by(f32::total_cmp);
         assert_eq!(ends, [0.0, 4.0]);
     }
+
+    #[test]
+    fn a_point_that_was_matched_by_its_feature_is_not_matched_again_by_its_place() {
+        let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
+        (old.points_mut()[0].features, old.points_mut()[0].normal_impulse) = (7, 3.0);
+        let mut moved = [point(0.5, 0.0, 0.0), point(0.001, 0.0, 0.0)];
+        moved[0].features = 7;
+        let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);
+        new.inherit(&old, 0.01);
+        assert_eq!(new.points().iter().map(|p| p.normal_impulse).collect::<Vec<_>>(), [3.0, 0.0]);
+    }
 }
