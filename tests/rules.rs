@@ -611,11 +611,10 @@ fn a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew(
 
 #[test]
 fn a_device_carries_no_friction_that_a_surface_lost() {
-    // With sweeps that leave something of an impulse that is carried over, so that it shows.
-    let config = SolverConfig { relaxation: 0.5, ..SolverConfig::default() };
-    same_on_a_device(sliding(), &config, 40, |step, world| {
+    same_on_a_device(sliding(), &SolverConfig::default(), 40, |step, world| {
         if step == 20 {
-            world.bodies.iter_mut().for_each(|body| body.material.friction = 0.0);
+            // The others keep theirs, so that friction is in the plan.
+            world.bodies[1].material.friction = 0.0;
             world.bodies[1].position.x += 0.02;
         }
     });
