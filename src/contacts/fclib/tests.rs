@@ -162,7 +162,8 @@ fn angular_parts_in_body_axes_give_the_same_problem() {
 #[test]
 fn arms_that_fit_either_way_point_out_of_their_bodies() {
     let mut problem = boxes();
-    let contact = |a, b, r_a: DVec3, r_b: DVec3| PointContact { a, b, r_a, r_b, ..problem.contacts[0].clone() };
+    let first = problem.contacts[0];
+    let contact = |a, b, r_a: DVec3, r_b: DVec3| PointContact { a, b, r_a, r_b, ..first };
     let (below, above) = (DVec3::new(0.2, 0.3, -0.4), DVec3::new(-0.1, 0.2, 0.7));
     problem.contacts = vec![contact(None, Some(0), DVec3::ZERO, below), contact(Some(1), Some(2), above, below)];
     let read = ContactProblem::from_fclib(bytes(&tree(&problem), "fclib_global")).expect("read");
