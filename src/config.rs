@@ -185,6 +185,22 @@ pub struct SolverConfig {
 /// Colors smaller than this share a workgroup, unless told otherwise.
 pub const FUSE_BELOW: u32 = 256;
 
+/// Shortest step [s]. Shorter ones move nothing that single precision can tell from rest.
+pub const SHORTEST_STEP: f32 = 1e-9;
+/// Longest step [s].
+pub const LONGEST_STEP: f32 = 1.0;
+
+/// Refuses a length of a step that no step can be made of: less than [`SHORTEST_STEP`], more than [`LONGEST_STEP`], or no number.
+///
+/// # Errors
+/// One line with the length and the range.
+pub fn check_step_length(dt: f32) -> Result<()> {
+    if (SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
+        return Ok(());
+    }
+    Err(Error::input(format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")))
+}
+
 impl Default for SolverConfig {
     fn default() -> Self {
         Self {

@@ -111,4 +111,69 @@ mod tests {
         assert!(!in_place(&start, &start.clone().position(0.0, 0.0, 0.5)));
         assert!(!in_place(&start, &start.clone().position(f32::NAN, 0.0, 0.0)));
     }
+
+    /// Twenty cubes side by side, the k-th k mm deep in the floor, and one that is apart from it.
+    #[test]
+    fn penetration_is_the_deepest_the_mean_and_what_19_of_20_do_not_exceed() {
+        let mut world = World::new();
+        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        let cube =
+            |k: usize, y: f32| Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(2.0 * k as f32, y, 0.0);
+        for k in 1..=20 {
+            world.add(cube(k, 0.5 - 1e-3 * k as f32));
+        }
+        let near = |x: f64, y: f64| (x - y).abs() < 1e-6;
+        let config = SolverConfig::default();
+        let of = Penetration::of_world(&world, &config);
+        assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.0105), "{of:?}");
+        // What is within its margin counts as touching, with a depth of zero.
+        world.add(cube(21, 0.505));
+        let of = Penetration::of_world(&world, &config);
+        assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.010), "{of:?}");
+        assert_eq!(Penetration::of_world(&World::new(), &config), Penetration::default());
+    }
+
+    /// 1 kg at 3 m/s, 3 kg at 1 m/s, and a fixed body that has no part in it.
+    fn two_that_move() -> World {
+        let mut world = World::new();
+        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        for (mass, speed) in [(1.0, 3.0), (3.0, 1.0)] {
+            let ball = Body::dynamic().shape(Shape::ball(0.5)).total_mass(mass);
+            world.add(ball.velocity(Vec3::new(0.0, 0.6, -0.8) * speed, Vec3::ZERO));
+        }
+        world
+    }
+
+    #[test]
+    fn rms_speed_is_weighted_by_mass() {
+        assert!((rms_speed(&two_that_move()) - (12.0_f64 / 4.0).sqrt()).abs() < 1e-6);
+        assert_eq!(rms_speed(&World::new()), 0.0);
+    }
+
+    #[test]
+    fn the_fastest_is_named_and_what_is_no_number_is_faster_than_all() {
+        let mut world = two_that_move();
+        let (speed, body) = fastest(&world);
+        assert!((speed - 3.0).abs() < 1e-6 && body == 1, "{speed} m/s of {body}");
+        world.bodies[2].linear_velocity.x = f32::NAN;
+        let (speed, body) = fastest(&world);
+        assert!(speed.is_nan() && body == 2, "{speed} m/s of {body}");
+        world.bodies[0].linear_velocity = Vec3::splat(100.0);
+        world.bodies[2].linear_velocity = Vec3::ZERO;
+        assert_eq!(fastest(&world).1, 1, "a fixed body is not fast");
+        assert_eq!(fastest(&World::new()), (0.0, 0));
+    }
+
+    #[test]
+    fn drift_is_horizontal_whichever_way_it_goes() {
+        let before = two_that_move();
+        let mut after = before.clone();
+        after.bodies[1].position += Vec3::new(3.0, -70.0, 4.0);
+        after.bodies[0].position.x += 100.0;
+        assert!((drift(&before, &after) - 5.0).abs() < 1e-6);
+        assert_eq!(in_place_count(&before, &after), 1);
+        // A way down counts as one aside.
+        assert!(!in_place(&before.bodies[1], &before.bodies[1].clone().position(0.0, -0.6, 0.0)));
+        assert_eq!(drift(&before, &before), 0.0);
+    }
 }

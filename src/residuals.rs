@@ -176,7 +176,13 @@ mod tests {
     #[test]
     fn the_projection_is_the_nearest_point_of_the_cone() {
         let mu = 0.5;
-        for x in [DVec3::new(1.0, 2.0, -1.0), DVec3::new(-0.1, 1.0, 0.0), DVec3::new(-3.0, 1.0, 1.0), DVec3::X] {
+        for x in [
+            DVec3::new(1.0, 2.0, -1.0),
+            DVec3::new(-0.1, 1.0, 0.0),
+            DVec3::new(-3.0, 1.0, 1.0),
+            DVec3::new(-0.7, 1.0, 0.0),
+            DVec3::X,
+        ] {
             let nearest = projected_on_cone(mu, x);
             assert!(DVec2::new(nearest.y, nearest.z).length() <= mu * nearest.x * (1.0 + 1e-15) + 1e-300);
             for k in 0..1000 {

@@ -5,7 +5,7 @@ mod stages;
 use crate::backend::cpu::Reference;
 use crate::backend::{Backend, CheckedStep};
 use crate::collide::Pair;
-use crate::config::SolverConfig;
+use crate::config::{SolverConfig, check_step_length};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::metrics::Penetration;
@@ -14,22 +14,6 @@ use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
 use stages::Stages;
-
-/// Shortest step [s]. Shorter ones move nothing that single precision can tell from rest.
-pub const SHORTEST_STEP: f32 = 1e-9;
-/// Longest step [s].
-pub const LONGEST_STEP: f32 = 1.0;
-
-/// Refuses a length of a step that no step can be made of: less than [`SHORTEST_STEP`], more than [`LONGEST_STEP`], or no number.
-///
-/// # Errors
-/// One line with the length and the range.
-pub fn check_step_length(dt: f32) -> Result<()> {
-    if (SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
-        return Ok(());
-    }
-    Err(Error::input(format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")))
-}
 
 /// A world that moves.
 ///
@@ -72,7 +56,7 @@ impl Simulation {
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
     ///
     /// # Errors
-    /// `dt` is not from [`SHORTEST_STEP`] to [`LONGEST_STEP`]; bodies came, went, or changed kind or shape; a joint or a mass is not
+    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); bodies came, went, or changed kind or shape; a joint or a mass is not
     /// fit to be simulated; the backend cannot run the step. The world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();

@@ -87,12 +87,17 @@ impl Sleep {
         }
     }
 
-    /// Takes over other settings: bodies that sleep go on sleeping unless nothing ever does.
-    pub fn change_settings(&mut self, world: &World, config: &SolverConfig) {
-        if self.asleep.is_empty() || config.sleep_after == 0.0 {
-            *self = Self::new(world, config);
-        } else {
-            (self.after, self.speed) = (config.sleep_after, config.sleep_speed);
+    /// Takes over other settings. All bodies wake where anything but the settings of sleeping changes: what they rested on may
+    /// hold them no longer.
+    pub fn change_settings(&mut self, world: &World, before: &SolverConfig, now: &SolverConfig) {
+        let SolverConfig { sleep_after, sleep_speed, .. } = *now;
+        if self.asleep.is_empty() || sleep_after == 0.0 {
+            *self = Self::new(world, now);
+            return;
+        }
+        (self.after, self.speed) = (sleep_after, sleep_speed);
+        if (SolverConfig { sleep_after, sleep_speed, ..before.clone() }) != *now {
+            (0..self.asleep.len()).for_each(|body| self.wake(body));
         }
     }
 

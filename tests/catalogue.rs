@@ -33,6 +33,22 @@ fn fallen(scene: &Scene, simulation: &Simulation) -> usize {
     both.filter(|(before, after)| after.kind == BodyKind::Dynamic && !in_place(before, after)).count()
 }
 
+/// That what cannot move pushes up with the weight of all that can, so that nothing only hangs in the air.
+fn bears_its_weight(name: &str, simulation: &mut Simulation) {
+    let substep = 1.0 / 60.0 / simulation.config().substeps as f32;
+    let (world, pairs) = simulation.world_and_pairs();
+    let is_fixed = |body: u32| world.bodies[body as usize].kind == BodyKind::Fixed;
+    let mut pushed = Vec3::ZERO;
+    for pair in pairs.filter(|pair| is_fixed(pair.body_a) || is_fixed(pair.body_b)) {
+        let own = pair.manifolds.iter().flat_map(|m| m.points().iter().map(|p| (m.normal * p.normal_impulse, p)));
+        let sum: Vec3 = own.map(|(normal, p)| normal + p.friction_impulse).sum();
+        pushed += if is_fixed(pair.body_a) { sum } else { -sum };
+    }
+    let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
+    let weight = -world.gravity * dynamic.map(|b| b.mass.mass).sum::<f32>() * substep;
+    assert!(pushed.distance(weight) < 0.02 * weight.length(), "{name}: {pushed} N s of {weight}");
+}
+
 fn energy(simulation: &Simulation) -> f64 {
     simulation.world.kinetic_energy() + simulation.world.potential_energy()
 }
@@ -47,6 +63,7 @@ fn a_wall_rests() {
     step(&mut simulation, 300);
     let speed = rms_speed(&simulation.world);
     assert!(speed < 1e-3 && fallen(&scene, &simulation) == 0, "{speed:e} m/s");
+    bears_its_weight("wall", &mut simulation);
 }
 
 #[test]
@@ -86,9 +103,10 @@ fn small_standing_scenes_stand() {
         ("many-pyramids", vec!["n=5", "base=4"]),
         ("arch", vec![]),
     ] {
-        let (scene, simulation) = run(name, &parameters, 90);
+        let (scene, mut simulation) = run(name, &parameters, 90);
         assert!(scene.stands);
         assert_eq!(fallen(&scene, &simulation), 0, "{name}");
+        bears_its_weight(name, &mut simulation);
     }
 }
 
@@ -147,7 +165,12 @@ fn a_pendulum_keeps_its_energy() {
     let mut simulation = run("pendulum", &["angle=90"], 0).1;
     let before = energy(&simulation);
     let deepest = 9.81 * f64::from(only(&simulation).mass.mass);
-    step(&mut simulation, 300);
+    let mut fastest = 0.0_f64;
+    for _ in 0..300 {
+        step(&mut simulation, 1);
+        fastest = fastest.max(simulation.world.kinetic_energy());
+    }
+    assert!(fastest > 0.98 * deepest, "it swings through the lowest point: {fastest} J of {deepest}");
     let lost = (before - energy(&simulation)) / deepest;
     assert!(lost.abs() < 0.005, "{lost} of what it has at the bottom");
 }
@@ -160,7 +183,7 @@ fn jointed_scenes_stay_together_and_gain_no_energy() {
         ("bridge", ["planks=10", "boxes=3"]),
         ("joint-grid", ["n=6", "n=6"]),
     ] {
-        let mut simulation = run(name, &parameters, 0).1;
+        let (scene, mut simulation) = run(name, &parameters, 0);
         let before = energy(&simulation);
         let mut gap = 0.0_f32;
         for _ in 0..90 {
@@ -169,6 +192,11 @@ fn jointed_scenes_stay_together_and_gain_no_energy() {
         }
         assert!(gap < 0.01, "{name}: {gap} m");
         assert!(energy(&simulation) < before + 1.0, "{name}");
+        // Its weight at least stretches what it hangs on.
+        let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
+        let moved = both.map(|(was, is)| was.position.distance(is.position)).fold(0.0, f32::max);
+        println!("{name} {parameters:?}: {moved} m");
+        assert!(moved > 1e-5, "{name}: {moved} m in 1.5 s");
     }
 }
 
@@ -177,6 +205,11 @@ fn boxes_stay_on_the_bridge_and_in_the_drum() {
     for (name, parameters) in [("bridge", ["planks=10", "boxes=5"]), ("drum", ["n=20", "speed=2"])] {
         let (scene, simulation) = run(name, &parameters, 120);
         assert_eq!(scene.escaped(&simulation.world), 0, "{name}");
+        let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
+        let boxes = both.filter(|(was, _)| was.kind == BodyKind::Dynamic);
+        let farthest = boxes.map(|(was, is)| was.position.distance(is.position)).fold(0.0, f32::max);
+        println!("{name}: {farthest} m");
+        assert!(farthest > 0.02, "{name}: nothing moved by more than {farthest} m in 2 s");
     }
 }
 

@@ -71,7 +71,7 @@ fn standing() -> World {
 /// Every setting away from its default, and what has to go with it.
 fn other_settings() -> Vec<(&'static str, SolverConfig)> {
     let of = |change: &dyn Fn(&mut SolverConfig)| {
-        let mut config = SolverConfig::default();
+        let mut config = SolverConfig::default().without_sleep();
         change(&mut config);
         config.check().expect("a setting");
         config
@@ -123,12 +123,12 @@ fn other_settings() -> Vec<(&'static str, SolverConfig)> {
 /// joint may open, and all backends take the same steps.
 #[test]
 fn every_setting_may_change_on_a_settled_world() {
-    let mut settled = simulation(&standing(), &SolverConfig::default(), cpu);
+    let mut settled = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
     run(&mut settled, 300);
     assert!(fastest(&settled.world) < 2e-3, "{}", fastest(&settled.world));
     for (name, config) in other_settings() {
         let begun = |backend| {
-            let mut simulation = simulation(&standing(), &SolverConfig::default(), backend);
+            let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), backend);
             run(&mut simulation, 300);
             simulation
         };
@@ -159,7 +159,7 @@ fn every_setting_may_change_on_a_settled_world() {
 #[test]
 fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_holds_again_afterwards() {
     for (backend, at) in BOTH.into_iter().zip([FrictionAt::Points, FrictionAt::Manifold]) {
-        let config = SolverConfig { friction_at: at, ..SolverConfig::default() };
+        let config = SolverConfig { friction_at: at, ..SolverConfig::default().without_sleep() };
         let none = SolverConfig { friction: FrictionRule::None, ..config.clone() };
         let mut simulation = simulation(&standing(), &config, backend);
         run(&mut simulation, 60);
@@ -182,7 +182,7 @@ fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_ho
 #[test]
 fn a_pile_at_rest_stays_so_with_fewer_substeps_and_with_longer_steps() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let fine = SolverConfig { substeps: 32, ..SolverConfig::default() };
+    let fine = SolverConfig { substeps: 32, ..SolverConfig::default().without_sleep() };
     for (substeps, dt) in [(8, DT), (32, 2.0 * DT), (16, 0.5 * DT)] {
         let mut simulation = simulation(&scene.world, &fine, cpu);
         run(&mut simulation, 400);
@@ -200,10 +200,10 @@ fn a_pile_at_rest_stays_so_with_fewer_substeps_and_with_longer_steps() {
 
 #[test]
 fn bodies_may_fall_asleep_once_the_settings_say_so() {
-    let mut simulation = simulation(&standing(), &SolverConfig { sleep_after: 0.0, ..SolverConfig::default() }, cpu);
+    let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 120);
     assert!(!(0..simulation.world.bodies.len()).any(|i| simulation.is_asleep(i)));
-    let asleep = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let asleep = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
     simulation.set_config(asleep.clone()).expect("a setting");
     run(&mut simulation, 60);
     assert!(simulation.is_asleep(1), "0.3 s of rest are over");
@@ -214,16 +214,30 @@ fn bodies_may_fall_asleep_once_the_settings_say_so() {
     simulation.set_config(asleep).expect("a setting");
     run(&mut simulation, 60);
     assert!(simulation.is_asleep(1));
-    simulation.set_config(SolverConfig { sleep_after: 0.0, ..SolverConfig::default() }).expect("a setting");
+    simulation.set_config(SolverConfig::default().without_sleep()).expect("a setting");
     run(&mut simulation, 1);
     assert!(!simulation.is_asleep(1), "nothing sleeps any more");
+}
+
+#[test]
+fn a_setting_that_changes_wakes_what_sleeps() {
+    let mut simulation = simulation(&standing(), &SolverConfig { sleep_after: 0.3, ..SolverConfig::default() }, cpu);
+    run(&mut simulation, 240);
+    let block = 17;
+    assert!(simulation.is_asleep(block));
+    let slippery = SolverConfig { friction: FrictionRule::None, ..simulation.config().clone() };
+    simulation.set_config(slippery).expect("a setting");
+    run(&mut simulation, 30);
+    let slid = simulation.world.bodies[block].linear_velocity.length();
+    assert!((slid - 9.81 * 0.2_f32.sin() * 30.0 * DT).abs() < 0.02, "{slid} m/s");
 }
 
 /// Asking for the next step is no step: whatever is asked, the run goes on with the same bits.
 #[test]
 fn asking_for_the_next_problem_changes_no_bit_of_the_run() {
     let scene = Scene::find("pile", &["n=60".into()]).expect("the scene");
-    let [mut asked, mut left] = [cpu, cpu].map(|b| simulation(&scene.world, &SolverConfig::default(), b));
+    let [mut asked, mut left] =
+        [cpu, cpu].map(|b| simulation(&scene.world, &SolverConfig::default().without_sleep(), b));
     for step in 0..120 {
         let (problem, plan) = asked.next_problem(DT).expect("a step");
         let (other, _) = asked.next_problem(0.5 * DT).expect("a step");
@@ -264,7 +278,7 @@ fn net() -> World {
 fn joints_that_take_the_place_of_others_hold_what_they_tie() {
     let mut gaps = Vec::new();
     for backend in BOTH {
-        let mut simulation = simulation(&net(), &SolverConfig::default(), backend);
+        let mut simulation = simulation(&net(), &SolverConfig::default().without_sleep(), backend);
         run(&mut simulation, 60);
         // The balls of the first row hang from other points now, and the rest hangs from them the other way round.
         let joints = &mut simulation.world.joints;
@@ -288,7 +302,7 @@ fn joints_that_take_the_place_of_others_hold_what_they_tie() {
 
 #[test]
 fn a_joint_that_ends_leaves_the_impulses_of_the_others_alone() {
-    let mut simulation = simulation(&standing(), &SolverConfig::default(), reference);
+    let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), reference);
     run(&mut simulation, 120);
     // The top of a tower is held where it is, by a joint that stands first in the list.
     let top = simulation.world.bodies[5].position;
@@ -317,7 +331,7 @@ fn whether_jointed_bodies_collide_may_change() {
     let b = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.6, 0.0, 0.0));
     world.join(BallJoint::new(a, Vec3::new(0.3, 0.0, 0.0), b, Vec3::new(-0.3, 0.0, 0.0)));
     for backend in BOTH {
-        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
+        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
         assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);
         simulation.world.joints[0].collide = true;
         assert_eq!(simulation.step(DT).expect("a step").manifolds, 1);
@@ -333,7 +347,7 @@ fn whether_jointed_bodies_collide_may_change() {
 
 #[test]
 fn a_changed_joint_wakes_what_it_held() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
     let mut simulation = simulation(&standing(), &config, cpu);
     run(&mut simulation, 240);
     let rod = 18;
@@ -346,7 +360,8 @@ fn a_changed_joint_wakes_what_it_held() {
 
 #[test]
 fn masses_and_materials_may_change() {
-    let mut simulation = simulation(&standing(), &SolverConfig { sleep_after: 0.3, ..SolverConfig::default() }, cpu);
+    let mut simulation =
+        simulation(&standing(), &SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() }, cpu);
     run(&mut simulation, 240);
     let (slope, block) = (16, 17);
     assert!(simulation.is_asleep(block));
@@ -390,7 +405,7 @@ fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
         ("body 3 \"\" changed", |w| w.bodies.swap(3, 4)),
     ];
     for (start, change) in cases {
-        let mut simulation = simulation(&standing(), &SolverConfig::default(), cpu);
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
         run(&mut simulation, 10);
         let good = simulation.world.clone();
         change(&mut simulation.world);
@@ -407,7 +422,7 @@ fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
 #[test]
 fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
     for backend in BOTH {
-        let mut simulation = simulation(&standing(), &SolverConfig::default(), backend);
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), backend);
         run(&mut simulation, 5);
         let before = simulation.world.clone();
         for dt in [0.0, -DT, f32::NAN, f32::INFINITY, 1e9, 1.1, 1e-30, f32::MIN_POSITIVE] {
@@ -416,7 +431,7 @@ fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
             assert!(simulation.next_problem(dt).is_err());
             assert_eq!(Difference::between(&before, &simulation.world), Difference::default(), "{dt}");
         }
-        for dt in [drystone::simulation::SHORTEST_STEP, 1e-6, DT, drystone::simulation::LONGEST_STEP] {
+        for dt in [drystone::config::SHORTEST_STEP, 1e-6, DT, drystone::config::LONGEST_STEP] {
             let stats = simulation.step(dt).expect("a length");
             assert_eq!(stats.first_non_finite, None, "{dt} s");
         }
@@ -426,7 +441,8 @@ fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
 /// The plan depends on the length of a step: a substep of less than 1/4100 s does not carry impulses as velocities.
 #[test]
 fn a_plan_belongs_to_a_length_of_step() {
-    let [mut one, mut other] = BOTH.map(|backend| simulation(&standing(), &SolverConfig::default(), backend));
+    let [mut one, mut other] =
+        BOTH.map(|backend| simulation(&standing(), &SolverConfig::default().without_sleep(), backend));
     for (step, dt) in [DT, DT, 1e-4, 1e-4, DT, 1e-3, 1e-3].into_iter().enumerate() {
         one.step(dt).expect("a step");
         let (problem, _) = other.next_problem(dt).expect("a step");
@@ -447,7 +463,7 @@ fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
         ("body 2 \"\": friction", |w| w.bodies[2].material.friction = f32::NAN),
     ];
     for (start, change) in cases {
-        let mut simulation = simulation(&standing(), &SolverConfig::default(), cpu);
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
         run(&mut simulation, 3);
         change(&mut simulation.world);
         let line = simulation.step(DT).expect_err(start).to_string();
@@ -469,7 +485,7 @@ fn no_number_that_a_body_can_have_makes_a_step_panic() {
         ];
         for (k, change) in changes.into_iter().enumerate() {
             for early in [true, false] {
-                let mut simulation = simulation(&standing(), &SolverConfig::default(), cpu);
+                let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
                 run(&mut simulation, if early { 0 } else { 3 });
                 change(&mut simulation.world.bodies[4], bad);
                 let others: Vec<usize> = (6..15).collect();

@@ -441,10 +441,10 @@ fn a_long_build_is_announced() {
     assert!(output.status.success() && !text(&output.stderr).contains("building"));
 }
 
-/// A body so fast that its numbers leave the finite range: said by name, with a code of failure, after the report.
+/// A force that no number can follow: said by name, with a code of failure, after the report.
 #[test]
 fn numbers_that_cannot_be_used_are_an_error() {
-    let fast = GOOD.replace(r#"{"shapes""#, r#"{"name": "comet", "linear_velocity": [3e38, 0, 0], "shapes""#);
+    let fast = GOOD.replace(r#"{"shapes""#, r#"{"name": "comet", "force": [3e38, 0, 0], "mass": 1e-3, "shapes""#);
     let folder = Folder::new().with("fast.json", &fast);
     let output = folder.run(&["run", "fast.json", "--dt", "1", "--steps", "3", "--json"]);
     let report: Value = serde_json::from_str(&text(&output.stdout)).expect("a report all the same");
@@ -548,4 +548,53 @@ fn a_bench_is_printed_in_three_forms_and_marks_what_a_baseline_was_faster_at() {
     let refused = folder.run(&["bench", "tower", "--baseline", "broken.json"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("not what `drystone bench --json` prints"), "{}", text(&refused.stderr));
+}
+
+/// Most threads that a run had at once.
+#[cfg(target_os = "linux")]
+fn most_threads(arguments: &[&str]) -> usize {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+    command.args(arguments).stdout(Stdio::null()).env("DRYSTONE_ADAPTER", "none");
+    let mut run = command.spawn().expect("the command starts");
+    let tasks = format!("/proc/{}/task", run.id());
+    let mut most = 0;
+    while run.try_wait().expect("the command runs").is_none() {
+        most = most.max(std::fs::read_dir(&tasks).map_or(0, Iterator::count));
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    most
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn so_many_threads_work_as_were_asked_for() {
+    for threads in ["1", "3", "6"] {
+        let arguments =
+            ["run", "pile", "-p", "n=200", "--steps", "120", "--backend", "cpu", "--json", "--threads", threads];
+        assert_eq!(most_threads(&arguments).to_string(), threads);
+    }
+}
+
+#[test]
+fn nothing_sleeps_in_a_run_that_is_told_so() {
+    let asleep = |more: &str| {
+        let report = Folder::new().json(&format!("run tower -p n=2 --steps 120 --json{more}"));
+        (report["asleep"].as_u64(), report["manifolds"].as_u64())
+    };
+    assert_eq!(asleep("").0, Some(2));
+    assert_eq!(asleep(" --no-sleep"), (Some(0), Some(2)));
+}
+
+#[test]
+fn a_length_may_be_given_in_any_unit() {
+    let chosen = |length: &str| {
+        let output = Folder::new().run(&["run", "tower", "--steps", "1", "--max-penetration", length]);
+        assert!(output.status.success(), "{length}: {}", text(&output.stderr));
+        text(&output.stderr).lines().find(|l| l.starts_with("substeps")).expect("the choice").to_owned()
+    };
+    let millimeter = chosen("1mm");
+    for same in ["0.1cm", "0.001m", "0.001", "1000um"] {
+        assert_eq!(chosen(same), millimeter, "{same}");
+    }
+    assert_ne!(chosen("0.1mm"), millimeter);
 }

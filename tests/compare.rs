@@ -2,7 +2,7 @@
 
 use drystone::backend::CheckedStep;
 use drystone::compare::{Difference, FirstDifference, Stage, compare, first_difference};
-use drystone::problem::JointImpulseRow;
+use drystone::problem::{JointImpulseRow, JointRow};
 use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// What goes wrong at one pass.
@@ -95,7 +95,11 @@ fn the_pass_that_goes_wrong_is_found_whichever_it_is() {
 #[test]
 fn whatever_a_backend_gives_back_is_compared() {
     let (mut problem, plan) = lying();
+    // A joint that no pass goes over.
+    problem.joints.push(JointRow { body_a: 30, body_b: 31, ..JointRow::default() });
     problem.joint_impulses.push(JointImpulseRow::default());
+    problem.params.joint_count = 1;
+    problem.colors.extend([0, 1]);
     let spoils: [fn(&mut StepProblem); 4] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
         |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),
@@ -142,7 +146,7 @@ impl Backend for Once {
     fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
         let (problem, passes) = step.into_parts();
         if std::mem::take(&mut self.0) {
-            problem.bodies[3].v[0] += 1.0;
+            problem.bodies.last_mut().expect("a box").v[0] += 1.0;
         }
         Reference::<f32>::new().run(problem, passes)
     }
@@ -211,4 +215,23 @@ fn one_bit_of_one_number_makes_a_body_differ() {
     assert_eq!(changed(&|b| b.position.x = b.position.x.next_up()).bodies, 1);
     let lost = changed(&|b| b.linear_velocity.y = f32::NAN);
     assert_eq!((lost.bodies, lost.velocity), (1, f64::INFINITY));
+}
+
+#[test]
+fn each_number_of_a_difference_is_of_its_own_quantity() {
+    let world = pile().world;
+    let changed = |change: &dyn Fn(&mut drystone::Body)| {
+        let mut other = world.clone();
+        change(&mut other.bodies[7]);
+        Difference::between(&world, &other)
+    };
+    let none = Difference { bodies: 1, ..Difference::default() };
+    let position = changed(&|b| b.position.y += 4.0);
+    assert!((position.position - 4.0).abs() < 1e-5, "{position:?}");
+    assert_eq!(position, Difference { position: position.position, ..none });
+    let rotation = changed(&|b| b.rotation.y += 0.5);
+    assert!((rotation.rotation - 0.5).abs() < 1e-6, "{rotation:?}");
+    assert_eq!(rotation, Difference { rotation: rotation.rotation, ..none });
+    assert_eq!(changed(&|b| b.linear_velocity.z = -2.0), Difference { velocity: 2.0, ..none });
+    assert_eq!(changed(&|b| b.angular_velocity.x = 0.25), Difference { angular_velocity: 0.25, ..none });
 }

@@ -1,11 +1,13 @@
 //! The functions that docs/derivation.md names, against finite differences of the constraints and the dense product
 //! G M⁻¹ Gᵀ, in f64 where they are written over a lane.
 
+use drystone::config::FrictionRule;
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::kernels::contact::{current_separation, normal_movement};
+use drystone::kernels::contact::{current_separation, normal_movement, restitute_contact, solve_contact, warm_start};
+use drystone::kernels::friction::{solve_friction, solve_twist};
 use drystone::kernels::joint::joint_column;
-use drystone::kernels::pair::relative_velocity;
-use drystone::kernels::{Body, Contact, Mass, Pair, Point, Rules, Sym3};
+use drystone::kernels::pair::{relative_movement, relative_velocity};
+use drystone::kernels::{Body, Contact, Impulse, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3};
 use drystone::math::{Quat, Vec3 as LaneVec3, vec3};
 use drystone::problem::ContactRow;
 use drystone::problem::effective::{EffectiveMass, InverseMass};
@@ -184,4 +186,297 @@ fn friction_felt_by_the_bodies_is_the_same_row_by_row_and_as_one_vector() {
     let r_b = case.r[1].as_vec3();
     let by_rows: Vec3 = inertia * r_b.cross(t_1) * lambda[0] + inertia * r_b.cross(t_2) * lambda[1];
     assert!(by_rows.distance(inertia * r_b.cross(one_vector)) < 1e-5 * by_rows.length());
+}
+
+/// Friction at one point: a pair that slips, and what a sweep makes of it.
+struct Slipping {
+    case: Case,
+    pair: Pair<f64>,
+    contact: Contact<f64>,
+    point: Point<f64>,
+    params: StepParams<f64>,
+    tangents: [DVec3; 2],
+}
+
+fn slipping() -> Slipping {
+    let case = case();
+    let tangent = case.normal.any_orthonormal_vector();
+    let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
+    (pair.a.v, pair.a.w) = (lane(DVec3::new(1.0, -2.0, 0.5)), lane(DVec3::new(0.3, 0.1, 4.0)));
+    (pair.b.v, pair.b.w) = (lane(DVec3::new(-1.0, 0.2, 0.7)), lane(DVec3::new(2.0, 1.0, -3.0)));
+    let contact = Contact { normal: lane(case.normal), tangent: lane(tangent), friction: 0.5, ..Contact::default() };
+    let (sin, cos) = 0.7_f64.sin_cos();
+    let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
+    let point = Point { r_a, r_b, normal_mass: 0.3, tangent_mass: 0.2, slip_1: cos, slip_2: sin, ..Point::default() };
+    let params = StepParams { relaxation: 1.0, ..StepParams::default() };
+    let tangents = [tangent, case.normal.cross(tangent)];
+    Slipping { case, pair, contact, point, params, tangents }
+}
+
+impl Slipping {
+    /// Velocity of the slip along both tangents.
+    fn slip(&self) -> [f64; 2] {
+        let u = relative_velocity(&self.pair, self.point.r_a, self.point.r_b);
+        self.tangents.map(|t| DVec3::new(u.x, u.y, u.z).dot(t))
+    }
+
+    /// One sweep with normal impulse `pressed` from the impulse `before`; the impulse after it.
+    fn swept(&mut self, rules: Rules, pressed: f64, before: [f64; 2]) -> [f64; 2] {
+        let mut impulse = Impulse { tangent_1: before[0], tangent_2: before[1], ..Impulse::default() };
+        solve_friction(rules, &self.params, &mut self.pair, &self.contact, &self.point, pressed, &mut impulse);
+        [impulse.tangent_1, impulse.tangent_2]
+    }
+}
+
+fn with(friction: FrictionRule) -> Rules {
+    Rules { friction, ..Rules::default() }
+}
+
+fn near(x: [f64; 2], y: [f64; 2]) {
+    assert!((x[0] - y[0]).hypot(x[1] - y[1]) < 1e-14, "{x:?}, not {y:?}");
+}
+
+#[test]
+fn friction_takes_the_step_of_its_mass_against_the_slip_within_what_its_rule_allows() {
+    let before = [0.02, -0.03];
+    let [u_1, u_2] = slipping().slip();
+    let wanted = [before[0] - 0.2 * u_1, before[1] - 0.2 * u_2];
+    let length = wanted[0].hypot(wanted[1]);
+    assert!(length > 0.1 && wanted[0].abs() > 0.03 && wanted[1].abs() > 0.03, "{wanted:?}");
+    for rule in [FrictionRule::Disc, FrictionRule::Box] {
+        near(slipping().swept(with(rule), 100.0, before), wanted);
+    }
+    // mu N is half of N. A disc shortens, a box clamps each direction by itself, no pressure holds nothing.
+    let limit = 0.5 * 0.04;
+    near(slipping().swept(with(FrictionRule::Disc), 0.04, before), wanted.map(|x| x * limit / length));
+    near(slipping().swept(with(FrictionRule::Box), 0.04, before), wanted.map(|x| limit.copysign(x)));
+    near(slipping().swept(with(FrictionRule::Disc), 0.0, before), [0.0; 2]);
+    // Slip has one direction, and the impulse along it.
+    let d = [0.7_f64.cos(), 0.7_f64.sin()];
+    let along = wanted[0] * d[0] + wanted[1] * d[1];
+    near(slipping().swept(with(FrictionRule::Slip), 100.0, before), d.map(|d| along * d));
+    near(slipping().swept(with(FrictionRule::Slip), 0.04, before), d.map(|d| limit.copysign(along) * d));
+}
+
+#[test]
+fn a_belt_is_held_against_as_a_slip_is() {
+    let (mut driven, still) = (slipping(), slipping().slip());
+    (driven.point.slip_1, driven.point.slip_2) = (-still[0], -still[1]);
+    // The bodies move as the belt does: nothing is to be done.
+    near(driven.swept(Rules { driven: true, ..with(FrictionRule::Disc) }, 100.0, [0.0; 2]), [0.0; 2]);
+}
+
+#[test]
+fn friction_changes_the_velocities_by_its_rows() {
+    let mut after = slipping();
+    let (case, before) = (case(), slipping());
+    let impulse = after.swept(with(FrictionRule::Disc), 100.0, [0.0; 2]);
+    // M⁻¹ Gᵀ λ, body by body.
+    let rows = before.tangents.map(|t| case.row(t));
+    let felt = |k: usize| rows[0][k] * impulse[0] + rows[1][k] * impulse[1];
+    let wide = |v: LaneVec3<f64>| DVec3::new(v.x, v.y, v.z);
+    let bodies = [(before.pair.a, after.pair.a), (before.pair.b, after.pair.b)];
+    for (i, (was, is)) in bodies.into_iter().enumerate() {
+        let linear = wide(is.v) - wide(was.v) - felt(2 * i) * case.inverse_mass[i];
+        let angular = wide(is.w) - wide(was.w) - case.inverse_inertia[i] * felt(2 * i + 1);
+        assert!(linear.length() < 1e-14 && angular.length() < 1e-13, "body {i}: {linear} {angular}");
+    }
+    assert!(after.case.normal.dot(felt(0)).abs() < 1e-14, "friction does not push along the normal");
+}
+
+#[test]
+fn relaxation_scales_the_step_of_friction_and_of_twist() {
+    let whole = slipping().swept(with(FrictionRule::Disc), 100.0, [0.0; 2]);
+    let mut half = slipping();
+    half.params.relaxation = 0.5;
+    near(half.swept(with(FrictionRule::Disc), 100.0, [0.0; 2]), whole.map(|x| 0.5 * x));
+    let twisted = |relaxation: f64| {
+        let mut s = slipping();
+        s.params.relaxation = relaxation;
+        let mut impulse = Impulse::default();
+        solve_twist(&s.params, &mut s.pair, &s.contact, &s.point, 100.0, &mut impulse);
+        impulse.normal
+    };
+    assert!(twisted(1.0).abs() > 0.1 && (twisted(0.5) - 0.5 * twisted(1.0)).abs() < 1e-15);
+}
+
+#[test]
+fn twist_takes_the_spin_about_the_normal_within_mu_times_the_lever() {
+    let spin = |s: &Slipping| {
+        let w = s.pair.b.w - s.pair.a.w;
+        DVec3::new(w.x, w.y, w.z).dot(s.case.normal)
+    };
+    let twisted = |lever: f64| {
+        let mut s = slipping();
+        s.point.normal_mass =
+            1.0 / s.case.inverse_inertia.iter().map(|i| s.case.normal.dot(*i * s.case.normal)).sum::<f64>();
+        let before = spin(&s);
+        let mut impulse = Impulse::default();
+        solve_twist(&s.params, &mut s.pair, &s.contact, &s.point, lever, &mut impulse);
+        (before, spin(&s), impulse.normal, s.point.normal_mass)
+    };
+    let (before, after, impulse, mass) = twisted(100.0);
+    assert!(before.abs() > 1.0 && after.abs() < 1e-14 && (impulse + mass * before).abs() < 1e-14, "{before} {after}");
+    let (before, after, impulse, mass) = twisted(0.1);
+    let limited = -(0.05_f64).copysign(before);
+    assert!((impulse - limited).abs() < 1e-15 && (after - before - limited / mass).abs() < 1e-14, "{impulse}");
+}
+
+#[test]
+fn friction_that_changes_a_velocity_by_more_than_the_tolerance_is_noted() {
+    let change = slipping().swept(with(FrictionRule::Disc), 100.0, [0.0; 2]);
+    let largest = change[0].abs().max(change[1].abs()) / 0.2;
+    for (tolerance, noted) in [(0.99 * largest, 1.0), (1.01 * largest, 0.0)] {
+        let mut s = slipping();
+        s.params.tolerance = tolerance;
+        s.swept(Rules { measured: true, ..with(FrictionRule::Disc) }, 100.0, [0.0; 2]);
+        assert_eq!(s.pair.moving, noted, "{largest} m/s, tolerance {tolerance}");
+        // Nothing is noted where nobody asks.
+        let mut s = slipping();
+        s.params.tolerance = tolerance;
+        s.swept(with(FrictionRule::Disc), 100.0, [0.0; 2]);
+        assert_eq!(s.pair.moving, 0.0);
+    }
+}
+
+/// Normal velocity after one sweep of a point at `separation` that approached at 3 m/s, and its impulse, from `before`.
+fn pressed(rules: Rules, params: &StepParams<f64>, separation: f64, before: f64) -> (f64, f64) {
+    let case = case();
+    let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
+    pair.b.v = lane(case.normal * -3.0);
+    let contact = Contact { normal: lane(case.normal), ..Contact::default() };
+    let normal_mass = 1.0 / case.dense(case.normal, case.normal);
+    let point = Point { r_a: lane(case.r[0]), r_b: lane(case.r[1]), separation, normal_mass, ..Point::default() };
+    let mut impulses = [Impulse { normal: before, ..Impulse::default() }];
+    solve_contact(rules, params, &mut pair, &contact, &[point], &mut impulses);
+    let u = relative_velocity(&pair, point.r_a, point.r_b);
+    (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0].normal)
+}
+
+fn hard(bias_rate: f64, push_limit: f64) -> SoftnessOf<f64> {
+    SoftnessOf { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
+}
+
+#[test]
+fn a_sweep_leaves_the_normal_velocity_that_closes_a_gap_or_pushes_out_overlap() {
+    let params = StepParams {
+        inverse_substep: 100.0,
+        relaxation: 1.0,
+        slop: 0.004,
+        movable: hard(50.0, 0.4),
+        ..StepParams::default()
+    };
+    let (biased, relax) = (Rules { biased: true, ..Rules::default() }, Rules::default());
+    for (rules, separation, expected) in [
+        // A gap may be closed within the substep, 0.01 s.
+        (biased, 0.02, -2.0),
+        (relax, 0.02, -2.0),
+        // Overlap goes at its rate, but for the slop, and no faster than the limit.
+        (biased, -0.01, 50.0 * 0.006),
+        (biased, -0.003, 0.0),
+        (biased, -0.1, 0.4),
+        (relax, -0.01, 0.0),
+    ] {
+        let (u, impulse) = pressed(rules, &params, separation, 0.0);
+        assert!((u - expected).abs() < 1e-13 && impulse > 0.0, "{rules:?}, {separation} m: {u}, not {expected} m/s");
+    }
+    // What has a larger gap than it closes is not touched, and no contact pulls.
+    assert_eq!(pressed(biased, &params, 0.04, 0.0).1, 0.0);
+    let half = StepParams { relaxation: 0.5, ..params };
+    assert!((pressed(relax, &half, -0.01, 0.0).0 + 1.5).abs() < 1e-13, "half of the correction");
+}
+
+/// u + bias_rate s + r / (mass ...) = 0: the share of the mass that acts, and the impulse that is given back.
+#[test]
+fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
+    let softness = SoftnessOf { bias_rate: 50.0, mass_scale: 0.75, impulse_scale: 0.25, push_limit: 10.0 };
+    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, movable: softness, ..StepParams::default() };
+    let case = case();
+    let mass = 1.0 / case.dense(case.normal, case.normal);
+    let (u, impulse) = pressed(Rules { biased: true, ..Rules::default() }, &params, -0.01, 0.2);
+    let change = -0.75 * mass * (-3.0 - 0.5) - 0.25 * 0.2;
+    assert!((impulse - 0.2 - change).abs() < 1e-14 && (u - (change / mass - 3.0)).abs() < 1e-13, "{u} {impulse}");
+    // The impulse of a sweep may shrink the sum, down to nothing and no further; or each counts by itself.
+    let pushed = |accumulated| {
+        let mut rules = Rules { accumulated, ..Rules::default() };
+        rules.biased = false;
+        let parting = StepParams { movable: hard(0.0, 0.0), ..params };
+        let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
+        pair.b.v = lane(case.normal);
+        let contact = Contact { normal: lane(case.normal), ..Contact::default() };
+        let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
+        let point = Point { r_a, r_b, separation: -0.01, normal_mass: mass, ..Point::default() };
+        let mut impulses = [Impulse { normal: 0.1, peak: 0.3, ..Impulse::default() }];
+        solve_contact(rules, &parting, &mut pair, &contact, &[point], &mut impulses);
+        assert_eq!(impulses[0].peak, 0.3, "the largest so far stays");
+        impulses[0].normal
+    };
+    assert!(mass > 0.11, "{mass}");
+    assert_eq!((pushed(true), pushed(false)), (0.0, 0.1));
+}
+
+#[test]
+fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_contact_stopped() {
+    let case = case();
+    let mass = 1.0 / case.dense(case.normal, case.normal);
+    let params = StepParams { restitution_threshold: 1.0, ..StepParams::default() };
+    let bounced = |approach_velocity: f64, peak: f64| {
+        let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
+        let contact = Contact { normal: lane(case.normal), restitution: 0.5, ..Contact::default() };
+        let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
+        let point = Point { r_a, r_b, normal_mass: mass, approach_velocity, ..Point::default() };
+        let mut impulses = [Impulse { normal: 0.1, peak, ..Impulse::default() }];
+        restitute_contact(Rules::default(), &params, &mut pair, &contact, &[point], &mut impulses);
+        let u = relative_velocity(&pair, r_a, r_b);
+        (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0])
+    };
+    let (u, impulse) = bounced(-3.0, 0.2);
+    assert!((u - 1.5).abs() < 1e-13 && (impulse.normal - 0.1 - 1.5 * mass).abs() < 1e-14, "{u} m/s");
+    assert_eq!(impulse.peak, impulse.normal.max(0.2));
+    // Too slow, and what no contact stopped.
+    assert_eq!(bounced(-0.99, 0.2).0, 0.0);
+    assert_eq!(bounced(-3.0, 0.0).0, 0.0);
+}
+
+/// M⁻¹ Gᵀ λ of the impulses that are carried over: of each point, or of the points and their patch.
+#[test]
+fn a_warm_start_is_the_impulses_times_their_rows() {
+    let s = slipping();
+    let (case, [t_1, t_2]) = (case(), s.tangents);
+    let impulse = Impulse { normal: 0.3, tangent_1: 0.2, tangent_2: -0.1, peak: 0.0 };
+    let patch_impulse = Impulse { normal: -0.4, tangent_1: 0.05, tangent_2: 0.15, peak: 0.0 };
+    let friction = |i: Impulse<f64>| t_1 * i.tangent_1 + t_2 * i.tangent_2;
+    for patch in [false, true] {
+        let mut pair = s.pair;
+        let (rules, points, impulses) =
+            (Rules { patch, ..with(FrictionRule::Disc) }, [s.point; 2], [impulse, patch_impulse]);
+        warm_start(
+            rules,
+            &mut pair,
+            &s.contact,
+            &points[..1 + usize::from(patch)],
+            &impulses[..1 + usize::from(patch)],
+        );
+        let linear = case.normal * impulse.normal + friction(if patch { patch_impulse } else { impulse });
+        let twist = if patch { case.normal * patch_impulse.normal } else { DVec3::ZERO };
+        for (i, (was, is, sign)) in [(s.pair.a, pair.a, -1.0), (s.pair.b, pair.b, 1.0)].into_iter().enumerate() {
+            let wide = |v: LaneVec3<f64>| DVec3::new(v.x, v.y, v.z);
+            let moved = wide(is.v) - wide(was.v) - sign * linear * case.inverse_mass[i];
+            let spun = wide(is.w) - wide(was.w) - sign * (case.inverse_inertia[i] * (case.r[i].cross(linear) + twist));
+            assert!(moved.length() < 1e-14 && spun.length() < 1e-13, "patch {patch}, body {i}: {moved} {spun}");
+        }
+    }
+}
+
+#[test]
+fn anchors_move_as_far_as_their_bodies_moved_and_turned() {
+    let case = case();
+    let (dp, turn) = (DVec3::new(0.1, -0.2, 0.3), DVec3::new(0.4, 0.7, -0.2));
+    for (moved, sign) in [(0, -1.0), (1, 1.0)] {
+        let pair = case.pair(moved, dp, turn);
+        let way = relative_movement(&pair, lane(case.r[0]), lane(case.r[1]));
+        let arm = case.r[moved];
+        let expected = (dp + DQuat::from_scaled_axis(turn) * arm - arm) * sign;
+        assert!(DVec3::new(way.x, way.y, way.z).distance(expected) < 1e-14, "body {moved}");
+    }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules of each floor, the ground floor first.
 const FLOORS: [&[&str]; 10] = [
-    &["math", "random", "error", "files", "stats"],
+    &["math", "random", "error", "files", "memory", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],

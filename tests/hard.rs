@@ -54,8 +54,14 @@ fn no_number_passes_no_limit() {
 }
 
 #[test]
-fn an_unknown_case_lists_the_known_ones() {
+fn an_unknown_case_is_answered_with_the_nearest_one_and_where_all_are() {
     let message = Case::find("H13").err().expect("no such case").to_string();
-    assert!(message.contains("H13") && message.contains("H12") && !message.contains('\n'), "{message}");
+    assert!(
+        message.contains("H13")
+            && message.contains("did you mean \"H1")
+            && message.contains("hard --list")
+            && !message.contains('\n'),
+        "{message}"
+    );
     assert_eq!(Case::find("h3").expect("a case").name, "H3");
 }

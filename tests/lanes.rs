@@ -28,6 +28,29 @@ fn each() -> impl Iterator<Item = impl Fn() -> Box<dyn Backend> + Sync> {
     (0..Cpu::each().count()).map(|i| move || Box::new(Cpu::each().nth(i).expect("counted")) as Box<_>)
 }
 
+/// What of the sets that lanes are written for this processor has: they are all that the tests below can try.
+#[test]
+fn the_sets_that_are_tried_are_those_that_the_processor_has() {
+    let tried: Vec<String> = each().map(|backend| backend().adapter()).collect();
+    println!("tried: {}", tried.join("; "));
+    let has = |set: &str| tried.iter().any(|adapter| adapter.contains(set));
+    assert!(has("portable"), "{tried:?}");
+    #[cfg(target_arch = "x86_64")]
+    {
+        let known = [
+            ("AVX2", std::arch::is_x86_feature_detected!("avx2")),
+            ("AVX-512", std::arch::is_x86_feature_detected!("avx512f")),
+        ];
+        for (set, expected) in known {
+            assert_eq!(has(set), expected, "{set}: {tried:?}");
+            if !expected {
+                eprintln!("not tried: {set}, which this processor lacks");
+            }
+        }
+        assert!(best().adapter().contains(tried.last().expect("one at least")), "{}", best().adapter());
+    }
+}
+
 #[track_caller]
 fn same_bits(comparison: &Comparison) {
     assert!(comparison.first.is_none(), "{:?}", comparison.first);

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use common::gpu;
 use drystone::glam::{Quat, Vec3};
-use drystone::maze::{BOARDS, Game, Map, Outcome, Played, RADIUS, Script, pilot, play};
+use drystone::maze::{BOARD, BOARDS, CELL, Game, Map, Outcome, Played, RADIUS, Script, TILT_LIMIT, pilot, play};
 use drystone::{Backend, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
 use serde_json::Value;
 
@@ -23,6 +23,8 @@ tests! {
         the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes,
         the_command_prints_outcome_and_track,
         the_pilot_writes_a_script_that_wins,
+        the_board_tilts_no_further_than_its_limit_and_no_faster_than_its_rate,
+        a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before,
         bad_maps_and_scripts_are_refused_in_one_line_with_line_and_column,
     }
 }
@@ -117,6 +119,37 @@ fn the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_
     let (box_hop, box_slip) = roll_over(boxes);
     assert!(mesh_hop < plane_hop + 2e-6 && mesh_slip < plane_slip + 1e-4, "{mesh_hop} m, {mesh_slip} m/s on triangles");
     assert!(box_hop > 1e-5 && box_slip > 1e-3, "{box_hop} m, {box_slip} m/s on boxes; {plane_slip} m/s on a plane");
+}
+
+fn the_board_tilts_no_further_than_its_limit_and_no_faster_than_its_rate() {
+    let mut game = game(Map::find("easy").expect("a board"), reference());
+    for step in 1..=24 {
+        game.step([90.0, -90.0]).expect("a step");
+        assert_eq!(game.outcome, None);
+        // 60 degrees a second.
+        let expected = (60.0 * step as f32 * game.dt()).min(TILT_LIMIT);
+        let [right, front] = game.tilt;
+        assert!((right - expected).abs() < 1e-4 && (front + expected).abs() < 1e-4, "step {step}: {:?}", game.tilt);
+    }
+    assert_eq!(game.tilt, [TILT_LIMIT, -TILT_LIMIT]);
+    let up = game.world().bodies[BOARD].rotation * Vec3::Y;
+    let expected = TILT_LIMIT.to_radians().cos().powi(2);
+    assert!((up.y - expected).abs() < 1e-4, "the board is tilted both ways: {up}");
+}
+
+fn a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before() {
+    let (mut game, script) = (game(Map::find("easy").expect("a board"), reference()), script("easy"));
+    let (row, column) = game.map.goal;
+    let middle = |at: usize, count: usize| CELL * (at as f32 + 0.5 - 0.5 * count as f32);
+    let (x, z) = (middle(column, game.map.columns), middle(row, game.map.rows));
+    let far = |game: &Game| (game.ball().x - x).hypot(game.ball().z - z);
+    let mut before = f32::INFINITY;
+    while game.outcome.is_none() {
+        before = far(&game);
+        game.step(script.at(game.time())).expect("a step");
+    }
+    assert_eq!(game.outcome, Some(Outcome::Goal));
+    assert!(before >= 0.4 * CELL && far(&game) < 0.4 * CELL, "{before} m, then {} m", far(&game));
 }
 
 /// What the command prints, or the one line that refuses it.

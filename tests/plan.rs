@@ -155,3 +155,104 @@ fn a_pile_needs_no_more_colors_than_there_are() {
         assert_eq!(simulation.step(scene.dt).expect("a step").overflow, 0);
     }
 }
+
+/// Contacts have the last word: what a joint pushes into the ground is pushed out of it again.
+#[test]
+fn joints_are_swept_before_contacts() {
+    let mut world = row(&cube(), 0.5, 0.0);
+    world.join(drystone::BallJoint::new(1, Vec3::X, 2, -Vec3::X));
+    let config = SolverConfig { substeps: 1, iterations: 2, relax: 1, ..SolverConfig::default() };
+    let (plan, ..) = planned(world, config);
+    let expected = "\
+integrate_velocities
+warm_start_joints over colors 2
+warm_start(disc friction) over colors 0
+solve_joints(biased) over colors 2
+solve_contacts(biased) over colors 0
+solve_joints(biased) over colors 2
+solve_contacts(biased) over colors 0
+integrate_positions
+solve_joints() over colors 2
+solve_contacts(disc friction) over colors 0
+";
+    assert_eq!(plan.to_string(), expected);
+}
+
+/// The first sweep of the contacts that is not biased, as the plan prints it.
+fn relax_sweep(config: SolverConfig) -> String {
+    let (plan, ..) = planned(row(&cube(), 0.5, 0.0), config);
+    let text = plan.to_string();
+    let line = text.lines().find(|l| l.starts_with("solve_contacts") && !l.contains("biased"));
+    line.unwrap_or_else(|| panic!("{text}")).to_owned()
+}
+
+#[test]
+fn every_setting_of_a_sweep_is_in_the_plan() {
+    use drystone::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, Stabilization};
+    let default = SolverConfig::default;
+    assert_eq!(relax_sweep(default()), "solve_contacts(disc friction) over colors 0");
+    for (config, expected) in [
+        (SolverConfig { manifold_passes: 2, ..default() }, "disc friction, repeated"),
+        (SolverConfig { friction_order: FrictionOrder::FrictionFirst, ..default() }, "disc friction, first"),
+        (SolverConfig { friction_at: FrictionAt::Manifold, ..default() }, "disc friction, per manifold"),
+        (SolverConfig { tolerance: 1e-3, ..default() }, "disc friction, measured"),
+        (SolverConfig { friction: FrictionRule::Slip, ..default() }, "slip friction"),
+        (SolverConfig { friction: FrictionRule::Box, ..default() }, "box friction"),
+    ] {
+        assert_eq!(relax_sweep(config), format!("solve_contacts({expected}) over colors 0"));
+    }
+    // Impulses that begin at zero are cleared, not carried over.
+    let config = SolverConfig {
+        clamping: Clamping::PerCorrection,
+        stabilization: Stabilization::Baumgarte,
+        relax: 0,
+        substeps: 2,
+        ..default()
+    };
+    let (plan, ..) = planned(row(&cube(), 0.5, 0.0), config);
+    let substep = "\
+integrate_velocities
+clear_impulses
+solve_contacts(biased, disc friction, clamped per correction) over colors 0
+integrate_positions
+";
+    assert_eq!(plan.to_string(), substep.repeat(2));
+}
+
+#[test]
+fn momentum_begins_with_the_third_sweep_and_ends_before_the_last_is_measured() {
+    use drystone::config::Method;
+    let of = |iterations| {
+        let config =
+            SolverConfig { substeps: 1, iterations, relax: 0, method: Method::Accelerated, ..SolverConfig::default() };
+        planned(row(&cube(), 0.5, 0.0), config).0.to_string()
+    };
+    let sweep = "solve_contacts(biased, disc friction) over colors 0\n";
+    let around = |sweeps: &str| {
+        format!("integrate_velocities\nwarm_start(disc friction) over colors 0\n{sweeps}integrate_positions\n")
+    };
+    let twice = sweep.replace("colors 0", "colors 0, 0");
+    assert_eq!(of(2), around(&twice));
+    let measured = format!("extrapolate\n{sweep}measure_step\nupdate_momentum\n");
+    assert_eq!(of(3), around(&[&measured.repeat(2), "extrapolate\n", sweep].concat()));
+}
+
+/// Sizes of the rows [bytes]: a body 64, a mass 48, a contact 64, a point 48, an impulse 16. A contact reads two bodies and their
+/// masses and writes their velocities, half of a body.
+#[test]
+fn bytes_moved_are_those_of_the_rows_that_a_pass_names() {
+    let contact = 64 + 2 * (64 + 48 + 32);
+    // Eight cubes of four points: an impulse is read, or read and written; friction goes over the points again.
+    for (name, expected) in [
+        ("warm_start(disc friction)", 8 * (contact + 4 * (48 + 16))),
+        ("solve_contacts(biased)", 8 * (contact + 4 * (48 + 2 * 16))),
+        ("solve_contacts(disc friction)", 8 * (contact + 2 * 4 * (48 + 2 * 16))),
+        ("integrate_positions", 9 * (64 + 32)),
+    ] {
+        let mut simulation = planned(row(&cube(), 0.5, 0.0), SolverConfig::default().without_sleep()).2;
+        let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
+        let pass =
+            plan.passes.iter().find(|p| p.kernel.to_string() == name).unwrap_or_else(|| panic!("{name}: {plan}"));
+        assert_eq!(pass.bytes_moved(&problem), expected, "{name}");
+    }
+}

@@ -7,10 +7,12 @@ mod common;
 use common::gpu;
 use drystone::backend::CheckedStep;
 use drystone::compare::Difference;
+use drystone::config::{FrictionAt, FrictionRule};
+use drystone::glam::{Quat, Vec3};
 use drystone::problem::carry::Carry;
 use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
-use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem};
+use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
 tests! {
     exact_gpu {
@@ -19,6 +21,9 @@ tests! {
         islands_fall_asleep_and_wake_with_their_impulses,
         a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
         two_rows_in_each_others_places_are_found,
+        a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
+        a_device_carries_no_friction_that_a_surface_lost,
+        a_device_takes_the_points_that_are_sent,
     }
     any_gpu {
         the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart,
@@ -252,4 +257,62 @@ fn a_falling_pile_sends_what_was_computed_and_where_the_rest_was() {
         steps += usize::from(stats.computed > 0 && stats.computed < stats.pairs);
     }
     assert!(steps > 10, "in {steps} steps only some were computed");
+}
+
+/// Steps of the reference and of a device that keeps its rows: the same bits in every one of them.
+fn same_on_a_device(world: World, config: &SolverConfig, steps: u32, change: impl Fn(u32, &mut World)) {
+    let backends: [Box<dyn Backend>; 2] = [Box::new(Reference::<f32>::new()), Box::new(gpu::exact())];
+    let mut both =
+        backends.map(|backend| Simulation::new(world.clone(), config.clone(), backend).expect("good settings"));
+    for step in 0..steps {
+        for simulation in &mut both {
+            change(step, &mut simulation.world);
+            simulation.step(1.0 / 60.0).expect("a step");
+        }
+        let apart = Difference::between(&both[0].world, &both[1].world);
+        assert_eq!(apart, Difference::default(), "step {step}");
+    }
+}
+
+/// Cubes that slide down a slope, so that what holds them is carried over to manifolds that are computed anew.
+fn sliding() -> World {
+    let mut world = World::new();
+    world.gravity =
+        Quat::from_rotation_y(0.4) * Quat::from_rotation_z(std::f32::consts::FRAC_PI_6) * Vec3::NEG_Y * 9.81;
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.5));
+    for x in [0.0, 3.0, 6.0] {
+        world.add(
+            Body::dynamic()
+                .shape(Shape::cuboid(0.5, 0.5, 0.5))
+                .friction(0.5)
+                .position(x, 0.5, 0.0)
+                .velocity(Vec3::ZERO, Vec3::Y * x),
+        );
+    }
+    world
+}
+
+fn a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew() {
+    let config = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+    same_on_a_device(sliding(), &config, 40, |_, _| ());
+}
+
+fn a_device_carries_no_friction_that_a_surface_lost() {
+    same_on_a_device(sliding(), &SolverConfig::default().without_sleep(), 40, |step, world| {
+        if step == 20 {
+            // The others keep theirs, so that friction is in the plan.
+            world.bodies[1].material.friction = 0.0;
+            world.bodies[1].position.x += 0.02;
+        }
+    });
+}
+
+/// Where surfaces bounce, or friction has the direction of a slip, points change from step to step, and are sent.
+fn a_device_takes_the_points_that_are_sent() {
+    let mut bouncing = sliding();
+    bouncing.bodies.iter_mut().for_each(|body| body.material.restitution = 0.7);
+    bouncing.bodies[1].position.y += 1.0;
+    same_on_a_device(bouncing, &SolverConfig::default().without_sleep(), 40, |_, _| ());
+    let config = SolverConfig { friction: FrictionRule::Slip, ..SolverConfig::default().without_sleep() };
+    same_on_a_device(sliding(), &config, 40, |_, _| ());
 }

@@ -159,3 +159,51 @@ fn the_units_do_not_matter_to_the_error_to_steer_by() {
     assert!((after.vmax / before.vmax / (length / time) - 1.0).abs() < 1e-12, "{before:?} became {after:?}");
     assert!((after.e_fclib / before.e_fclib - 1.0).abs() > 0.1, "which that with rho = 1 cannot say: {after:?}");
 }
+
+/// Without friction nothing but the sign of its normal impulse is wrong with a contact that pulls.
+#[test]
+fn a_pull_is_outside_of_the_cone_even_without_friction() {
+    let (mut problem, mut impulses) = tower_at_rest();
+    problem.contacts.iter_mut().for_each(|c| c.friction = 0.0);
+    assert_eq!(Residuals::of(&problem, &impulses).cone, 0.0);
+    impulses[5] = DVec3::X * -0.25;
+    assert_eq!(Residuals::of(&problem, &impulses).cone, 0.25);
+}
+
+/// One ball of 2 kg whose middle is pushed at: W = 1/m, so that rho = m. It parts at 3 m/s but for an impulse of 0.5 N s.
+#[test]
+fn what_pushes_while_it_parts_counts_by_its_impulse_or_by_its_velocity_whichever_is_less() {
+    let mut problem = tower(&[2.0]);
+    problem.contacts.truncate(1);
+    problem.contacts[0].r_b = DVec3::ZERO;
+    problem.bodies[0].free = Velocity { linear: DVec3::Z * 3.0, angular: DVec3::ZERO };
+    let parting = 3.0 + 0.5 / 2.0;
+    let of = Residuals::of(&problem, &[DVec3::X * 0.5]);
+    // F/rho with rho = 2 is min(r / rho, u).
+    assert!((of.vmax - 0.25).abs() < 1e-15 && (of.e_vel - 0.25 / 3.0).abs() < 1e-15, "{of:?}");
+    assert!((of.e_fclib - 0.5 / 3.0).abs() < 1e-15 && (of.compl - 0.5 * parting).abs() < 1e-15, "{of:?}");
+    // Pushed by 10 N s it parts at 8 m/s, which is less than 10 and more than 10/2.
+    let of = Residuals::of(&problem, &[DVec3::X * 10.0]);
+    assert!((of.vmax - 5.0).abs() < 1e-14 && (of.e_fclib - 8.0 / 3.0).abs() < 1e-14, "{of:?}");
+}
+
+#[test]
+fn what_presses_while_it_closes_is_not_complementary_either() {
+    let (problem, impulses) = tower_at_rest();
+    let weaker: Vec<_> = impulses.iter().map(|r| *r * 0.5).collect();
+    let of = Residuals::of(&problem, &weaker);
+    assert!(of.compl > 1e-3 && of.pen_rate > 0.05, "it sinks in while it is pressed: {of:?}");
+}
+
+/// Twice the energy of a spin about z is I w², of the free fall m (g h)².
+#[test]
+fn a_spin_that_was_made_up_is_a_drift() {
+    let (problem, impulses) = sliding();
+    let measure = Measure::new(&problem);
+    let right = Operator::new(&problem).velocities(&impulses);
+    assert!(measure.of(&impulses, &right).eom < 1e-14);
+    let spun = [Velocity { angular: right[0].angular + DVec3::Z, ..right[0] }];
+    let whole = 2.0 * (3.0_f64.powi(2) + (GRAVITY * STEP).powi(2));
+    let expected = (2.0 / 6.0 / whole).sqrt();
+    assert!((measure.of(&impulses, &spun).eom - expected).abs() < 1e-14, "{}", measure.of(&impulses, &spun).eom);
+}

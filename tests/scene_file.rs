@@ -130,6 +130,20 @@ fn mass_comes_from_density_from_the_total_or_as_given() {
 }
 
 #[test]
+fn the_principal_frame_is_taken() {
+    let frame = Quat::from_xyzw(0.5, -0.5, 0.5, 0.5);
+    let given = json!({"mass": 2, "principal_inertia": [1, 2, 3], "principal_frame": frame.to_array()});
+    let body = one_body(json!({"mass_properties": given}));
+    assert_eq!(body.mass.principal_frame, frame);
+    // About the world's axes: the first of its own lies along the turned x.
+    let inertia = body.mass.world_inertia(Quat::IDENTITY);
+    for (axis, moment) in [(Vec3::X, 1.0), (Vec3::Y, 2.0), (Vec3::Z, 3.0)] {
+        let axis = frame * axis;
+        assert!((inertia * axis).distance(axis * moment) < 1e-6, "{axis}: {inertia}");
+    }
+}
+
+#[test]
 fn a_compound_has_the_mass_and_center_of_its_parts() {
     let part = |x: f32| json!({"type": "cuboid", "half_extents": [0.5, 0.5, 0.5], "position": [x, 0, 0]});
     let body = one_body(json!({"shapes": [part(0.0), part(1.0), part(2.0)]}));

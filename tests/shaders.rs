@@ -296,6 +296,79 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
     }
 }
 
+/// What a pass writes the next one reads, whichever thread that is. On an adapter whose subgroup is as wide as the workgroup a
+/// missing barrier shows in no result.
+#[test]
+fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
+    let kernels = [Kernel::IntegrateVelocities { carry: false }, Kernel::SolveContacts(Rules::default())];
+    let module = parsed(&Program::Whole(kernels.into(), 16).source());
+    let [entry] = &module.entry_points[..] else { panic!("one entry point") };
+    let mut bodies = Vec::new();
+    for statement in entry.function.body.iter() {
+        loops(statement, &mut bodies);
+    }
+    let [passes] = bodies[..] else { panic!("one loop, over the passes: {}", bodies.len()) };
+    let passes = flat(passes);
+    let switch =
+        passes.iter().position(|s| matches!(s, naga::Statement::Switch { .. })).expect("a choice of the kernel");
+    let after = passes[switch + 1];
+    let waits = |b: &naga::Barrier| b.contains(naga::Barrier::STORAGE);
+    assert!(matches!(after, naga::Statement::ControlBarrier(b) if waits(b)), "after the kernel comes {after:?}");
+    // And no way around it.
+    let leaves = |s: &naga::Statement| matches!(s, naga::Statement::Continue | naga::Statement::Return { .. });
+    assert!(!passes[..switch].iter().any(|s| leaves(s)));
+}
+
+/// Colors of one pass are swept by one workgroup, one after another.
+#[test]
+fn every_color_of_a_pass_ends_with_a_barrier() {
+    let swept = [
+        Kernel::SolveContacts(Rules::default()),
+        Kernel::SolveJoints(Rules::default()),
+        Kernel::WarmStart(Rules::default()),
+        Kernel::WarmStartJoints,
+        Kernel::ApplyRestitution(Rules::default()),
+    ];
+    for kernel in swept {
+        let module = parsed(&source(kernel));
+        let mut bodies = Vec::new();
+        for statement in module.entry_points[0].function.body.iter() {
+            loops(statement, &mut bodies);
+        }
+        // That over the colors is the outer one, and comes first.
+        let colors = bodies.first().unwrap_or_else(|| panic!("{kernel} has a loop over its colors"));
+        let last = flat(colors).pop().expect("a statement");
+        let waits = matches!(last, naga::Statement::ControlBarrier(b) if b.contains(naga::Barrier::STORAGE));
+        assert!(waits, "{kernel}: the last statement of a color is {last:?}");
+    }
+}
+
+/// The statements of a block and of the blocks that stand in it by themselves.
+fn flat(block: &naga::Block) -> Vec<&naga::Statement> {
+    let mut all = Vec::new();
+    for statement in block.iter() {
+        match statement {
+            naga::Statement::Block(inner) => all.extend(flat(inner)),
+            other => all.push(other),
+        }
+    }
+    all
+}
+
+/// The bodies of the loops in a statement, outer ones first.
+fn loops<'a>(statement: &'a naga::Statement, found: &mut Vec<&'a naga::Block>) {
+    let inner: Vec<&naga::Block> = match statement {
+        naga::Statement::Loop { body, .. } => {
+            found.push(body);
+            vec![body]
+        }
+        naga::Statement::Block(block) => vec![block],
+        naga::Statement::If { accept, reject, .. } => vec![accept, reject],
+        _ => Vec::new(),
+    };
+    inner.into_iter().flat_map(|block| block.iter()).for_each(|s| loops(s, found));
+}
+
 #[test]
 fn every_override_is_a_constant_of_its_kernel_and_every_constant_an_override() {
     for kernel in every_kernel() {

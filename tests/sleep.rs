@@ -77,16 +77,17 @@ fn stacks_fall_asleep_and_stay_where_they_are_to_the_last_bit() {
 }
 
 #[test]
-fn nothing_sleeps_unless_asked() {
-    let mut simulation = simulation(stacks(), SolverConfig::default());
-    assert_eq!(run(&mut simulation, 300).asleep, 0);
+fn what_rests_sleeps_unless_told_otherwise() {
+    let asleep = |config: SolverConfig| run(&mut simulation(stacks(), config), 300).asleep;
+    assert_eq!(asleep(SolverConfig::default()), 6);
+    assert_eq!(asleep(SolverConfig::default().without_sleep()), 0);
 }
 
 #[test]
 fn where_nothing_sleeps_sleeping_changes_no_bit() {
     let world = || Scene::find("pile", &["n=100".into()]).expect("the scene").world;
     let mut with = simulation(world(), sleepy());
-    let mut without = simulation(world(), SolverConfig::default());
+    let mut without = simulation(world(), SolverConfig::default().without_sleep());
     for step in 0..60 {
         let stats = with.step(DT).expect("a step");
         without.step(DT).expect("a step");
@@ -227,4 +228,132 @@ fn every_domino_of_a_row_still_falls() {
     let fallen = |s: &Simulation| s.world.bodies.iter().filter(|b| (b.rotation * Vec3::Y).y < 0.7).count();
     assert!(fallen(&without) > 5, "{}", fallen(&without));
     assert_eq!(fallen(&with), fallen(&without));
+}
+
+/// A cube without friction that slides over the floor without gravity, turning about the vertical, and what became of it.
+fn drifting(velocity: Vec3, spin: f32, config: SolverConfig) -> Simulation {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    world.add(floor().friction(0.0));
+    world.add(cube(0.0, 0.5).friction(0.0).velocity(velocity, Vec3::Y * spin));
+    simulation(world, config)
+}
+
+/// Islands are looked for in every eighth step: half a second is 30 steps, the next eighth is 32.
+#[test]
+fn what_is_still_falls_asleep_after_the_time_that_was_set() {
+    for (after, step) in [(0.5, 32), (0.25, 16), (1.0, 64)] {
+        let mut simulation = drifting(Vec3::ZERO, 0.0, SolverConfig { sleep_after: after, ..SolverConfig::default() });
+        assert_eq!(run(&mut simulation, step - 1).asleep, 0, "{after} s");
+        assert_eq!(run(&mut simulation, 1).asleep, 1, "{after} s");
+    }
+}
+
+/// The fastest point counts: a corner of the cube is sqrt(3)/2 m from its middle.
+#[test]
+fn speed_and_spin_just_above_the_limit_keep_awake() {
+    let limit = 0.02;
+    let config = || SolverConfig { sleep_speed: limit, ..sleepy() };
+    for (share, asleep) in [(0.95, 1), (1.05, 0)] {
+        let speed = share * limit;
+        assert_eq!(run(&mut drifting(Vec3::X * speed, 0.0, config()), 64).asleep, asleep, "{speed} m/s");
+        let spin = speed / 0.75_f32.sqrt();
+        assert_eq!(run(&mut drifting(Vec3::ZERO, spin, config()), 64).asleep, asleep, "{spin} rad/s");
+        let both = drifting(Vec3::X * 0.5 * speed, 0.5 * spin, config());
+        assert_eq!(run(&mut { both }, 64).asleep, asleep, "{spin} rad/s and {speed} m/s, half of each");
+    }
+}
+
+#[test]
+fn what_falls_asleep_stands_still() {
+    let mut simulation = drifting(Vec3::X * 5e-3, 5e-3, sleepy());
+    run(&mut simulation, 31);
+    let before = simulation.world.bodies[1].clone();
+    assert!(before.linear_velocity.x > 4e-3 && before.angular_velocity.y > 4e-3 && before.position.x > 2e-3);
+    assert_eq!(run(&mut simulation, 1).asleep, 1);
+    let after = &simulation.world.bodies[1];
+    assert_eq!((after.linear_velocity, after.angular_velocity), (Vec3::ZERO, Vec3::ZERO));
+}
+
+#[test]
+fn what_touches_nothing_never_sleeps() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    let alone = world.add(cube(0.0, 50.0));
+    world.add(floor());
+    let held = world.add(cube(0.0, 0.5));
+    let mut simulation = simulation(world, sleepy());
+    assert_eq!(run(&mut simulation, 120).asleep, 1);
+    assert!(!simulation.is_asleep(alone) && simulation.is_asleep(held));
+}
+
+/// In every single step: what falls asleep there is woken in the next one.
+#[test]
+fn what_a_moving_body_carries_is_never_asleep() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].linear_velocity = Vec3::new(5e-4, 0.0, 0.0);
+    for step in 0..120 {
+        assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
+    }
+}
+
+#[test]
+fn what_was_woken_stays_awake_for_the_time_that_was_set() {
+    let mut simulation = sleeping();
+    simulation.wake(1);
+    for step in 1..=30 {
+        let stats = run(&mut simulation, 1);
+        assert_eq!(stats.asleep, 3, "{step} steps are not half a second");
+    }
+    assert_eq!(run(&mut simulation, 8).asleep, 6);
+}
+
+/// Slow for 0.4 s, fast for one step, slow for 0.4 s: half a second is never in one piece.
+#[test]
+fn what_moves_now_and_then_does_not_sleep() {
+    let mut simulation = drifting(Vec3::ZERO, 0.0, sleepy());
+    for _ in 0..8 {
+        assert_eq!(run(&mut simulation, 24).asleep, 0);
+        simulation.world.bodies[1].linear_velocity.x = 0.1;
+        assert_eq!(run(&mut simulation, 1).asleep, 0);
+        simulation.world.bodies[1].linear_velocity.x = 0.0;
+    }
+}
+
+/// A cube with a ball on an arm of 2 m, which its middle hardly moves with.
+#[test]
+fn a_shape_on_a_long_arm_counts_with_its_arm() {
+    let limit = sleepy().sleep_speed;
+    for (share, asleep) in [(0.9, 1), (1.1, 0)] {
+        let mut world = World::new();
+        world.gravity = Vec3::ZERO;
+        world.add(floor().friction(0.0));
+        let ball = Shape::ball(0.5);
+        let arms = Body::dynamic().shape_at(ball.clone(), Vec3::X * 2.0, Quat::IDENTITY);
+        let arms = arms.shape_at(ball, Vec3::X * -2.0, Quat::IDENTITY).friction(0.0).position(0.0, 0.5, 0.0);
+        world.add(arms.velocity(Vec3::ZERO, Vec3::Y * share * limit / 2.5));
+        assert_eq!(run(&mut simulation(world, sleepy()), 64).asleep, asleep, "{share} of the limit");
+    }
+}
+
+/// A cube that drifts on and one that lies against it: one island.
+#[test]
+fn what_touches_what_moves_does_not_sleep() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    world.add(floor().friction(0.0));
+    world.add(cube(0.0, 0.5).friction(0.0));
+    world.add(cube(1.0, 0.5).friction(0.0).velocity(Vec3::Z * 0.1, Vec3::ZERO));
+    let mut simulation = simulation(world, sleepy());
+    for step in 0..120 {
+        assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
+    }
+}
+
+#[test]
+fn a_body_that_was_put_elsewhere_is_at_rest_again() {
+    let mut simulation = on_a_plate();
+    simulation.world.bodies[0].position.x += 0.01;
+    assert_eq!(run(&mut simulation, 1).asleep, 0);
+    assert_eq!(run(&mut simulation, 120).asleep, 1);
 }

@@ -27,7 +27,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::progress::Progress;
 use crate::backend::BackendChoice;
-use crate::config::{Method, SolverConfig};
+use crate::config::{LONGEST_STEP, Method, SHORTEST_STEP, SolverConfig};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::files;
@@ -35,7 +35,7 @@ use crate::load::Load;
 use crate::memory;
 use crate::preset::Preset;
 use crate::scenes::{CATALOGUE, Scene};
-use crate::simulation::{Simulation, check_step_length};
+use crate::simulation::Simulation;
 use crate::stats::StepStats;
 use crate::suggest::nearest;
 
@@ -231,8 +231,8 @@ impl SceneArgs {
         }
         config.method = self.method.unwrap_or(config.method);
         config.check()?;
-        if let Some(dt) = self.dt {
-            check_step_length(dt).map_err(|e| Error::input(format!("--{e}")))?;
+        if let Some(dt) = self.dt.filter(|dt| !(SHORTEST_STEP..=LONGEST_STEP).contains(dt)) {
+            return Err(Error::input(format!("--dt {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")));
         }
         announce(&self.scene, &self.parameter, worlds);
         let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;

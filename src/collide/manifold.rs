@@ -253,4 +253,39 @@ mod tests {
         let impulses: Vec<f32> = new.points().iter().map(|p| p.normal_impulse).collect();
         assert_eq!(impulses, [3.0, 5.0, 0.0]);
     }
+
+    #[test]
+    fn a_manifold_computed_anew_has_all_that_the_old_one_carried() {
+        let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
+        old.color = Some(5);
+        (old.twist_impulse, old.friction_impulse, old.preload, old.row_before) = (2.0, Vec3::X, 0.25, Some(7));
+        let own = &mut old.points_mut()[0];
+        (own.normal_impulse, own.friction_impulse, own.row_before) = (3.0, Vec3::Z, Some(9));
+        let mut new = Manifold::new(Vec3::Y, (0, 0), &[point(0.001, 0.0, 0.0)]);
+        new.inherit(&old, 0.01);
+        assert_eq!((new.color, new.twist_impulse, new.friction_impulse), (Some(5), 2.0, Vec3::X));
+        assert_eq!((new.preload, new.row_before), (0.25, Some(7)));
+        let own = &new.points()[0];
+        assert_eq!((own.normal_impulse, own.friction_impulse, own.row_before), (3.0, Vec3::Z, Some(9)));
+    }
+
+    #[test]
+    fn points_in_a_line_become_its_ends() {
+        let points = [0.0, 1.0, 2.0, 3.0, 4.0].map(|x| point(x, 0.0, -0.001));
+        let m = Manifold::new(Vec3::Y, (0, 0), &points);
+        let mut ends: Vec<f32> = m.points().iter().map(|p| p.anchor_a.x).collect();
+        ends.sort_by(f32::total_cmp);
+        assert_eq!(ends, [0.0, 4.0]);
+    }
+
+    #[test]
+    fn a_point_that_was_matched_by_its_feature_is_not_matched_again_by_its_place() {
+        let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
+        (old.points_mut()[0].features, old.points_mut()[0].normal_impulse) = (7, 3.0);
+        let mut moved = [point(0.5, 0.0, 0.0), point(0.001, 0.0, 0.0)];
+        moved[0].features = 7;
+        let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);
+        new.inherit(&old, 0.01);
+        assert_eq!(new.points().iter().map(|p| p.normal_impulse).collect::<Vec<_>>(), [3.0, 0.0]);
+    }
 }

@@ -267,3 +267,22 @@ impl Case {
         (self.run)(setup).map_err(|e| e.within(self.name))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two cubes 0.2 m in each other, which are pushed apart by 0.1 m/s at the most: 0.17 m deep after half a second, not at all after five.
+    #[test]
+    fn overlap_is_looked_at_on_the_way() {
+        let mut world = World::new();
+        world.gravity = glam::Vec3::ZERO;
+        for x in [0.0, 0.8] {
+            world.add(crate::Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 0.0, 0.0));
+        }
+        let open = || Ok(Box::new(crate::Cpu::new()) as Box<dyn Backend>);
+        let setup = Setup { config: SolverConfig { push_limit: 0.1, ..SolverConfig::default() }, open: &open };
+        let outcome = setup.outcome(world, 300).expect("a run");
+        assert!(outcome.at_rest < 1e-3 && (0.15..0.2).contains(&outcome.deepest), "{outcome:?}");
+    }
+}

@@ -167,4 +167,26 @@ mod tests {
             assert_eq!(chunked_sum(&numbers), numbers.iter().sum::<f64>());
         }
     }
+
+    #[test]
+    fn a_step_is_held_against_the_shortest_since_the_last_restart() {
+        let mut momentum = Momentum::<f64>::default();
+        momentum.begin();
+        for (square, restarts) in [(1.0, 0), (3.9, 0), (4.1, 1), (16.3, 1), (16.5, 2)] {
+            momentum.update(StepLength { square, along: 1.0 });
+            assert_eq!(momentum.restarts, restarts, "{square}");
+        }
+    }
+
+    #[test]
+    fn a_step_goes_from_where_the_sweep_began_and_along_the_way_from_the_sweep_before() {
+        let step = Step { before: vec3(1.0, 0.0, 0.0), begin: vec3(2.0, 1.0, 0.0) };
+        let length = step_length(vec3(2.0, 3.0, 0.0), &step);
+        assert_eq!(length, StepLength { square: 4.0, along: 6.0 });
+        let back = step_length(vec3(1.5, -1.0, 0.0), &Step { before: vec3(1.5, 2.0, 0.0), ..step });
+        assert_eq!(back, StepLength { square: 4.25, along: 6.0 });
+        // Uphill: it turned round.
+        let turned = step_length(vec3(1.5, 1.0, 0.0), &step);
+        assert_eq!(turned.along, -0.25);
+    }
 }

@@ -69,3 +69,30 @@ pub(super) fn preloaded(by: &Preload, before: f32, both_movable: bool, pressed: 
     // What is borne no more is not held up either.
     smaller(before + by.share * (sag - before), LARGEST_PRELOAD * sag)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BY: Preload = Preload { movable_compliance: 0.5, fixed_compliance: 0.25, share: 0.5, warm_start: 1 };
+
+    fn near(x: f32, y: f32) {
+        assert!((x - y).abs() < 1e-6, "{x}, not {y}");
+    }
+
+    /// An impulse of 8 N s on 2 kg sags by 8 / 2 times the compliance.
+    #[test]
+    fn a_preload_takes_its_share_of_what_is_missing_to_the_overlap_of_what_is_borne() {
+        near(preloaded(&BY, 0.0, true, 8.0, 2.0), 1.0);
+        near(preloaded(&BY, 1.0, true, 8.0, 2.0), 1.5);
+        near(preloaded(&BY, 0.0, false, 8.0, 2.0), 0.5);
+        near(preloaded(&BY, 3.0, true, 8.0, 2.0), 2.5);
+    }
+
+    #[test]
+    fn a_preload_is_at_most_twice_the_overlap_of_what_is_borne() {
+        near(preloaded(&BY, 100.0, true, 8.0, 2.0), 4.0);
+        near(preloaded(&BY, 100.0, false, 8.0, 2.0), 2.0);
+        near(preloaded(&BY, 100.0, true, 0.0, 2.0), 0.0);
+    }
+}

@@ -50,11 +50,20 @@ const SETTINGS: [(u32, u32); 7] = [(8, 1), (4, 2), (2, 4), (1, 8), (32, 1), (4, 
 pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) -> Result<String> {
     let problems = problems(folder)?;
     let mut page = include_str!("convergence_head.md").to_owned();
+    solves(&mut page, &problems, || after_problem(problems.len()))?;
+    page.push_str(include_str!("convergence_tail.md"));
+    runs(&mut page)?;
+    Ok(page)
+}
+
+/// How many sweeps `problems` take to which error, and what momentum and repeated passes gain over them; `after_problem` is called
+/// after each.
+fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: impl FnMut()) -> Result<()> {
     page.push_str(
         "\n| problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |\n|---|--:|---|--:|--:|--:|--:|--:|\n",
     );
     let mut gains = [const { (Vec::new(), Vec::new()) }; KINDS.len()];
-    for problem in &problems {
+    for problem in problems {
         let mut first = None;
         for (kind, (fewer, lower)) in KINDS.iter().zip(&mut gains) {
             let report = solved(problem, *kind, MOST, 1e-4)?;
@@ -68,7 +77,7 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
             let (name, contacts) =
                 if *kind == KINDS[0] { (name.as_str(), contacts.to_string()) } else { ("", String::new()) };
             line(
-                &mut page,
+                page,
                 format_args!(
                     "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
                     kind_name(*kind),
@@ -76,16 +85,14 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
                 ),
             );
         }
-        after_problem(problems.len());
+        after_problem();
     }
     page.push_str("\nMedians over these problems, against plain sweeps with one pass:\n\n");
     page.push_str("| sweeps | times fewer to 1e-3 | times lower after 32 |\n|---|--:|--:|\n");
     for (kind, (fewer, lower)) in KINDS.iter().zip(&gains).skip(1) {
-        line(&mut page, format_args!("| {} | {:.1} | {:.1} |", kind_name(*kind), median(fewer), median(lower)));
+        line(page, format_args!("| {} | {:.1} | {:.1} |", kind_name(*kind), median(fewer), median(lower)));
     }
-    page.push_str(include_str!("convergence_tail.md"));
-    runs(&mut page)?;
-    Ok(page)
+    Ok(())
 }
 
 /// What plain and accelerated sweeps make of whole runs.
@@ -175,4 +182,40 @@ pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
         }
     }
     Ok(problems)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers in a cell of the page's tables that begin with this.
+    fn cells(page: &str, begins: &str) -> Vec<Vec<String>> {
+        let lines = page.lines().filter(|l| l.starts_with(begins));
+        lines.map(|l| l.split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
+    }
+
+    /// A tower of four, of which one problem is made: medians over one are its own.
+    #[test]
+    fn gains_are_plain_over_own() {
+        let scene = Scene::find("tower", &["n=4".into()]).expect("the scene");
+        let mut simulation =
+            Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("a simulation");
+        let problem = simulation.step_with_contacts("tower", scene.dt).expect("a problem").0;
+        let (mut page, mut solved) = (String::new(), 0);
+        solves(&mut page, std::slice::from_ref(&problem), || solved += 1).expect("solves");
+        assert_eq!(solved, 1);
+        // | problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |
+        let first = cells(&page, "| tower | ").remove(0);
+        let number = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{cell} in {page}"));
+        for kind in ["plain, 2 passes", "accelerated, 1 pass", "accelerated, 2 passes"] {
+            let own = cells(&page, &format!("|  |  | {kind} |")).remove(0);
+            let gain = cells(&page, &format!("| {kind} |")).remove(0);
+            let fewer = number(&first[6]) / number(&own[6]);
+            assert!((number(&gain[2]) - fewer).abs() <= 0.051, "{kind}: {fewer} times fewer sweeps to 1e-3, in {page}");
+            // Errors are printed with two digits.
+            let lower = number(&first[8]) / number(&own[8]);
+            assert!((number(&gain[3]) / lower - 1.0).abs() < 0.12, "{kind}: {lower} times lower, in {page}");
+            assert!(fewer > 1.0, "{kind} gains nothing: {page}");
+        }
+    }
 }

@@ -7,8 +7,8 @@ use glam::{Quat, Vec3};
 use super::Scene;
 use super::file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
 use super::joint::joint;
+use crate::config::{LONGEST_STEP, SHORTEST_STEP};
 use crate::error::{Error, Result};
-use crate::simulation::{LONGEST_STEP, SHORTEST_STEP};
 use crate::world::{Body, BodyKind, MOST_GRAVITY, MOST_LENGTH, MOST_SPEED, MassProperties, Shape, World};
 
 /// How far a quaternion or a normal may be from length 1; nearer ones are normalized.

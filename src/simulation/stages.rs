@@ -103,7 +103,7 @@ impl Stages {
             self.detector.pairs_mut().flatten().flat_map(|p| &mut p.manifolds).for_each(|m| m.forget_friction());
         }
         self.prepared.forget_joint_colors();
-        self.sleep.change_settings(world, now);
+        self.sleep.change_settings(world, before, now);
     }
 
     /// Brings impulses, preloads and colors back to the manifolds, so that the next step writes all rows anew.

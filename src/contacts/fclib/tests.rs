@@ -158,6 +158,26 @@ fn angular_parts_in_body_axes_give_the_same_problem() {
     assert!(difference(&other, &read) > 1e-8, "another inertia is seen");
 }
 
+/// Bodies with one contact each, whose arms fit with either sign: on the side that the normal points to, and on the other.
+#[test]
+fn arms_that_fit_either_way_point_out_of_their_bodies() {
+    let mut problem = boxes();
+    let first = problem.contacts[0];
+    let contact = |a, b, r_a: DVec3, r_b: DVec3| PointContact { a, b, r_a, r_b, ..first };
+    let (below, above) = (DVec3::new(0.2, 0.3, -0.4), DVec3::new(-0.1, 0.2, 0.7));
+    problem.contacts = vec![contact(None, Some(0), DVec3::ZERO, below), contact(Some(1), Some(2), above, below)];
+    let read = ContactProblem::from_fclib(bytes(&tree(&problem), "fclib_global")).expect("read");
+    for (c, r) in problem.contacts.iter().zip(&read.contacts) {
+        // The length is that of the file, and the normal of the frame comes out of a and into b.
+        for (was, is, out) in [(c.a.map(|_| c.r_a), r.r_a, 1.0), (c.b.map(|_| c.r_b), r.r_b, -1.0)] {
+            let Some(was) = was else { continue };
+            assert!((is.length() - was.length()).abs() < 1e-13 && out * is.dot(r.frame[0]) > 0.0, "{was} became {is}");
+        }
+    }
+    let worst = difference(&problem, &read);
+    assert!(worst < 1e-13, "{worst} m/s");
+}
+
 #[test]
 fn what_is_written_is_read_back() {
     let problem = boxes();

@@ -96,4 +96,23 @@ mod tests {
             assert!(row.penetration_max < 1e-3 && row.residual.is_some_and(|r| r > 0.0 && r < 0.5), "{row:?}");
         }
     }
+
+    #[test]
+    fn a_time_within_the_spread_of_both_is_neither_slower_nor_faster() {
+        let then = measured();
+        let times = |ms: f64, low: f64, high: f64| {
+            let mut bench = then.clone();
+            bench.rows.iter_mut().for_each(|r| (r.ms, r.ms_low, r.ms_high) = (ms, low, high));
+            bench
+        };
+        let then = times(1.0, 0.8, 1.2);
+        for (now, expected) in [
+            (times(1.5, 1.1, 1.9), Change::Same(1.5)),
+            (times(1.5, 1.3, 1.9), Change::Slower(1.5)),
+            (times(0.5, 0.2, 0.9), Change::Same(0.5)),
+            (times(0.5, 0.2, 0.7), Change::Faster(0.5)),
+        ] {
+            assert!(compare_with(&now, &then).iter().all(|change| *change == expected), "{expected:?}");
+        }
+    }
 }

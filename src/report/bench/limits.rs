@@ -239,4 +239,19 @@ mod tests {
             assert!(row.triads.iter().all(|t| t.1 > 0.0), "{row:?}");
         }
     }
+
+    #[test]
+    fn shares_are_of_what_the_machine_can_do() {
+        let row = LimitRow {
+            threads: 2,
+            manifolds: 1,
+            points: 4,
+            sweeps: 1e6,
+            operations: 300.0,
+            peak: 1.2e9,
+            triads: vec![],
+        };
+        assert_eq!(row.of_peak(), 0.25);
+        assert_eq!(row.of_triad(4e6 * BYTES), 0.25);
+    }
 }

@@ -1,0 +1,116 @@
+//! Every instruction set does to sixteen numbers what Rust does to one, the odd ones included.
+
+use std::ops::Range;
+use std::sync::Mutex;
+
+use super::super::sweep::{InstructionSet, Work};
+use super::{Lanes, Row8, WIDTH, Wide};
+use crate::math::Lane;
+
+/// Zeros of both signs, the smallest and the largest, and what is no number.
+const NUMBERS: [f32; WIDTH] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    f32::MIN_POSITIVE,
+    -f32::MIN_POSITIVE,
+    1e-45,
+    -1e-45,
+    f32::MAX,
+    f32::MIN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+    0.1,
+    -3.7,
+    1e20,
+];
+
+/// What a lane does to two numbers, over any kind of lane.
+fn done<L: Lane>(a: L, b: L) -> [L; 11] {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let chosen = |mask: L::Mask| L::select(zero, one, mask);
+    // Of numbers whose inverse square root is asked for.
+    let positive = L::larger(a * a, L::constant(1e-30));
+    [
+        a + b,
+        a - b,
+        a * b,
+        -a,
+        chosen(a.gt(b)),
+        chosen(L::and(a.gt(b), a.gt(zero))),
+        chosen(L::and(L::mask(true), L::mask(false))),
+        L::larger(a, b),
+        L::smaller(a, b),
+        L::select(a, b, L::mask(true)),
+        L::smaller(positive, L::constant(1e30)).inverse_sqrt(),
+    ]
+}
+
+/// The same over sixteen at a time, and to rows and back.
+struct Sixteen {
+    a: Wide,
+    b: Wide,
+    rows: Vec<Row8>,
+    places: [u32; WIDTH],
+    results: Mutex<(Vec<Wide>, Vec<Row8>)>,
+}
+
+impl Work for Sixteen {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, _: Range<usize>) {
+        let numbers = done(L::load(&self.a), L::load(&self.b));
+        // SAFETY: the places are those of rows.
+        let columns = unsafe { L::gathered(self.rows.as_ptr(), &self.places) };
+        let mut results = self.results.lock().expect("one thread");
+        for number in numbers.into_iter().chain(columns) {
+            results.0.push(number.store());
+        }
+        results.1.extend(L::scattered(columns));
+    }
+}
+
+fn sixteen(a: Wide, b: Wide) -> Sixteen {
+    let rows: Vec<Row8> = (0..40).map(|row| Row8([0, 1, 2, 3, 4, 5, 6, 7].map(|k| (8 * row + k) as f32))).collect();
+    // A row is four times eight bytes.
+    let places = std::array::from_fn(|lane| 4 * ((7 * lane as u32 + 3) % 40));
+    Sixteen { a, b, rows, places, results: Mutex::default() }
+}
+
+fn same(x: f32, y: f32) -> bool {
+    x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan()
+}
+
+#[test]
+fn every_set_compares_and_chooses_as_a_number_does() {
+    for set in InstructionSet::each() {
+        for turn in 0..WIDTH {
+            let b = std::array::from_fn(|lane| NUMBERS[(lane + turn) % WIDTH]);
+            let work = sixteen(Wide(NUMBERS), Wide(b));
+            set.run(&work, 0..1);
+            let results = work.results.into_inner().expect("one thread").0;
+            for lane in 0..WIDTH {
+                let (x, y) = (NUMBERS[lane], b[lane]);
+                for (k, expected) in done(x, y).into_iter().enumerate() {
+                    let found = results[k].0[lane];
+                    assert!(same(found, expected), "{}: {x:e} and {y:e}, {k}: {found:e}, not {expected:e}", set.name());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_set_brings_rows_to_lanes_and_back() {
+    for set in InstructionSet::each() {
+        let work = sixteen(Wide(NUMBERS), Wide(NUMBERS));
+        set.run(&work, 0..1);
+        let (columns, back) = work.results.into_inner().expect("one thread");
+        for (lane, (place, back)) in work.places.iter().zip(&back).enumerate() {
+            let row = work.rows[*place as usize / 4];
+            let found: Vec<f32> = columns[11..].iter().map(|column| column.0[lane]).collect();
+            assert_eq!((&found[..], *back), (&row.0[..], row), "{}, lane {lane}", set.name());
+        }
+    }
+}
