@@ -14,13 +14,13 @@ use crate::world::World;
 pub struct Difference {
     /// Bodies of which any number differs in any bit.
     pub bodies: usize,
-    /// Largest difference of a coordinate of a position [m].
+    /// Largest difference of a coordinate of a position (m).
     pub position: f64,
     /// Largest difference of a component of a rotation.
     pub rotation: f64,
-    /// Largest difference of a component of a velocity [m/s].
+    /// Largest difference of a component of a velocity (m/s).
     pub velocity: f64,
-    /// Largest difference of a component of an angular velocity [rad/s].
+    /// Largest difference of a component of an angular velocity (rad/s).
     pub angular_velocity: f64,
 }
 

@@ -122,11 +122,11 @@ pub struct SolverConfig {
     pub stabilization: Stabilization,
     /// Share of the overlap that Baumgarte stabilization removes in a substep, 0 to 1.
     pub baumgarte: f32,
-    /// Overlap that Baumgarte stabilization leaves alone [m].
+    /// Overlap that Baumgarte stabilization leaves alone (m).
     pub slop: f32,
     /// Every correction is multiplied by this: under-relaxed below 1, over-relaxed up to 2. 1 is safe everywhere.
     pub relaxation: f32,
-    /// Sweeps of a substep end when no correction changes a relative velocity by more than this [m/s]; 0 sweeps on.
+    /// Sweeps of a substep end when no correction changes a relative velocity by more than this (m/s); 0 sweeps on.
     /// `iterations` and `relax` are then the most that are done.
     pub tolerance: f32,
     /// Contact stiffness: frequency of the undamped contact spring times the substep length, so that it is 60 Hz for
@@ -139,11 +139,11 @@ pub struct SolverConfig {
     pub contact_damping: f32,
     /// Frequency of contacts with fixed and kinematic bodies, relative to the others.
     pub fixed_contact_frequency_ratio: f32,
-    /// How fast the overlap of soft contacts at rest is taken out, as a rate [1/s]: a contact that bears a load is preloaded by
+    /// How fast the overlap of soft contacts at rest is taken out, as a rate (1/s): a contact that bears a load is preloaded by
     /// the overlap that the load would make. 0 leaves it there. Measured with 8 substeps, deepest overlap of a wall of 400 bricks:
     /// 2.57 mm without, 0.11 mm with, at the same speed at rest and drift.
     pub preload_rate: f32,
-    /// Fastest that overlap is pushed out [m/s].
+    /// Fastest that overlap is pushed out (m/s).
     pub push_limit: f32,
     /// Friction rule.
     pub friction: FrictionRule,
@@ -159,7 +159,7 @@ pub struct SolverConfig {
     pub joint_damping: f32,
     /// Whether a step starts from the impulses of the step before.
     pub warm_start: bool,
-    /// Approach slower than this does not bounce [m/s].
+    /// Approach slower than this does not bounce (m/s).
     pub restitution_threshold: f32,
     /// Whether free rotation of unequal moments of inertia is integrated (implicit midpoint).
     pub gyroscopic: bool,
@@ -169,10 +169,10 @@ pub struct SolverConfig {
     /// A manifold is reused while its bodies moved relative to each other by less than this, relative to the smallest
     /// half extent of the thinner shape; 0 computes every manifold anew.
     pub recycle_distance: f32,
-    /// Bodies that touch or are joined fall asleep together once all of them were slower than `sleep_speed` for this long [s];
+    /// Bodies that touch or are joined fall asleep together once all of them were slower than `sleep_speed` for this long (s);
     /// 0 lets nothing sleep. Asleep they cost next to nothing and stay to the last bit, until something disturbs them.
     pub sleep_after: f32,
-    /// Speed of the fastest point of a body under which it is slow [m/s]. A pile of 5,000 falls asleep 7 s after it came to rest,
+    /// Speed of the fastest point of a body under which it is slow (m/s). A pile of 5,000 falls asleep 7 s after it came to rest,
     /// with a mean overlap of 0.166 mm where it has 0.161 awake; at 5 mm/s a few that rattle keep it awake.
     pub sleep_speed: f32,
     /// Colors smaller than this are swept one after another in one workgroup instead of one dispatch each.
@@ -185,9 +185,9 @@ pub struct SolverConfig {
 /// Colors smaller than this share a workgroup, unless told otherwise.
 pub const FUSE_BELOW: u32 = 256;
 
-/// Shortest step [s]. Shorter ones move nothing that single precision can tell from rest.
+/// Shortest step (s). Shorter ones move nothing that single precision can tell from rest.
 pub const SHORTEST_STEP: f32 = 1e-9;
-/// Longest step [s].
+/// Longest step (s).
 pub const LONGEST_STEP: f32 = 1.0;
 
 /// Refuses a length of a step that no step can be made of: less than [`SHORTEST_STEP`], more than [`LONGEST_STEP`], or no number.

@@ -21,8 +21,6 @@
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
-// Units stand in brackets, which rustdoc takes for links: [m], [kg].
-#![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod backend;
 pub mod cli;

@@ -25,9 +25,9 @@ pub struct Load {
     pub upper: usize,
     /// The body that bears it.
     pub lower: usize,
-    /// Force between the two [N].
+    /// Force between the two (N).
     pub force: f64,
-    /// Overlap times the square of w [m/s²]: the force on one point over the mass that the point feels.
+    /// Overlap times the square of w (m/s²): the force on one point over the mass that the point feels.
     pub stress: f64,
 }
 
@@ -61,13 +61,13 @@ impl Load {
         heaviest
     }
 
-    /// Overlap with `substeps` in a step of `dt` seconds [m].
+    /// Overlap with `substeps` in a step of `dt` seconds (m).
     pub fn overlap(&self, substeps: u32, dt: f32, config: &SolverConfig) -> f64 {
         let w = TAU * f64::from(config.contact_frequency) * f64::from(substeps) / f64::from(dt);
         self.stress / (w * w)
     }
 
-    /// Fewest substeps of a step of `dt` seconds with which the overlap is at most `most` [m].
+    /// Fewest substeps of a step of `dt` seconds with which the overlap is at most `most` (m).
     ///
     /// # Errors
     /// There are more than the settings take, or contacts are not soft, so that no law says how deep they get.
@@ -101,7 +101,7 @@ fn stress(world: &World, boxes: &[Box3], upper: usize, lower: usize, force: f64,
     force / if one_point { 1.0 } else { 4.0 } * inverse_mass / f64::from(ratio * ratio)
 }
 
-/// 1/m of a point of a body along `normal` [1/kg].
+/// 1/m of a point of a body along `normal` (1/kg).
 fn inverse_mass_at(body: &Body, at: DVec3, normal: DVec3) -> f64 {
     if body.kind != BodyKind::Dynamic {
         return 0.0;

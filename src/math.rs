@@ -339,7 +339,7 @@ pub fn conjugate<L: Lane>(q: Quat<L>) -> Quat<L> {
     Quat { axis: vec3(-q.axis.x, -q.axis.y, -q.axis.z), w: q.w }
 }
 
-/// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
+/// The rotation by the vector r (rad), from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
 /// by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
 #[inline(always)]
 pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {

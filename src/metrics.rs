@@ -8,11 +8,11 @@ use crate::world::{Body, BodyKind, World};
 /// Overlap over all touching pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Penetration {
-    /// Deepest [m].
+    /// Deepest (m).
     pub max: f64,
-    /// Depth that 95 % of the same manifolds do not exceed [m].
+    /// Depth that 95 % of the same manifolds do not exceed (m).
     pub p95: f64,
-    /// Mean over the manifolds whose surfaces are within their margin of each other, of each one's deepest point [m].
+    /// Mean over the manifolds whose surfaces are within their margin of each other, of each one's deepest point (m).
     pub mean: f64,
 }
 
@@ -38,7 +38,7 @@ impl Penetration {
     }
 }
 
-/// Speed of the fastest dynamic body [m/s] and its index; NaN counts as fastest.
+/// Speed of the fastest dynamic body (m/s) and its index; NaN counts as fastest.
 pub fn fastest(world: &World) -> (f64, usize) {
     // Slower than any, so that a body at rest is named where all are.
     let mut best = (-1.0, 0);
@@ -51,13 +51,13 @@ pub fn fastest(world: &World) -> (f64, usize) {
     if best.0 < 0.0 { (0.0, 0) } else { best }
 }
 
-/// Root of the mean square speed, weighted by mass: sqrt(2 E / m) [m/s]. 0 for a world without dynamic bodies.
+/// Root of the mean square speed, weighted by mass: sqrt(2 E / m) (m/s). 0 for a world without dynamic bodies.
 pub fn rms_speed(world: &World) -> f64 {
     let mass: f64 = world.bodies.iter().map(|b| f64::from(b.mass.mass)).sum();
     if mass > 0.0 { (2.0 * world.kinetic_energy() / mass).sqrt() } else { 0.0 }
 }
 
-/// Half of the height of the box along the world's axes around a body as it is [m]; 0 without shapes.
+/// Half of the height of the box along the world's axes around a body as it is (m); 0 without shapes.
 pub fn half_height(body: &Body) -> f64 {
     let bounds = |c: &crate::world::Collider| {
         let (low, high) = c.bounds(body.position, body.rotation);
@@ -73,7 +73,7 @@ pub fn in_place(before: &Body, after: &Body) -> bool {
     moved < half_height(before)
 }
 
-/// Largest horizontal distance of a dynamic body's center of mass from where it was `before` [m].
+/// Largest horizontal distance of a dynamic body's center of mass from where it was `before` (m).
 pub fn drift(before: &World, after: &World) -> f64 {
     let moved = |(was, is): (&Body, &Body)| (is.center_of_mass() - was.center_of_mass()).as_dvec3();
     let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);

@@ -25,9 +25,9 @@ pub struct Promise {
     pub tower: u32,
     /// Density of the top cube of a tower of ten, relative to the others, which stands for 10 s.
     pub heavy_top: f32,
-    /// Deepest overlap at any time of 10 s of a tower of 20 [m].
+    /// Deepest overlap at any time of 10 s of a tower of 20 (m).
     pub deepest: f64,
-    /// The same at the end of them [m].
+    /// The same at the end of them (m).
     pub at_rest: f64,
 }
 

@@ -17,17 +17,17 @@ pub struct Residuals {
     /// The natural map with rho = 1, as published error curves have it: impulses and velocities are added as numbers, so it
     /// depends on units.
     pub e_fclib: f64,
-    /// Largest share of one contact in `e_vel`, |F|/rho [m/s].
+    /// Largest share of one contact in `e_vel`, |F|/rho (m/s).
     pub vmax: f64,
     /// Which contact that is; none without contacts.
     pub worst_contact: Option<usize>,
-    /// Fastest approach of two surfaces that touch [m/s].
+    /// Fastest approach of two surfaces that touch (m/s).
     pub pen_rate: f64,
-    /// Largest |u_n r_n| [J]: contacts that push while they part.
+    /// Largest |u_n r_n| (J): contacts that push while they part.
     pub compl: f64,
-    /// Farthest that an impulse is outside of its cone, |r_t| - mu r_n or -r_n [N s].
+    /// Farthest that an impulse is outside of its cone, |r_t| - mu r_n or -r_n (N s).
     pub cone: f64,
-    /// Largest |u_t · r_t + mu r_n |u_t|| [J]: friction that does not oppose its slip with all it has.
+    /// Largest |u_t · r_t + mu r_n |u_t|| (J): friction that does not oppose its slip with all it has.
     pub diss: f64,
     /// Drift of the velocities that a solver carried along from those of its impulses, over the free velocities, both in the
     /// norm of kinetic energy.
@@ -35,7 +35,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    /// Of `impulses`, one a contact in its coordinates [N s]. To measure many times, keep a [`Measure`].
+    /// Of `impulses`, one a contact in its coordinates (N s). To measure many times, keep a [`Measure`].
     ///
     /// # Panics
     /// There is not one impulse a contact.
@@ -61,9 +61,9 @@ impl Residuals {
 /// A problem with what does not depend on the impulses.
 pub struct Measure<'a> {
     operator: Operator<'a>,
-    /// rho of each contact: 3/trace(W_ii) [kg].
+    /// rho of each contact: 3/trace(W_ii) (kg).
     steps: Vec<f64>,
-    /// Norm of the relative velocities without impulses [m/s].
+    /// Norm of the relative velocities without impulses (m/s).
     free_norm: f64,
 }
 
@@ -79,7 +79,7 @@ impl<'a> Measure<'a> {
         Self { operator, steps, free_norm }
     }
 
-    /// Of `impulses`, one a contact in its coordinates [N s], and the velocities that a solver carried along with them.
+    /// Of `impulses`, one a contact in its coordinates (N s), and the velocities that a solver carried along with them.
     ///
     /// # Panics
     /// There is not one impulse a contact and one velocity a body.

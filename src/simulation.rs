@@ -192,7 +192,7 @@ impl Simulation {
         (&self.world, self.stages.detector.pairs())
     }
 
-    /// Impulse of each joint of the world on its body b, in the last substep, world axes [N s].
+    /// Impulse of each joint of the world on its body b, in the last substep, world axes (N s).
     pub fn joint_impulses(&self) -> &[glam::Vec3] {
         self.stages.prepared.joint_impulses()
     }

@@ -46,9 +46,9 @@ pub struct Sleep {
     asleep: Vec<bool>,
     /// What each body is to the detection; empty likewise.
     activity: Vec<Activity>,
-    /// How long each body has been slow [s].
+    /// How long each body has been slow (s).
     slow_for: Vec<f32>,
-    /// Radius around the origin of each body that holds its shapes [m].
+    /// Radius around the origin of each body that holds its shapes (m).
     reach: Vec<f32>,
     /// Bodies that sleep, and those that cannot be pushed, as they were left.
     known: Vec<Known>,

@@ -43,7 +43,7 @@ fn crossing(bodies: [usize; 2], cpu: [f64; 2], gpu: [f64; 2]) -> Option<usize> {
     (cheaper > 0.0).then(|| (dearer / cheaper).max(0.0).ceil() as usize)
 }
 
-/// Time of a step of a pile, once it has been run [s].
+/// Time of a step of a pile, once it has been run (s).
 fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     let plan = StepPlan::new(&SolverConfig::default(), pile);
     let (mut least, mut carry) = (f64::INFINITY, Carry::default());

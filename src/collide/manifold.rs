@@ -8,23 +8,23 @@ pub const MAX_POINTS: usize = 4;
 /// One contact point, anchored on both bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ManifoldPoint {
-    /// On the surface of a, in a's frame [m].
+    /// On the surface of a, in a's frame (m).
     pub anchor_a: Vec3,
-    /// On the surface of b, in b's frame [m].
+    /// On the surface of b, in b's frame (m).
     pub anchor_b: Vec3,
-    /// From the centre of mass of a to the point midway between the surfaces, world axes [m].
+    /// From the centre of mass of a to the point midway between the surfaces, world axes (m).
     pub r_a: Vec3,
-    /// From the centre of mass of b to that point [m].
+    /// From the centre of mass of b to that point (m).
     pub r_b: Vec3,
-    /// Distance along the normal now, negative when overlapping [m].
+    /// Distance along the normal now, negative when overlapping (m).
     pub separation: f32,
     /// The same when the manifold was computed.
     pub(crate) computed_separation: f32,
     /// parry's features of a and b; 0 if unknown.
     pub features: u64,
-    /// Normal impulse of the last substep [N s].
+    /// Normal impulse of the last substep (N s).
     pub normal_impulse: f32,
-    /// Friction impulse on b of the last substep, world axes [N s].
+    /// Friction impulse on b of the last substep, world axes (N s).
     pub friction_impulse: Vec3,
     /// Its row in the last step, if it had one. Written by `problem`.
     pub(crate) row_before: Option<u32>,
@@ -37,15 +37,15 @@ pub struct Manifold {
     pub normal: Vec3,
     /// Which triangles or cells of a composite shape; (0, 0) for convex shapes.
     pub parts: (u32, u32),
-    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp [m].
+    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp (m).
     pub radius_a: f32,
-    /// Radius of curvature of b's surface where it touches [m].
+    /// Radius of curvature of b's surface where it touches (m).
     pub radius_b: f32,
-    /// Impulse of the twist about the normal, with friction per manifold [N m s].
+    /// Impulse of the twist about the normal, with friction per manifold (N m s).
     pub twist_impulse: f32,
-    /// Friction impulse on b, with friction per manifold, world axes [N s].
+    /// Friction impulse on b, with friction per manifold, world axes (N s).
     pub friction_impulse: Vec3,
-    /// How far the springs of its soft contacts are compressed while the surfaces just touch [m].
+    /// How far the springs of its soft contacts are compressed while the surfaces just touch (m).
     pub preload: f32,
     /// Color in the constraint graph; none until it has been given one.
     pub color: Option<u8>,
@@ -109,7 +109,7 @@ impl Manifold {
     }
 
     /// Takes over color and impulses of the same contact one step earlier: points match by feature and, where that
-    /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` [m].
+    /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` (m).
     pub(super) fn inherit(&mut self, old: &Self, distance: f32) {
         self.color = old.color;
         self.twist_impulse = old.twist_impulse;

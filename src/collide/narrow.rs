@@ -21,11 +21,11 @@ pub(super) struct ColliderInfo {
     pub shape: SharedShape,
     /// Place in the body's frame.
     pub local: Pose,
-    /// Half extents of a cuboid [m].
+    /// Half extents of a cuboid (m).
     pub cuboid: Option<Vec3>,
-    /// Half of the smallest side [m].
+    /// Half of the smallest side (m).
     pub size: f32,
-    /// Radius around the body's origin that holds the collider [m].
+    /// Radius around the body's origin that holds the collider (m).
     pub reach: f32,
     /// Half-spaces have no box to put into the tree.
     pub unbounded: bool,
@@ -63,11 +63,11 @@ pub struct Pair {
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
-    /// Half of the smallest side of the thinner one [m].
+    /// Half of the smallest side of the thinner one (m).
     size: f32,
-    /// Radius around the origin of body b that holds its collider [m].
+    /// Radius around the origin of body b that holds its collider (m).
     reach_b: f32,
-    /// Distance up to which the last computation looked [m].
+    /// Distance up to which the last computation looked (m).
     looked: f32,
     /// Where the bodies were when the manifolds were computed; none if they never were.
     computed_at: Option<[Placed; 2]>,
@@ -84,7 +84,7 @@ pub struct Pair {
 /// How two bodies moved relative to each other since their manifolds were computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Of the centre of b as seen from the centre of a, world axes [m].
+    /// Of the centre of b as seen from the centre of a, world axes (m).
     drift: Vec3,
     turn_a: Quat,
     turn_b: Quat,
@@ -138,7 +138,7 @@ impl Moving {
     }
 }
 
-/// Farthest that something is from the origin and still touches anything [m]: the square is far inside of single precision.
+/// Farthest that something is from the origin and still touches anything (m): the square is far inside of single precision.
 pub(super) const FARTHEST: f32 = 1e15;
 
 /// Settings of the detection, as lengths relative to the thinner shape.
@@ -146,7 +146,7 @@ pub(super) const FARTHEST: f32 = 1e15;
 pub(super) struct Margins {
     pub speculative: f32,
     pub recycle: f32,
-    /// How far gravity moves a body in one step [m].
+    /// How far gravity moves a body in one step (m).
     pub fall: f32,
     pub dt: f32,
     /// Number of this detection, from 1.
@@ -353,7 +353,7 @@ fn candidate(
     })
 }
 
-/// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) [m].
+/// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) (m).
 fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
     match c.shape.as_typed_shape() {
         TypedShape::Ball(ball) => ball.radius,

@@ -11,9 +11,9 @@ pub(super) const EXACT: f32 = 1e-3;
 /// Settings of one search.
 #[derive(Clone, Copy)]
 pub(super) struct Search {
-    /// Distance up to which contacts are sought [m].
+    /// Distance up to which contacts are sought (m).
     pub look: f32,
-    /// Smallest half extent of the thinner shape [m].
+    /// Smallest half extent of the thinner shape (m).
     pub size: f32,
 }
 

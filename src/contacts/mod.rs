@@ -34,9 +34,9 @@ pub struct ContactProblem {
 /// A body that can move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeBody {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Inertia about the center of mass, world axes [kg m²].
+    /// Inertia about the center of mass, world axes (kg m²).
     pub inertia: DMat3,
     /// How it would move at the end of the step without contacts, all forces included.
     pub free: Velocity,
@@ -45,9 +45,9 @@ pub struct FreeBody {
 /// How a body moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Velocity {
-    /// Of the center of mass [m/s].
+    /// Of the center of mass (m/s).
     pub linear: DVec3,
-    /// World axes [rad/s].
+    /// World axes (rad/s).
     pub angular: DVec3,
 }
 
@@ -60,14 +60,14 @@ pub struct PointContact {
     pub b: Option<u32>,
     /// Coulomb coefficient mu.
     pub friction: f64,
-    /// Added to the relative velocity, in the contact's coordinates: restitution, gap over step length [m/s].
+    /// Added to the relative velocity, in the contact's coordinates: restitution, gap over step length (m/s).
     pub offset: DVec3,
     /// The coordinates of the contact: unit normal from a to b, first and second tangent, world axes. Tangents are used
     /// as they are, whether or not they are orthonormal.
     pub frame: [DVec3; 3],
-    /// From the center of mass of a to the point, world axes [m]; of no effect if a is fixed.
+    /// From the center of mass of a to the point, world axes (m); of no effect if a is fixed.
     pub r_a: DVec3,
-    /// From the center of mass of b to the point, world axes [m]; of no effect if b is fixed.
+    /// From the center of mass of b to the point, world axes (m); of no effect if b is fixed.
     pub r_b: DVec3,
 }
 
@@ -77,7 +77,7 @@ impl PointContact {
         DVec3::from_array(self.frame.map(|d| d.dot(x)))
     }
 
-    /// The impulse on b [N s], world axes, that belongs to coordinates `r`.
+    /// The impulse on b (N s), world axes, that belongs to coordinates `r`.
     pub fn impulse(&self, r: DVec3) -> DVec3 {
         self.frame[0] * r.x + self.frame[1] * r.y + self.frame[2] * r.z
     }

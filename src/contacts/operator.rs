@@ -8,7 +8,7 @@ use super::{ContactProblem, Velocity};
 #[derive(Clone, Debug)]
 pub struct Operator<'a> {
     problem: &'a ContactProblem,
-    /// Inverse inertia of each body, world axes [1/(kg m²)].
+    /// Inverse inertia of each body, world axes (1/(kg m²)).
     inverse_inertia: Vec<DMat3>,
 }
 
@@ -23,12 +23,12 @@ impl<'a> Operator<'a> {
         self.problem
     }
 
-    /// Inverse inertia of a body, world axes [1/(kg m²)].
+    /// Inverse inertia of a body, world axes (1/(kg m²)).
     pub fn inverse_inertia(&self, body: usize) -> DMat3 {
         self.inverse_inertia[body]
     }
 
-    /// The velocity of each body under the impulses of all contacts, each in its contact's coordinates [N s].
+    /// The velocity of each body under the impulses of all contacts, each in its contact's coordinates (N s).
     ///
     /// # Panics
     /// There is not one impulse a contact.
@@ -47,7 +47,7 @@ impl<'a> Operator<'a> {
         velocities
     }
 
-    /// The relative velocity u at a contact, offset included, in its coordinates [m/s].
+    /// The relative velocity u at a contact, offset included, in its coordinates (m/s).
     pub fn relative_velocity(&self, contact: usize, velocities: &[Velocity]) -> DVec3 {
         let contact = &self.problem.contacts[contact];
         let at = |body: Option<u32>, arm: DVec3| {
@@ -56,7 +56,7 @@ impl<'a> Operator<'a> {
         contact.coordinates(at(contact.b, contact.r_b) - at(contact.a, contact.r_a)) + contact.offset
     }
 
-    /// The block W_ii of W = J M⁻¹ Jᵀ [1/kg]: how u at a contact answers to the contact's own impulse.
+    /// The block W_ii of W = J M⁻¹ Jᵀ (1/kg): how u at a contact answers to the contact's own impulse.
     pub fn block(&self, contact: usize) -> DMat3 {
         let contact = &self.problem.contacts[contact];
         let mut block = [[0.0; 3]; 3];

@@ -244,7 +244,7 @@ pub(super) fn painleve(setup: &Setup) -> Result<Vec<Check>> {
 
 /// What a free body with moments 1, 2, 3 kg m² and spin (`first`, 10, 0) rad/s does in 20 s.
 pub struct Tumble {
-    /// When its spin about the middle axis changes sign [s].
+    /// When its spin about the middle axis changes sign (s).
     pub flips: Vec<f64>,
     /// Largest relative change of the energy.
     pub energy: f64,
@@ -282,7 +282,7 @@ impl Tumble {
         Ok(tumble)
     }
 
-    /// Mean time between flips [s]; NaN if there were fewer than two.
+    /// Mean time between flips (s); NaN if there were fewer than two.
     pub fn between(&self) -> f64 {
         let [first, .., last] = self.flips[..] else { return f64::NAN };
         (last - first) / (self.flips.len() - 1) as f64
@@ -290,7 +290,7 @@ impl Tumble {
 }
 
 /// Time between two flips of that body, 2 K(k) / rate (Landau and Lifshitz, "Mechanics", section 37), with moments
-/// i < j < l and 2 E j > L²; the first comes after half of it [s].
+/// i < j < l and 2 E j > L²; the first comes after half of it (s).
 pub fn flip_time(first: f64) -> f64 {
     let (i, j, l) = (1.0, 2.0, 3.0);
     let twice_energy = i * first * first + j * 100.0;
@@ -322,7 +322,7 @@ pub(super) fn flip(setup: &Setup) -> Result<Vec<Check>> {
 }
 
 /// SimBenchmark's rolling test: 25 balls on a plate that is pushed at `angle` degrees from x to z. All move along the push with
-/// accelerations known on paper; the error is the mean over 4 s of |dv|² of the plate plus that of the first ball [m²/s²].
+/// accelerations known on paper; the error is the mean over 4 s of |dv|² of the plate plus that of the first ball (m²/s²).
 ///
 /// # Errors
 /// Of the simulation.

@@ -102,7 +102,7 @@ impl Setup<'_> {
     }
 }
 
-/// Length of a step [s].
+/// Length of a step (s).
 const DT: f32 = 1.0 / 60.0;
 
 /// What became of a world.
@@ -110,13 +110,13 @@ const DT: f32 = 1.0 / 60.0;
 struct Outcome {
     /// Dynamic bodies that are not in place.
     fallen: f64,
-    /// Largest horizontal way of a body [m].
+    /// Largest horizontal way of a body (m).
     drift: f64,
-    /// Speed at the end, root mean square [m/s].
+    /// Speed at the end, root mean square (m/s).
     rms: f64,
-    /// Deepest overlap, looked at twice a second [m].
+    /// Deepest overlap, looked at twice a second (m).
     deepest: f64,
-    /// The same at the end [m].
+    /// The same at the end (m).
     at_rest: f64,
 }
 

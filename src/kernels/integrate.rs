@@ -59,7 +59,7 @@ fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, spin: Vec3<L>, next: Vec3<L>
     next - solve_3x3(row_0, row_1, row_2, residual)
 }
 
-/// Square of the angle [rad] up to which two Newton steps leave no more than rounding.
+/// Square of the angle (rad) up to which two Newton steps leave no more than rounding.
 const SLOW: f64 = 0.0625;
 
 /// What `integrate_gyroscopic` adds to the angular velocity `w` of a body whose spin about its principal axes is fast: its

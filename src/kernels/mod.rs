@@ -38,7 +38,7 @@ pub struct Rules {
     /// How often a manifold is swept before the next one, 1 or more.
     pub passes: u8,
     /// Whether surfaces slip by themselves, as a belt does: friction at points is then against `slip_1` and `slip_2`, a
-    /// velocity added to that of the bodies [m/s]. With box or disc friction only.
+    /// velocity added to that of the bodies (m/s). With box or disc friction only.
     pub driven: bool,
     /// Whether corrections are held against the tolerance.
     pub measured: bool,

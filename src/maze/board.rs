@@ -12,13 +12,13 @@ use crate::error::Result;
 use crate::scenes::Scene;
 use crate::world::{Body, Shape, World};
 
-/// Side of a cell [m].
+/// Side of a cell (m).
 pub const CELL: f32 = 0.06;
-/// Radius of the ball [m].
+/// Radius of the ball (m).
 pub const RADIUS: f32 = 0.015;
-/// Radius of a hole [m].
+/// Radius of a hole (m).
 const HOLE: f32 = 0.4 * CELL;
-/// Height of the walls, and depth of the holes [m].
+/// Height of the walls, and depth of the holes (m).
 const HEIGHT: f32 = 0.022;
 const DEPTH: f32 = 0.04;
 /// Corners of a hole, a multiple of four.
@@ -58,7 +58,7 @@ pub fn scene(map: &Map) -> Result<Scene> {
     Ok(Scene { dt: 1.0 / RATE, ..Scene::new(format!("maze {}", map.name), world, 10 * RATE as u32) })
 }
 
-/// Middle of a cell on the floor of the board [m].
+/// Middle of a cell on the floor of the board (m).
 pub fn center_of(map: &Map, (row, column): (usize, usize)) -> Vec3 {
     corner(map, row as f32 + 0.5, column as f32 + 0.5)
 }
@@ -72,7 +72,7 @@ fn corners(map: &Map, row: isize, column: isize) -> [Vec3; 4] {
     [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(r, c)| corner(map, (row + r) as f32, (column + c) as f32))
 }
 
-/// How far the ball is from what it can touch [m]; negative when it overlaps.
+/// How far the ball is from what it can touch (m); negative when it overlaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gap {
     /// From the floor; none over a hole.

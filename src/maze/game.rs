@@ -13,15 +13,15 @@ use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::world::World;
 
-/// How fast the board tilts [degrees/s].
+/// How fast the board tilts (degrees/s).
 const TILT_RATE: f32 = 60.0;
 /// Steps after which a ball on the floor rolls: a tenth of a second.
 const SETTLED: u32 = 12;
-/// The ball is on the floor if it is nearer than this, and off the walls if it is further from them than that [m]. A board that
+/// The ball is on the floor if it is nearer than this, and off the walls if it is further from them than that (m). A board that
 /// turns back throws the ball up by some micrometers.
 const ON_FLOOR: f32 = 2e-6;
 const OFF_WALLS: f32 = 2e-5;
-/// The ball has arrived when its middle is this near to the goal's [m].
+/// The ball has arrived when its middle is this near to the goal's (m).
 const ARRIVED: f32 = 0.4 * CELL;
 
 /// How a game ended.
@@ -37,7 +37,7 @@ pub enum Outcome {
 }
 
 /// Speed of the ball's surface against the floor where they touch, while it rolls: it has touched nothing else for a tenth of
-/// a second, in which friction ends what a wall began [m/s].
+/// a second, in which friction ends what a wall began (m/s).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Slip {
     /// Root of the mean square.
@@ -88,7 +88,7 @@ pub struct Game {
     engine: Box<dyn Engine>,
     /// How it ended, if it did.
     pub outcome: Option<Outcome>,
-    /// Tilts of the board now, to the right and to the front [degrees].
+    /// Tilts of the board now, to the right and to the front (degrees).
     pub tilt: [f32; 2],
     steps: u32,
     dt: f32,
@@ -136,12 +136,12 @@ impl Game {
         self.steps as f32 * self.dt
     }
 
-    /// Length of a step [s].
+    /// Length of a step (s).
     pub fn dt(&self) -> f32 {
         self.dt
     }
 
-    /// Where the ball is, on the board [m].
+    /// Where the ball is, on the board (m).
     pub fn ball(&self) -> Vec3 {
         let bodies = &self.world().bodies;
         bodies[BOARD].rotation.inverse() * bodies[BALL].position
@@ -204,7 +204,7 @@ impl Game {
         Slip { rms: (squares / f64::from(steps.max(1))).sqrt(), max, steps }
     }
 
-    /// Deepest overlap with floor or walls at the end of any step so far [m].
+    /// Deepest overlap with floor or walls at the end of any step so far (m).
     pub fn penetration(&self) -> f32 {
         self.deepest
     }
@@ -215,7 +215,7 @@ impl Game {
 pub struct Sample {
     /// Seconds since the start.
     pub time: f32,
-    /// Place on the board: to the right, up, to the front of its middle [m].
+    /// Place on the board: to the right, up, to the front of its middle (m).
     pub ball: [f32; 3],
 }
 
@@ -228,11 +228,11 @@ pub struct Played {
     pub engine: String,
     /// How it ended.
     pub outcome: Outcome,
-    /// When it ended [s].
+    /// When it ended (s).
     pub time: f32,
     /// Steps until then.
     pub steps: u32,
-    /// Deepest overlap [m].
+    /// Deepest overlap (m).
     pub penetration: f32,
     /// Slip while rolling.
     pub slip: Slip,

@@ -13,12 +13,12 @@ use crate::error::{Error, Result};
 
 /// Steps from one point of the script to the next: 0.05 s.
 const HOLD: u32 = 6;
-/// Pull towards the next cell [1/s²] and damping [1/s]: a little less than critical.
+/// Pull towards the next cell (1/s²) and damping (1/s): a little less than critical.
 const PULL: f32 = 9.0;
 const DAMPING: f32 = 5.0;
-/// Acceleration of a ball that rolls on a slope of 1 [m/s²].
+/// Acceleration of a ball that rolls on a slope of 1 (m/s²).
 const ROLLING: f32 = 9.81 * 5.0 / 7.0;
-/// Longest script [s].
+/// Longest script (s).
 const PATIENCE: f32 = 120.0;
 
 /// Plays `game`, which has not begun, and returns the script that wins it, with 3 s to spare.

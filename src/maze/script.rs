@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use crate::error::{Error, Result};
 
-/// Furthest that the board tilts about either axis [degrees].
+/// Furthest that the board tilts about either axis (degrees).
 pub const TILT_LIMIT: f32 = 8.0;
 
 /// What the board is asked to tilt to, piece by piece on straight lines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Script {
-    /// Time [s], ascending, and the tilts to the right and to the front [degrees].
+    /// Time (s), ascending, and the tilts to the right and to the front (degrees).
     points: Vec<(f32, [f32; 2])>,
 }
 
@@ -66,12 +66,12 @@ impl Script {
         self.points.push((time, tilt));
     }
 
-    /// When it ends [s].
+    /// When it ends (s).
     pub fn end(&self) -> f32 {
         self.points.last().map_or(0.0, |p| p.0)
     }
 
-    /// Tilts to the right and to the front at a time [degrees]: none before the first point, those of the last after it.
+    /// Tilts to the right and to the front at a time (degrees): none before the first point, those of the last after it.
     pub fn at(&self, time: f32) -> [f32; 2] {
         let after = self.points.partition_point(|p| p.0 <= time);
         let earlier = if after == 0 { (0.0, [0.0; 2]) } else { self.points[after - 1] };

@@ -43,9 +43,9 @@ pub struct Origin {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Preload {
-    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move [s].
+    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move (s).
     pub movable_compliance: f32,
-    /// The same of contacts with bodies that cannot [s].
+    /// The same of contacts with bodies that cannot (s).
     pub fixed_compliance: f32,
     /// Share of what is missing that preloads gain in this step.
     pub share: f32,

@@ -94,7 +94,7 @@ pub(super) struct Writer<'a> {
     pub world: &'a World,
     pub detector: &'a Detector,
     pub config: &'a SolverConfig,
-    /// Length of a substep [s].
+    /// Length of a substep (s).
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],

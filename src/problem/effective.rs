@@ -5,7 +5,7 @@ use glam::{Mat3, Vec3};
 use super::layout::{ContactRow, MassRow};
 use crate::math::Lane;
 
-/// Inverse mass [1/kg] and inverse inertia in world axes [1/(kg m²)] of one body.
+/// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseMass {
     /// One over the mass; 0 if nothing moves it.

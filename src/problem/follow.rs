@@ -14,11 +14,11 @@ use crate::world::{BallJoint, BodyKind, World};
 /// What the impulses and preloads of a step are proportional to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StepScale {
-    /// Length of a substep [s]. A contact that bears a force passes on the force times this in a substep.
+    /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.
     substep: f32,
-    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move [s].
+    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move (s).
     movable_compliance: f32,
-    /// The same of contacts with bodies that cannot [s].
+    /// The same of contacts with bodies that cannot (s).
     fixed_compliance: f32,
 }
 

@@ -10,15 +10,15 @@ use glam::Vec3;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct BodyRow {
-    /// Velocity of the centre of mass [m/s].
+    /// Velocity of the centre of mass (m/s).
     pub v: [f32; 3],
     #[doc(hidden)]
     pub pad_v: f32,
-    /// Angular velocity, world axes [rad/s].
+    /// Angular velocity, world axes (rad/s).
     pub w: [f32; 3],
     #[doc(hidden)]
     pub pad_w: f32,
-    /// Movement of the centre of mass since the step began [m].
+    /// Movement of the centre of mass since the step began (m).
     pub dp: [f32; 3],
     #[doc(hidden)]
     pub pad_dp: f32,
@@ -37,11 +37,11 @@ impl BodyRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FreeRow {
-    /// Velocity of the centre of mass [m/s].
+    /// Velocity of the centre of mass (m/s).
     pub v: [f32; 3],
     #[doc(hidden)]
     pub pad_v: f32,
-    /// Angular velocity, world axes [rad/s].
+    /// Angular velocity, world axes (rad/s).
     pub w: [f32; 3],
     #[doc(hidden)]
     pub pad_w: f32,
@@ -51,15 +51,15 @@ pub struct FreeRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MassRow {
-    /// Inverse inertia about the centre of mass, world axes [1/(kg m²)]; xx xy xz.
+    /// Inverse inertia about the centre of mass, world axes (1/(kg m²)); xx xy xz.
     pub inv_inertia_x: [f32; 3],
-    /// Inverse mass [1/kg].
+    /// Inverse mass (1/kg).
     pub inv_mass: f32,
     /// Inverse inertia; yy yz zz.
     pub inv_inertia_yz: [f32; 3],
     #[doc(hidden)]
     pub pad: f32,
-    /// Gravity plus force over mass [m/s²].
+    /// Gravity plus force over mass (m/s²).
     pub acceleration: [f32; 3],
     #[doc(hidden)]
     pub pad_end: f32,
@@ -69,7 +69,7 @@ pub struct MassRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct InertiaRow {
-    /// Principal moments of inertia, by the power of two [kg m²] in the largest: only their ratios matter, and no product
+    /// Principal moments of inertia, by the power of two (kg m²) in the largest: only their ratios matter, and no product
     /// with spins leaves single precision.
     pub principal: [f32; 3],
     /// Whose they are.
@@ -103,11 +103,11 @@ pub struct ContactRow {
     /// How many points it has, 1 to 4. With friction per manifold one more row follows them, the patch: its arms are those
     /// of their middle, its normal mass is that of the twist about the normal, its normal impulse the twist's.
     pub point_count: u32,
-    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp [m]: a round body turns under its contact.
+    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp (m): a round body turns under its contact.
     pub radius_a: f32,
-    /// Radius of curvature of b's surface [m].
+    /// Radius of curvature of b's surface (m).
     pub radius_b: f32,
-    /// How far the springs of a soft contact are compressed while the surfaces just touch: separations are that much less [m].
+    /// How far the springs of a soft contact are compressed while the surfaces just touch: separations are that much less (m).
     pub preload: f32,
     #[doc(hidden)]
     pub pad: f32,
@@ -130,20 +130,20 @@ impl ContactRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRow {
-    /// From the centre of mass of a to the point when the step begins, world axes [m].
+    /// From the centre of mass of a to the point when the step begins, world axes (m).
     pub r_a: [f32; 3],
-    /// Separation when the step begins, negative when overlapping [m].
+    /// Separation when the step begins, negative when overlapping (m).
     pub separation: f32,
-    /// From the centre of mass of b to the point [m].
+    /// From the centre of mass of b to the point (m).
     pub r_b: [f32; 3],
-    /// One over the normal entry of G M⁻¹ Gᵀ [kg].
+    /// One over the normal entry of G M⁻¹ Gᵀ (kg).
     pub normal_mass: f32,
     /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ; with one slip direction, one over the
-    /// entry of that direction [kg].
+    /// entry of that direction (kg).
     pub tangent_mass: f32,
-    /// Normal velocity with which the surfaces meet, negative when approaching [m/s].
+    /// Normal velocity with which the surfaces meet, negative when approaching (m/s).
     pub approach_velocity: f32,
-    /// Component of the slip direction along the first tangent; with friction per manifold, distance from the patch [m].
+    /// Component of the slip direction along the first tangent; with friction per manifold, distance from the patch (m).
     pub slip_1: f32,
     /// Component of the slip direction along the second tangent.
     pub slip_2: f32,
@@ -153,21 +153,21 @@ pub struct PointRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct JointRow {
-    /// From the centre of mass of a to its anchor when the step begins, world axes [m].
+    /// From the centre of mass of a to its anchor when the step begins, world axes (m).
     pub r_a: [f32; 3],
     /// One body.
     pub body_a: u32,
-    /// From the centre of mass of b to its anchor [m].
+    /// From the centre of mass of b to its anchor (m).
     pub r_b: [f32; 3],
     /// The other body.
     pub body_b: u32,
-    /// Anchor of b less anchor of a when the step begins [m].
+    /// Anchor of b less anchor of a when the step begins (m).
     pub gap: [f32; 3],
     #[doc(hidden)]
     pub pad: f32,
 }
 
-/// The impulse of one joint on its body b, accumulated, 16 B [N s].
+/// The impulse of one joint on its body b, accumulated, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct JointImpulseRow {
@@ -199,13 +199,13 @@ pub struct MomentumRow {
     pub t: f32,
     /// How far the next sweep is extrapolated, as a share of the last step; 0 after a restart.
     pub factor: f32,
-    /// Norm of the least change that a sweep made of all impulses since momentum last began, squared [N² s²].
+    /// Norm of the least change that a sweep made of all impulses since momentum last began, squared (N² s²).
     pub square: f32,
     /// How often momentum ended, over the whole step.
     pub restarts: u32,
 }
 
-/// The impulses of one point, accumulated over the substeps' sweeps, 16 B [N s].
+/// The impulses of one point, accumulated over the substeps' sweeps, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ImpulseRow {
@@ -223,13 +223,13 @@ pub struct ImpulseRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Softness {
-    /// Velocity wanted per overlap [1/s].
+    /// Velocity wanted per overlap (1/s).
     pub bias_rate: f32,
     /// Share of the effective mass that acts.
     pub mass_scale: f32,
     /// Share of the accumulated impulse that is given back.
     pub impulse_scale: f32,
-    /// Fastest that overlap is pushed out [m/s].
+    /// Fastest that overlap is pushed out (m/s).
     pub push_limit: f32,
 }
 
@@ -239,7 +239,7 @@ impl Softness {
         Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
     }
 
-    /// Overlap at rest per impulse of a substep, times the effective mass [s]; 0 of a rigid constraint.
+    /// Overlap at rest per impulse of a substep, times the effective mass (s); 0 of a rigid constraint.
     pub fn compliance(&self) -> f32 {
         if self.impulse_scale > 0.0 { self.impulse_scale / (self.mass_scale * self.bias_rate) } else { 0.0 }
     }
@@ -249,11 +249,11 @@ impl Softness {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
-    /// Length of a substep [s].
+    /// Length of a substep (s).
     pub substep: f32,
-    /// One over the length of a substep [1/s].
+    /// One over the length of a substep (1/s).
     pub inverse_substep: f32,
-    /// Approach slower than this does not bounce [m/s].
+    /// Approach slower than this does not bounce (m/s).
     pub restitution_threshold: f32,
     /// Number of rows with unequal moments of inertia.
     pub inertia_count: u32,
@@ -267,11 +267,11 @@ pub struct Params {
     pub body_count: u32,
     /// Number of points, patches included.
     pub point_count: u32,
-    /// Overlap that is left alone [m].
+    /// Overlap that is left alone (m).
     pub slop: f32,
     /// What every correction is multiplied by.
     pub relaxation: f32,
-    /// Corrections that change a relative velocity by less count as none [m/s].
+    /// Corrections that change a relative velocity by less count as none (m/s).
     pub tolerance: f32,
     /// Number of joints.
     pub joint_count: u32,

@@ -33,7 +33,7 @@ pub struct Prepared {
     pub(super) patches: bool,
     /// The detection whose manifolds the rows are of.
     pub(super) seen: u64,
-    /// Separation of each point when its manifold was computed, in the order of the rows [m].
+    /// Separation of each point when its manifold was computed, in the order of the rows (m).
     pub(super) computed: Vec<f32>,
     /// The rows of the step before, where they have to move.
     before: ContactRows,
@@ -96,7 +96,7 @@ impl Prepared {
         }
     }
 
-    /// Impulse of each joint on its body b at the end of the last step, world axes [N s].
+    /// Impulse of each joint on its body b at the end of the last step, world axes (N s).
     pub fn joint_impulses(&self) -> &[Vec3] {
         &self.joint_impulses
     }

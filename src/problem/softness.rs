@@ -14,7 +14,7 @@
 
 use super::layout::Softness;
 
-/// Coefficients of a contact with `frequency` [Hz] and `damping_ratio` over a substep of `h` seconds.
+/// Coefficients of a contact with `frequency` (Hz) and `damping_ratio` over a substep of `h` seconds.
 pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> Softness {
     let omega = 2.0 * std::f32::consts::PI * frequency;
     let a1 = 2.0 * damping_ratio + h * omega;

@@ -39,7 +39,7 @@ impl RulesReport {
     }
 }
 
-/// Length of every step here [s].
+/// Length of every step here (s).
 const DT: f32 = 1.0 / 60.0;
 
 /// Runs everything and makes the page; `after_run` is called as often as [`RUNS`] says.
@@ -73,13 +73,13 @@ fn simulate(world: World, settings_text: &str) -> Result<Simulation> {
 
 /// How a standing scene fared.
 struct Standing {
-    /// Until some body was out of its place, or the run was over [s].
+    /// Until some body was out of its place, or the run was over (s).
     seconds: f64,
-    /// Largest horizontal distance of a body from where it began [m].
+    /// Largest horizontal distance of a body from where it began (m).
     drift: f64,
-    /// Speed at the end [m/s].
+    /// Speed at the end (m/s).
     rms_speed: f64,
-    /// Deepest overlap at the end [m].
+    /// Deepest overlap at the end (m).
     penetration: f64,
 }
 
@@ -183,7 +183,7 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
     Ok(())
 }
 
-/// Fastest that a box which begins 5 cm deep in the floor ever rises [m/s].
+/// Fastest that a box which begins 5 cm deep in the floor ever rises (m/s).
 fn exit_speed(text: &str) -> Result<f64> {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
@@ -247,7 +247,7 @@ fn sliding_distance(rule: &str, degrees: f32) -> Result<f64> {
     Ok(f64::from(p.x.hypot(p.z)))
 }
 
-/// How far a block on a slope of 20 degrees moves in 10 s [m]; the slope is gravity's.
+/// How far a block on a slope of 20 degrees moves in 10 s (m); the slope is gravity's.
 fn creep(rule: &str) -> Result<f64> {
     let mut world = block_on_floor(Vec3::ZERO, 0.0, 0.5);
     world.gravity = Quat::from_rotation_y(0.5) * Quat::from_rotation_z(20_f32.to_radians()) * world.gravity;

@@ -26,21 +26,21 @@ pub struct RunReport {
     pub bodies: usize,
     /// Steps that were run.
     pub steps: u32,
-    /// Length of a step [s].
+    /// Length of a step (s).
     pub dt: f32,
     /// Settings.
     pub config: SolverConfig,
-    /// Wall time of each step [ms].
+    /// Wall time of each step (ms).
     pub step_ms: Vec<f64>,
     /// Steps in which a body was awake; in the others nothing is done.
     pub awake_steps: u32,
-    /// Wall time of these, median and least [ms].
+    /// Wall time of these, median and least (ms).
     pub awake_ms: Option<Spread>,
-    /// Wall time of each stage, median and least over these [ms].
+    /// Wall time of each stage, median and least over these (ms).
     pub stage_ms: Vec<StageRow>,
-    /// Time of each kernel by the clock of the device, if it was asked for, median and least over these [ms].
+    /// Time of each kernel by the clock of the device, if it was asked for, median and least over these (ms).
     pub kernel_ms: Vec<KernelRow>,
-    /// Bytes a second that the device reads and writes when it copies [B/s], if it was asked for times.
+    /// Bytes a second that the device reads and writes when it copies (B/s), if it was asked for times.
     pub copy_bandwidth: Option<f64>,
     /// Manifolds at the end, those that bodies sleep on among them.
     pub manifolds: usize,
@@ -54,7 +54,7 @@ pub struct RunReport {
     pub all_asleep_step: Option<u32>,
     /// Joints.
     pub joints: usize,
-    /// Largest distance between the anchors of a joint at the end [m]; none if the scene has no joints.
+    /// Largest distance between the anchors of a joint at the end (m); none if the scene has no joints.
     pub joint_gap: Option<f64>,
     /// Sweeps that were done in all steps, where the settings have a tolerance; else none.
     pub sweeps: Option<u64>,
@@ -74,21 +74,21 @@ pub struct RunReport {
     pub bytes_up: u64,
     /// Bytes that the last step read back.
     pub bytes_down: u64,
-    /// Deepest overlap at the end [m].
+    /// Deepest overlap at the end (m).
     pub penetration_max: f64,
-    /// Overlap at the end that 95 % of the contacts do not exceed [m].
+    /// Overlap at the end that 95 % of the contacts do not exceed (m).
     pub penetration_p95: f64,
-    /// Mean overlap at the end [m].
+    /// Mean overlap at the end (m).
     pub penetration_mean: f64,
-    /// Speed of the fastest body at the end [m/s].
+    /// Speed of the fastest body at the end (m/s).
     pub speed_max: f64,
     /// Which body that is; none if none moves.
     pub fastest: Option<String>,
-    /// Root mean square speed at the end [m/s].
+    /// Root mean square speed at the end (m/s).
     pub speed_rms: f64,
-    /// Kinetic energy at the end [J].
+    /// Kinetic energy at the end (J).
     pub kinetic_energy: f64,
-    /// Kinetic and potential energy gained since the start [J].
+    /// Kinetic and potential energy gained since the start (J).
     pub energy_gained: f64,
     /// Bodies outside the container at the end; none if the scene has no container.
     pub escaped: Option<usize>,
@@ -123,7 +123,7 @@ pub struct Standing {
     pub in_place: usize,
 }
 
-/// Some times [ms].
+/// Some times (ms).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spread {
     /// The middle one.
@@ -146,7 +146,7 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// Time of one kernel over a run [ms].
+/// Time of one kernel over a run (ms).
 #[derive(Clone, Debug, Serialize)]
 pub struct KernelRow {
     /// Name of the kernel.
@@ -161,7 +161,7 @@ pub struct KernelRow {
     pub share_of_copying: Option<f64>,
 }
 
-/// Time of one stage over a run [ms].
+/// Time of one stage over a run (ms).
 #[derive(Clone, Debug, Serialize)]
 pub struct StageRow {
     /// Name of the stage.

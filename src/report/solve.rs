@@ -54,7 +54,7 @@ pub struct SolveReport {
     pub colors: usize,
     /// Sweeps that were done; they end early where the numbers are not finite.
     pub sweeps: u32,
-    /// Time of the sweeps one by one, without measuring [ms].
+    /// Time of the sweeps one by one, without measuring (ms).
     pub ms: f64,
     /// When the error first fell below 1e-1 to 1e-4.
     pub reached: Vec<Reached>,
@@ -69,7 +69,7 @@ pub struct Reached {
     pub e_vel: f64,
     /// Sweeps until then; none if it did not.
     pub sweeps: Option<u32>,
-    /// Their time [ms].
+    /// Their time (ms).
     pub ms: Option<f64>,
 }
 
@@ -78,7 +78,7 @@ pub struct Reached {
 pub struct CurveRow {
     /// Sweeps.
     pub sweeps: u32,
-    /// Their time [ms].
+    /// Their time (ms).
     pub ms: f64,
     /// What they leave.
     #[serde(flatten)]

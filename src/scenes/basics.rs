@@ -7,7 +7,7 @@ use super::parts::{centered, floor, slope};
 use super::stacks::stack;
 use crate::world::{Body, Shape, World};
 
-/// A ball of radius 0.5 m, its lowest point `height` above a half-space [m].
+/// A ball of radius 0.5 m, its lowest point `height` above a half-space (m).
 pub(super) fn sphere_plane(height: f32) -> Scene {
     let mut world = World::new();
     world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)));
@@ -58,7 +58,7 @@ fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene
     Scene::new(name, world, 120)
 }
 
-/// A ball of radius 0.5 m, thrown with a horizontal `speed` [m/s] from 20 m away, meets the middle of a stack of `n`
+/// A ball of radius 0.5 m, thrown with a horizontal `speed` (m/s) from 20 m away, meets the middle of a stack of `n`
 /// cubes at the height from which it was thrown.
 pub(super) fn throw(n: usize, speed: f32) -> Scene {
     const DISTANCE: f32 = 20.0;

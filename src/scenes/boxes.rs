@@ -54,7 +54,7 @@ fn small_turn(random: &mut SplitMix64) -> Quat {
     Quat::from_xyzw(x, y, z, cosine as f32)
 }
 
-/// Distance of neighbors in a row of a pyramid, middle to middle [m].
+/// Distance of neighbors in a row of a pyramid, middle to middle (m).
 const PYRAMID_PITCH: f64 = 1.1;
 
 /// Rows of boxes, each one shorter than the row below it, 0.1 m between neighbors.

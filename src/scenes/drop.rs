@@ -8,9 +8,9 @@ use super::Scene;
 use crate::error::Result;
 use crate::world::{Body, Shape, World};
 
-/// Distance between neighbors in the row [m].
+/// Distance between neighbors in the row (m).
 const PITCH: f32 = 3.0;
-/// Depth of the mesh and of the height field [m].
+/// Depth of the mesh and of the height field (m).
 const DEPTH: f32 = 6.0;
 /// Cells along each side of the mesh and of the height field.
 const CELLS: u16 = 8;

@@ -8,13 +8,13 @@ use super::Scene;
 use super::parts::centered;
 use crate::world::{Body, Shape, World};
 
-/// Side of a box [m].
+/// Side of a box (m).
 const SIDE: f32 = 0.2;
 /// Share of the drum that the boxes fill.
 const FILL: f32 = 0.2;
 const STAVES: u16 = 12;
 
-/// `n` boxes of 0.2 m in a hollow drum that turns about the horizontal axis z with `speed` [rad/s]: one kinematic body of
+/// `n` boxes of 0.2 m in a hollow drum that turns about the horizontal axis z with `speed` (rad/s): one kinematic body of
 /// twelve staves and two ends, as long inside as its radius, a fifth full.
 pub(super) fn drum(n: usize, speed: f32) -> Scene {
     let mut radius = (n as f32 * SIDE.powi(3) / (FILL * TAU / 2.0)).cbrt().max(5.0 * SIDE);

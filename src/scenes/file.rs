@@ -33,16 +33,16 @@ pub struct SceneFile {
     pub version: u32,
     /// Name of the scene; the file's name without its extension if left out.
     pub name: Option<String>,
-    /// Acceleration of every dynamic body [m/s²], up to 1e9 along each axis.
+    /// Acceleration of every dynamic body (m/s²), up to 1e9 along each axis.
     #[serde(default = "defaults::gravity")]
     pub gravity: [f64; 3],
-    /// Length of a step [s], 1e-9 to 1.
+    /// Length of a step (s), 1e-9 to 1.
     #[serde(default = "defaults::dt")]
     pub dt: f64,
     /// Steps of a run that asks for none.
     #[serde(default = "defaults::steps")]
     pub steps: u32,
-    /// Lower and upper corner of the space that no dynamic body should leave [m].
+    /// Lower and upper corner of the space that no dynamic body should leave (m).
     pub container: Option<[[f64; 3]; 2]>,
     /// The bodies.
     pub bodies: Vec<BodyFile>,
@@ -60,19 +60,19 @@ pub struct BodyFile {
     pub name: Option<String>,
     /// Who decides how it moves.
     pub kind: BodyKind,
-    /// Origin of the body's frame [m].
+    /// Origin of the body's frame (m).
     pub position: [f64; 3],
     /// Rotation of the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
     pub rotation: [f64; 4],
-    /// Velocity of the center of mass [m/s], up to 1e9 along each axis; zero for a fixed body.
+    /// Velocity of the center of mass (m/s), up to 1e9 along each axis; zero for a fixed body.
     pub linear_velocity: [f64; 3],
-    /// Angular velocity in world axes [rad/s], up to 1e9 along each axis; zero for a fixed body.
+    /// Angular velocity in world axes (rad/s), up to 1e9 along each axis; zero for a fixed body.
     pub angular_velocity: [f64; 3],
-    /// Force through the center of mass, besides gravity [N]; zero unless dynamic.
+    /// Force through the center of mass, besides gravity (N); zero unless dynamic.
     pub force: [f64; 3],
-    /// Density of all shapes [kg/m³], more than 0. 1000 for a dynamic body that says nothing about its mass.
+    /// Density of all shapes (kg/m³), more than 0. 1000 for a dynamic body that says nothing about its mass.
     pub density: Option<f64>,
-    /// Total mass [kg], more than 0, instead of the density.
+    /// Total mass (kg), more than 0, instead of the density.
     pub mass: Option<f64>,
     /// Mass, center and inertia, instead of those of the shapes.
     pub mass_properties: Option<MassFile>,
@@ -109,12 +109,12 @@ impl Default for BodyFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Mass properties")]
 pub struct MassFile {
-    /// Mass [kg], more than 0.
+    /// Mass (kg), more than 0.
     pub mass: f64,
-    /// Center of mass [m].
+    /// Center of mass (m).
     #[serde(default)]
     pub center: [f64; 3],
-    /// Moments of inertia about the principal axes through the center of mass [kg m²], more than 0.
+    /// Moments of inertia about the principal axes through the center of mass (kg m²), more than 0.
     pub principal_inertia: [f64; 3],
     /// Rotation from the principal axes to the body's frame: a quaternion x, y, z, w.
     #[serde(default = "defaults::rotation")]
@@ -125,7 +125,7 @@ pub struct MassFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[schemars(title = "Shape", extend("unevaluatedProperties" = false))]
 pub struct ShapeFile {
-    /// Position in the body's frame [m].
+    /// Position in the body's frame (m).
     #[serde(default)]
     pub position: [f64; 3],
     /// Rotation in the body's frame: a quaternion x, y, z, w of length 1 within 0.001.

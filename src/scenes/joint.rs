@@ -19,9 +19,9 @@ pub enum JointFile {
         /// One body, which is tied to the world, or two; at least one of them dynamic.
         #[schemars(length(min = 1, max = 2))]
         bodies: Vec<BodyRef>,
-        /// The point where the bodies are tied as they stand, in the world [m].
+        /// The point where the bodies are tied as they stand, in the world (m).
         anchor: Option<[f64; 3]>,
-        /// The point in the frame of each body [m]; with one body, the second is in the world.
+        /// The point in the frame of each body (m); with one body, the second is in the world.
         anchors: Option<[[f64; 3]; 2]>,
         /// Whether the two bodies still collide with each other.
         #[serde(default)]

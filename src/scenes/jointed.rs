@@ -6,7 +6,7 @@ use super::Scene;
 use super::parts::centered;
 use crate::world::{BallJoint, Body, Shape, World};
 
-/// A ball at the end of `length` [m], lifted by `degrees` from where it would hang. Its radius is a tenth of the length,
+/// A ball at the end of `length` (m), lifted by `degrees` from where it would hang. Its radius is a tenth of the length,
 /// so that its period is 0.2 % longer than that of a point.
 pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     let mut world = World::new();
@@ -49,7 +49,7 @@ pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
 pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     const PITCH: f32 = 0.5;
     const HALF: Vec3 = Vec3::new(0.24, 0.05, 1.0);
-    /// Slope of the planks at the towers [rad].
+    /// Slope of the planks at the towers (rad).
     const STEEPEST: f64 = 0.25;
     let slope = |k: usize| Quat::from_rotation_z((centered(k, planks) * 2.0 * STEEPEST / planks as f64) as f32);
     let step = |k: usize| slope(k) * (PITCH * Vec3::X);

@@ -9,24 +9,24 @@ use super::parts::{centered, floor, unit_box};
 use crate::error::Result;
 use crate::world::{Body, Shape, World};
 
-/// Distance between neighboring stones at the start [m]: of hulls that touch exactly, nothing says which way they touch.
+/// Distance between neighboring stones at the start (m): of hulls that touch exactly, nothing says which way they touch.
 const GAP: f64 = 1e-4;
 /// Friction of stones.
 const STONE: f32 = 0.6;
 
 /// Wedges that make a semicircle about the z axis.
 struct Ring {
-    /// Mean radius [m].
+    /// Mean radius (m).
     radius: f64,
     /// Relative to the mean radius.
     thickness: f64,
-    /// Along z [m].
+    /// Along z (m).
     depth: f32,
     voussoirs: usize,
 }
 
 impl Ring {
-    /// Half of the angle of a wedge [rad].
+    /// Half of the angle of a wedge (rad).
     fn half(&self) -> f64 {
         PI / self.voussoirs as f64 / 2.0
     }
@@ -35,7 +35,7 @@ impl Ring {
         self.radius * (1.0 + self.thickness / 2.0)
     }
 
-    /// Top of the middle wedge over the center, if their number is odd [m].
+    /// Top of the middle wedge over the center, if their number is odd (m).
     fn crown(&self) -> f64 {
         self.outer() * self.half().cos() + GAP / 2.0
     }
@@ -149,7 +149,7 @@ pub(super) fn kapla(storeys: usize) -> Scene {
     Scene::new("kapla", world, 3600).standing()
 }
 
-/// A house of `storeys` of cards, `length` [m] long, 0.8 of it wide and `thickness` [m] thick: pairs that lean at each other by
+/// A house of `storeys` of cards, `length` (m) long, 0.8 of it wide and `thickness` (m) thick: pairs that lean at each other by
 /// `degrees` from the vertical, one pair fewer in each storey, and a plate across the pairs of each storey but the last.
 pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thickness: f64) -> Scene {
     let half_width = 0.4 * length as f32;

@@ -35,11 +35,11 @@ pub struct Scene {
     pub name: String,
     /// The bodies.
     pub world: World,
-    /// Length of a step [s].
+    /// Length of a step (s).
     pub dt: f32,
     /// Steps of a run that asks for none.
     pub steps: u32,
-    /// Lower and upper corner of the space that no dynamic body should leave [m], if the scene has one.
+    /// Lower and upper corner of the space that no dynamic body should leave (m), if the scene has one.
     pub container: Option<(Vec3, Vec3)>,
     /// Whether every dynamic body should still be in place at the end.
     pub stands: bool,

@@ -7,7 +7,7 @@ use super::{Group, Scene};
 use crate::random::SplitMix64;
 use crate::world::World;
 
-/// Adds `n` cubes on top of each other, the k-th one off the axis by `offset(k)` [m].
+/// Adds `n` cubes on top of each other, the k-th one off the axis by `offset(k)` (m).
 pub(super) fn stack(world: &mut World, n: usize, mut offset: impl FnMut(usize) -> Vec3) {
     for k in 0..n {
         let Vec3 { x, z, .. } = offset(k);

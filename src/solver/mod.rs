@@ -136,7 +136,7 @@ impl<'a> Solver<'a> {
         Ok(())
     }
 
-    /// The impulses of the last sweep in the order of the problem, each in its contact's coordinates [N s].
+    /// The impulses of the last sweep in the order of the problem, each in its contact's coordinates (N s).
     pub fn impulses(&self) -> Vec<DVec3> {
         let impulse = |(&point, &hand): (&u32, &f64)| {
             let r = match &self.work {

@@ -11,7 +11,7 @@ use crate::residuals::{Measure, Residuals};
 /// A solved contact problem.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// Impulses of the contacts, each in its coordinates [N s]. Often not the only ones that solve the problem.
+    /// Impulses of the contacts, each in its coordinates (N s). Often not the only ones that solve the problem.
     pub impulses: Vec<DVec3>,
     /// The velocities that they give the bodies.
     pub velocities: Vec<Velocity>,

@@ -4,10 +4,10 @@ use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{Mat4, Quat, Vec2, Vec3};
 
-/// Vertical angle of view [rad].
+/// Vertical angle of view (rad).
 const FIELD: f32 = 0.6;
 
-/// A box along the world's axes: lower and upper corner [m].
+/// A box along the world's axes: lower and upper corner (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Lower corner.
@@ -33,12 +33,12 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Middle [m]; the origin if it holds nothing.
+    /// Middle (m); the origin if it holds nothing.
     pub fn center(&self) -> Vec3 {
         if self.low.is_finite() { 0.5 * (self.low + self.high) } else { Vec3::ZERO }
     }
 
-    /// Radius of the sphere around it [m]; 1 if it holds nothing.
+    /// Radius of the sphere around it (m); 1 if it holds nothing.
     pub fn radius(&self) -> f32 {
         if self.low.is_finite() { (0.5 * (self.high - self.low).length()).max(1e-3) } else { 1.0 }
     }
@@ -53,13 +53,13 @@ impl Bounds {
 /// Looks at a point from a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// The point that it looks at [m].
+    /// The point that it looks at (m).
     pub target: Vec3,
-    /// Distance from there [m].
+    /// Distance from there (m).
     pub distance: f32,
-    /// Turn around the upward axis; 0 looks along -z if up is y [rad].
+    /// Turn around the upward axis; 0 looks along -z if up is y (rad).
     pub yaw: f32,
-    /// Height above the horizon as an angle [rad].
+    /// Height above the horizon as an angle (rad).
     pub pitch: f32,
     /// Unit vector that is up in the picture.
     pub up: Vec3,
@@ -102,12 +102,12 @@ impl Camera {
         [turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z]
     }
 
-    /// Where the eye is [m].
+    /// Where the eye is (m).
     pub fn eye(&self) -> Vec3 {
         self.target + self.distance * self.axes()[2]
     }
 
-    /// From the world to the picture; `reach` is how far around the target things are drawn [m].
+    /// From the world to the picture; `reach` is how far around the target things are drawn (m).
     pub fn projection(&self, aspect: f32, reach: f32) -> Mat4 {
         let far = self.distance + 60.0 * reach;
         let near = (self.distance - reach).max(0.01 * self.distance);

@@ -52,7 +52,7 @@ impl ColorBy {
         matches!(self, Self::Batch | Self::Impulse | Self::Sleeping)
     }
 
-    /// One number for each body: number of the material, number of the batch, speed [m/s], impulse [N s], or 1 if it sleeps and
+    /// One number for each body: number of the material, number of the batch, speed (m/s), impulse (N s), or 1 if it sleeps and
     /// 0 if not; NaN for bodies about which there is nothing to say.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
         let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();

@@ -20,7 +20,7 @@ use crate::world::{BodyKind, World};
 pub struct Frame {
     /// Seconds since the start.
     pub time: f64,
-    /// Position [m] and rotation of each body.
+    /// Position (m) and rotation of each body.
     pub poses: Vec<(Vec3, Quat)>,
     /// What each body is colored by, as [`ColorBy::values`] gives it.
     pub values: Vec<f32>,
@@ -29,9 +29,9 @@ pub struct Frame {
 /// Where a film is seen from.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Turn of the camera around the scene [rad].
+    /// Turn of the camera around the scene (rad).
     pub yaw: f32,
-    /// Its height above the horizon as an angle [rad].
+    /// Its height above the horizon as an angle (rad).
     pub pitch: f32,
 }
 

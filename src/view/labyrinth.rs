@@ -90,7 +90,7 @@ impl Labyrinth {
         Ok(())
     }
 
-    /// Tilts that keys and mouse ask for, to the right and to the front [degrees].
+    /// Tilts that keys and mouse ask for, to the right and to the front (degrees).
     fn wanted(&self) -> [f32; 2] {
         let arrow = |less: usize, more: usize| f32::from(self.held[more]) - f32::from(self.held[less]);
         match self.mouse {

@@ -21,7 +21,7 @@ use crate::world::{BallJoint, BodyKind, World};
 
 /// Steps keep a picture waiting for this long, or for as long as drawing takes if that is longer.
 const PATIENCE: Duration = Duration::from_millis(30);
-/// How fast a body that is pulled closes the gap to the mouse [1/s]: soft, however stiff joints are.
+/// How fast a body that is pulled closes the gap to the mouse (1/s): soft, however stiff joints are.
 const PULL: f32 = 10.0;
 
 /// A scene that runs.
@@ -56,11 +56,11 @@ pub struct Live {
 /// A body that the mouse pulls, by the last joint of the world.
 struct Grabbed {
     body: usize,
-    /// The point that is pulled, in the body's frame [m].
+    /// The point that is pulled, in the body's frame (m).
     anchor: Vec3,
-    /// Distance from the eye at which the mouse moves [m].
+    /// Distance from the eye at which the mouse moves (m).
     distance: f32,
-    /// Where the mouse is [m].
+    /// Where the mouse is (m).
     target: Vec3,
 }
 

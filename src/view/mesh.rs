@@ -26,7 +26,7 @@ pub struct Instance {
     pattern: u32,
 }
 
-/// Position [m] and rotation of each body of a world.
+/// Position (m) and rotation of each body of a world.
 pub type Poses = [(Vec3, Quat)];
 
 /// Poses of the bodies as they are.

@@ -42,7 +42,7 @@ pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     hung.flat_map(rope).collect()
 }
 
-/// Pairs of line ends, `size` long where a length has no other measure [m].
+/// Pairs of line ends, `size` long where a length has no other measure (m).
 pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
     let (world, pairs) = simulation.world_and_pairs();
     let mut ends = Vec::new();

@@ -268,7 +268,7 @@ const VIEW_WGSL: &str = include_str!("../../shaders/view/view.wgsl");
 const MESH_WGSL: &str = include_str!("../../shaders/view/mesh.wgsl");
 const LINE_WGSL: &str = include_str!("../../shaders/view/line.wgsl");
 
-/// Edge of the squares on the ground for a scene of this radius: a power of ten [m].
+/// Edge of the squares on the ground for a scene of this radius: a power of ten (m).
 fn pattern_edge(radius: f32) -> f32 {
     10.0_f32.powf((radius.log10() - 0.5).round())
 }

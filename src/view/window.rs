@@ -26,7 +26,7 @@ use crate::world::World;
 pub struct Pointer {
     /// Place in the picture, -1 to 1 from left to right and from bottom to top.
     pub at: Vec2,
-    /// The eye [m].
+    /// The eye (m).
     pub origin: Vec3,
     /// Unit vector from the eye to what is under the mouse.
     pub direction: Vec3,
@@ -117,7 +117,7 @@ struct Open {
     ui: egui_winit::State,
     ui_renderer: egui_wgpu::Renderer,
     panel: bool,
-    /// How much of the window the panel covers, from the right [pixels].
+    /// How much of the window the panel covers, from the right (pixels).
     panel_width: f32,
     drag: Drag,
     mouse: PhysicalPosition<f64>,

@@ -57,7 +57,7 @@ fn is_rotation(q: Quat) -> bool {
 pub struct Collider {
     /// The shape.
     pub shape: Shape,
-    /// Position in the body's frame [m].
+    /// Position in the body's frame (m).
     pub position: Vec3,
     /// Rotation in the body's frame.
     pub rotation: Quat,
@@ -66,11 +66,11 @@ pub struct Collider {
 /// Mass, centre of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f32,
-    /// Centre of mass in the body's frame [m].
+    /// Centre of mass in the body's frame (m).
     pub center: Vec3,
-    /// Moments of inertia about the principal axes [kg m²].
+    /// Moments of inertia about the principal axes (kg m²).
     pub principal_inertia: Vec3,
     /// Rotation from the principal axes to the body's frame.
     pub principal_frame: Quat,
@@ -81,9 +81,9 @@ impl MassProperties {
     pub const IMMOVABLE: Self =
         Self { mass: 0.0, center: Vec3::ZERO, principal_inertia: Vec3::ZERO, principal_frame: Quat::IDENTITY };
 
-    /// Masses that can be simulated [kg]: squares of impulses and of inverse masses stay numbers in single precision.
+    /// Masses that can be simulated (kg): squares of impulses and of inverse masses stay numbers in single precision.
     pub const MASSES: RangeInclusive<f32> = 1e-15..=1e15;
-    /// Moments of inertia that can be simulated [kg m²].
+    /// Moments of inertia that can be simulated (kg m²).
     pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
     /// Largest ratio of two moments of a body; that of a rod is a sixth of the square of its length over its radius.
     pub const MOST_RATIO: f32 = 1e12;
@@ -117,12 +117,12 @@ impl MassProperties {
         }
     }
 
-    /// Inverse inertia about the centre of mass in world axes, for a body with rotation `rotation` [1/(kg m²)].
+    /// Inverse inertia about the centre of mass in world axes, for a body with rotation `rotation` (1/(kg m²)).
     pub fn world_inverse_inertia(&self, rotation: Quat) -> Mat3 {
         self.world_tensor(rotation, self.principal_inertia.map(|i| if i > 0.0 { 1.0 / i } else { 0.0 }))
     }
 
-    /// Inertia about the centre of mass in world axes [kg m²].
+    /// Inertia about the centre of mass in world axes (kg m²).
     pub fn world_inertia(&self, rotation: Quat) -> Mat3 {
         self.world_tensor(rotation, self.principal_inertia)
     }
@@ -156,15 +156,15 @@ pub struct Body {
     pub name: String,
     /// Who decides how it moves.
     pub kind: BodyKind,
-    /// Origin of the body's frame in the world [m].
+    /// Origin of the body's frame in the world (m).
     pub position: Vec3,
     /// Rotation of the body's frame.
     pub rotation: Quat,
-    /// Velocity of the centre of mass [m/s].
+    /// Velocity of the centre of mass (m/s).
     pub linear_velocity: Vec3,
-    /// Angular velocity in world axes [rad/s].
+    /// Angular velocity in world axes (rad/s).
     pub angular_velocity: Vec3,
-    /// Force through the centre of mass, besides gravity, constant until changed [N].
+    /// Force through the centre of mass, besides gravity, constant until changed (N).
     pub force: Vec3,
     /// Mass, centre of mass and inertia; zero unless dynamic.
     pub mass: MassProperties,
@@ -219,14 +219,14 @@ impl Body {
         self
     }
 
-    /// Mass from density [kg/m³].
+    /// Mass from density (kg/m³).
     pub fn density(mut self, density: f32) -> Self {
         self.density = density;
         self.update_mass();
         self
     }
 
-    /// Total mass [kg]; inertia of the shapes, scaled to it.
+    /// Total mass (kg); inertia of the shapes, scaled to it.
     pub fn total_mass(mut self, mass: f32) -> Self {
         self.density = 1.0;
         self.update_mass();
@@ -240,7 +240,7 @@ impl Body {
         self
     }
 
-    /// Origin of the body's frame [m].
+    /// Origin of the body's frame (m).
     pub fn position(mut self, x: f32, y: f32, z: f32) -> Self {
         self.position = Vec3::new(x, y, z);
         self
@@ -252,7 +252,7 @@ impl Body {
         self
     }
 
-    /// Velocity of the centre of mass [m/s] and angular velocity [rad/s].
+    /// Velocity of the centre of mass (m/s) and angular velocity (rad/s).
     pub fn velocity(mut self, linear: Vec3, angular: Vec3) -> Self {
         self.linear_velocity = linear;
         self.angular_velocity = angular;
@@ -288,12 +288,12 @@ impl Body {
         self.mass = MassProperties::from_parry(&parts.sum(), self.density);
     }
 
-    /// Centre of mass in the world [m].
+    /// Centre of mass in the world (m).
     pub fn center_of_mass(&self) -> Vec3 {
         self.position + self.rotation * self.mass.center
     }
 
-    /// Velocity of the material point at world position `p` [m/s].
+    /// Velocity of the material point at world position `p` (m/s).
     pub fn velocity_at(&self, p: Vec3) -> Vec3 {
         self.linear_velocity + self.angular_velocity.cross(p - self.center_of_mass())
     }
@@ -308,7 +308,7 @@ impl Body {
         self.angular_velocity = turn.normalize().to_scaled_axis() / dt;
     }
 
-    /// Kinetic energy [J], in f64; zero for a body without mass.
+    /// Kinetic energy (J), in f64; zero for a body without mass.
     pub fn kinetic_energy(&self) -> f64 {
         let v = self.linear_velocity.as_dvec3();
         let w = self.principal_spin();
@@ -316,7 +316,7 @@ impl Body {
         0.5 * (f64::from(self.mass.mass) * v.length_squared() + (i * w * w).element_sum())
     }
 
-    /// Angular momentum about the world's origin [kg m²/s], in f64.
+    /// Angular momentum about the world's origin (kg m²/s), in f64.
     pub fn angular_momentum(&self) -> DVec3 {
         let orbital = self.center_of_mass().as_dvec3().cross(self.linear_velocity.as_dvec3());
         let axes = (self.rotation * self.mass.principal_frame).as_dquat();

@@ -9,9 +9,9 @@ pub struct BallJoint {
     pub body_a: usize,
     /// Index of the other; none for the world.
     pub body_b: Option<usize>,
-    /// The point in a's frame [m].
+    /// The point in a's frame (m).
     pub anchor_a: Vec3,
-    /// The point in b's frame, or in the world [m].
+    /// The point in b's frame, or in the world (m).
     pub anchor_b: Vec3,
     /// Whether the two bodies still collide with each other.
     pub collide: bool,

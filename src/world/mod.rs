@@ -17,11 +17,11 @@ use glam::Vec3;
 
 use crate::error::{Error, Result};
 
-/// Largest coordinate and size [m]: its cube is still a number in single precision.
+/// Largest coordinate and size (m): its cube is still a number in single precision.
 pub const MOST_LENGTH: f32 = 1e9;
-/// Fastest that a body may begin with [m/s], [rad/s].
+/// Fastest that a body may begin with (m/s), (rad/s).
 pub const MOST_SPEED: f32 = 1e9;
-/// Largest acceleration of gravity along an axis [m/s²].
+/// Largest acceleration of gravity along an axis (m/s²).
 pub const MOST_GRAVITY: f32 = 1e9;
 
 /// Whether a point has coordinates that are numbers and not too large.
@@ -32,7 +32,7 @@ fn is_place(point: Vec3) -> bool {
 /// A set of rigid bodies under one gravity.
 #[derive(Clone, Debug)]
 pub struct World {
-    /// Acceleration of every dynamic body [m/s²].
+    /// Acceleration of every dynamic body (m/s²).
     pub gravity: Vec3,
     /// The bodies; a body's index here is its name everywhere else.
     pub bodies: Vec<Body>,
@@ -102,14 +102,14 @@ impl World {
         (0..self.begins.len() + 1).map(move |k| begin(k)..end(k))
     }
 
-    /// Where the two anchors of a joint are in the world [m].
+    /// Where the two anchors of a joint are in the world (m).
     pub fn anchors(&self, joint: &BallJoint) -> [Vec3; 2] {
         let on_body = |b: usize, anchor: Vec3| self.bodies[b].position + self.bodies[b].rotation * anchor;
         let on_a = on_body(joint.body_a, joint.anchor_a);
         [on_a, joint.body_b.map_or(joint.anchor_b, |b| on_body(b, joint.anchor_b))]
     }
 
-    /// Largest distance between the two anchors of any joint [m].
+    /// Largest distance between the two anchors of any joint (m).
     pub fn joint_gap(&self) -> f32 {
         self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
     }
@@ -180,24 +180,24 @@ impl World {
         self.bodies.iter().position(|b| !b.is_finite())
     }
 
-    /// Sum of the kinetic energies of the dynamic bodies [J], in f64.
+    /// Sum of the kinetic energies of the dynamic bodies (J), in f64.
     pub fn kinetic_energy(&self) -> f64 {
         self.bodies.iter().map(Body::kinetic_energy).sum()
     }
 
-    /// Sum of the potential energies of the dynamic bodies [J], zero at the origin, in f64.
+    /// Sum of the potential energies of the dynamic bodies (J), zero at the origin, in f64.
     pub fn potential_energy(&self) -> f64 {
         let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
         dynamic.map(|b| -f64::from(b.mass.mass) * self.gravity.as_dvec3().dot(b.center_of_mass().as_dvec3())).sum()
     }
 
-    /// Linear momentum of the dynamic bodies [kg m/s], in f64.
+    /// Linear momentum of the dynamic bodies (kg m/s), in f64.
     pub fn linear_momentum(&self) -> glam::DVec3 {
         let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
         dynamic.map(|b| f64::from(b.mass.mass) * b.linear_velocity.as_dvec3()).sum()
     }
 
-    /// Angular momentum of the dynamic bodies about the origin [kg m²/s], in f64.
+    /// Angular momentum of the dynamic bodies about the origin (kg m²/s), in f64.
     pub fn angular_momentum(&self) -> glam::DVec3 {
         let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
         dynamic.map(Body::angular_momentum).sum()

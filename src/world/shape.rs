@@ -23,32 +23,32 @@ impl fmt::Debug for Shape {
 }
 
 impl Shape {
-    /// A ball of `radius` [m].
+    /// A ball of `radius` (m).
     pub fn ball(radius: f32) -> Self {
         Self(SharedShape::ball(radius))
     }
 
-    /// A box with half extents [m] along its own axes.
+    /// A box with half extents (m) along its own axes.
     pub fn cuboid(half_x: f32, half_y: f32, half_z: f32) -> Self {
         Self(SharedShape::cuboid(half_x, half_y, half_z))
     }
 
-    /// A capsule along Y: a segment of `half_height` either way, swept by `radius` [m].
+    /// A capsule along Y: a segment of `half_height` either way, swept by `radius` (m).
     pub fn capsule(half_height: f32, radius: f32) -> Self {
         Self(SharedShape::capsule_y(half_height, radius))
     }
 
-    /// A cylinder along Y [m].
+    /// A cylinder along Y (m).
     pub fn cylinder(half_height: f32, radius: f32) -> Self {
         Self(SharedShape::cylinder(half_height, radius))
     }
 
-    /// A cone along Y, tip up [m].
+    /// A cone along Y, tip up (m).
     pub fn cone(half_height: f32, radius: f32) -> Self {
         Self(SharedShape::cone(half_height, radius))
     }
 
-    /// The convex hull of `points` [m].
+    /// The convex hull of `points` (m).
     ///
     /// # Errors
     /// Fewer than four points, or points that span no volume.
@@ -66,7 +66,7 @@ impl Shape {
         Self(SharedShape::halfspace(normal))
     }
 
-    /// A triangle mesh: vertices [m] and counter-clockwise triangles seen from outside.
+    /// A triangle mesh: vertices (m) and counter-clockwise triangles seen from outside.
     ///
     /// # Errors
     /// No triangle, an index that names no vertex, or a vertex that is no point.
@@ -89,7 +89,7 @@ impl Shape {
             .map_err(|e| Error::input(format!("mesh: {e}")))
     }
 
-    /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` [m].
+    /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` (m).
     /// Like a mesh it has one side, the upper one, and bodies do not stumble over the edges between its triangles.
     ///
     /// # Errors
@@ -165,7 +165,7 @@ impl Shape {
         self.0.as_halfspace().is_some()
     }
 
-    /// Half extents if this is a cuboid [m].
+    /// Half extents if this is a cuboid (m).
     pub fn as_cuboid(&self) -> Option<Vec3> {
         self.0.as_cuboid().map(|c| c.half_extents)
     }
@@ -175,7 +175,7 @@ impl Shape {
         format!("{:?}", self.0.as_typed_shape())
     }
 
-    /// Radius of the smallest sphere around the shape's own origin that contains it [m]; infinite for a half-space.
+    /// Radius of the smallest sphere around the shape's own origin that contains it (m); infinite for a half-space.
     pub fn bounding_radius(&self) -> f32 {
         let sphere = self.0.compute_local_bounding_sphere();
         sphere.center().length() + sphere.radius()
@@ -186,7 +186,7 @@ impl Shape {
         &self.0
     }
 
-    /// Half of the smallest side of the shape's own bounding box [m]; infinite for a half-space.
+    /// Half of the smallest side of the shape's own bounding box (m); infinite for a half-space.
     pub fn smallest_half_extent(&self) -> f32 {
         if self.is_half_space() {
             return f32::INFINITY;

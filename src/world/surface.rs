@@ -7,7 +7,7 @@ use parry3d::shape::TypedShape;
 use super::shape::{Shape, pose};
 use super::{Body, Collider};
 
-/// Vertices [m] and triangles, counter-clockwise seen from outside.
+/// Vertices (m) and triangles, counter-clockwise seen from outside.
 pub type Triangles = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// Segments of a circle.
@@ -34,7 +34,7 @@ impl Shape {
         }
     }
 
-    /// Volume [m³]; 0 for shapes that enclose none.
+    /// Volume (m³); 0 for shapes that enclose none.
     pub fn volume(&self) -> f32 {
         if self.has_volume() { self.0.mass_properties(1.0).mass() } else { 0.0 }
     }
@@ -44,7 +44,7 @@ impl Shape {
         self.0.as_halfspace().map(|s| s.normal)
     }
 
-    /// Radius of a ball [m]; none for other shapes.
+    /// Radius of a ball (m); none for other shapes.
     pub fn as_ball(&self) -> Option<f32> {
         self.0.as_ball().map(|s| s.radius)
     }
@@ -56,7 +56,7 @@ impl Shape {
 }
 
 impl Collider {
-    /// Lower and upper corner of the box along the world's axes around the collider, on a body at this pose [m].
+    /// Lower and upper corner of the box along the world's axes around the collider, on a body at this pose (m).
     pub fn bounds(&self, position: Vec3, rotation: Quat) -> (Vec3, Vec3) {
         let aabb = self.shape.0.compute_aabb(&(pose(position, rotation) * pose(self.position, self.rotation)));
         (aabb.mins, aabb.maxs)
@@ -64,7 +64,7 @@ impl Collider {
 }
 
 impl Body {
-    /// Distance along a ray from `origin` in the unit direction `direction` to the first shape of the body [m].
+    /// Distance along a ray from `origin` in the unit direction `direction` to the first shape of the body (m).
     pub fn meets_ray(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let own = pose(self.position, self.rotation);
         let cast = |c: &Collider| {
@@ -79,7 +79,7 @@ impl Body {
 mod tests {
     use super::*;
 
-    /// Volume inside of triangles that look outward [m³].
+    /// Volume inside of triangles that look outward (m³).
     fn volume((vertices, triangles): &Triangles) -> f32 {
         let corner = |i: u32| vertices[i as usize];
         triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))) / 6.0).sum()

@@ -21,7 +21,7 @@ pub struct AdapterSummary {
     pub exact: bool,
     /// Whether it has a clock that times kernels.
     pub clock: bool,
-    /// Largest buffer that a kernel can be given [B].
+    /// Largest buffer that a kernel can be given (B).
     pub buffer_limit: u64,
 }
 

@@ -11,7 +11,7 @@ pub(super) struct Buffers {
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: String,
-    /// Largest buffer that a kernel can be given [B].
+    /// Largest buffer that a kernel can be given (B).
     limit: u64,
     slots: Vec<Slot>,
     /// Grows whenever a binding has another buffer, so that bind groups are no longer valid.
@@ -145,7 +145,7 @@ impl Buffers {
     }
 }
 
-/// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` [B]. The size is a multiple of 4 too and at
+/// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at
 /// most the limit; below that it is half as much again as is wanted, so that a growing pile does not mean a new buffer every step.
 pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
     (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)

@@ -38,7 +38,7 @@ pub const CARRY_BINDINGS: [&str; 8] =
 /// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
 /// sweeps leave for each other.
 pub const SCRATCH: usize = 4;
-/// Size of a row of all of these but the last: two vectors [B].
+/// Size of a row of all of these but the last: two vectors (B).
 pub const SCRATCH_ROW: usize = 32;
 /// How many of them, the first, are uniforms.
 pub const UNIFORMS: usize = 2;

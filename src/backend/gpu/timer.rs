@@ -19,7 +19,7 @@ const MOST: u32 = 4095;
 pub(super) struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    /// Length of a tick [ns].
+    /// Length of a tick (ns).
     period: f32,
     /// Name of the program of each run.
     runs: Vec<&'static str>,

@@ -41,7 +41,7 @@ pub(super) fn rotation(levers: &[Lever]) -> Option<DMat3> {
     }
 }
 
-/// The arm of a contact in world axes [m], with the rotation of its body: K Rᵀ = -[r]x.
+/// The arm of a contact in world axes (m), with the rotation of its body: K Rᵀ = -[r]x.
 pub(super) fn arm(map: DMat3, rotation: DMat3) -> DVec3 {
     let cross = map * rotation.transpose();
     let half = |a: f64, b: f64| 0.5 * (a - b);

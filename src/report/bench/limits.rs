@@ -39,7 +39,7 @@ pub struct LimitRow {
     pub operations: f64,
     /// The same a second of multiplications and additions on registers alone.
     pub peak: f64,
-    /// Bytes a second of a = b + s c, by the size of the three arrays together [bytes].
+    /// Bytes a second of a = b + s c, by the size of the three arrays together (bytes).
     pub triads: Vec<(usize, f64)>,
 }
 
@@ -55,7 +55,7 @@ impl LimitRow {
     }
 }
 
-/// Sizes of the triads [bytes]: within a core's cache, within a shared one, and beyond.
+/// Sizes of the triads (bytes): within a core's cache, within a shared one, and beyond.
 const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
 
 /// Measures a settled pile of `boxes` with each number of `threads`, over so many `turns`.
@@ -105,7 +105,7 @@ pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dy
 const FEW: u32 = 4;
 const MANY: u32 = 24;
 
-/// Time of so many sweeps [s].
+/// Time of so many sweeps (s).
 fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
     let config = SolverConfig { substeps: 1, iterations: sweeps, relax: 0, ..SolverConfig::default().without_sleep() };
     let plan = StepPlan::new(&config, problem);

@@ -9,7 +9,7 @@ pub struct Machine {
     pub processor: String,
     /// Cores that this process may use.
     pub cores: usize,
-    /// Memory of the machine [MiB]; 0 where the system does not say.
+    /// Memory of the machine (MiB); 0 where the system does not say.
     pub memory: u64,
     /// Operating system and instruction set.
     pub system: String,

@@ -77,27 +77,27 @@ pub struct BenchRow {
     pub colors: usize,
     /// Share of the pairs whose manifolds were reused, at the end.
     pub reused: f64,
-    /// All stages together, median over the turns [ms].
+    /// All stages together, median over the turns (ms).
     pub ms: f64,
     /// Its lower quartile.
     pub ms_low: f64,
     /// Its upper quartile.
     pub ms_high: f64,
-    /// Finding contacts [ms].
+    /// Finding contacts (ms).
     pub detect: f64,
-    /// Coloring them [ms].
+    /// Coloring them (ms).
     pub color: f64,
-    /// Writing rows [ms].
+    /// Writing rows (ms).
     pub prepare: f64,
-    /// Sweeping, transfers included [ms].
+    /// Sweeping, transfers included (ms).
     pub run: f64,
-    /// Reading the rows back [ms].
+    /// Reading the rows back (ms).
     pub store: f64,
-    /// Deepest overlap at the end [m].
+    /// Deepest overlap at the end (m).
     pub penetration_max: f64,
-    /// Mean overlap at the end [m].
+    /// Mean overlap at the end (m).
     pub penetration_mean: f64,
-    /// Root mean square speed at the end [m/s].
+    /// Root mean square speed at the end (m/s).
     pub speed_rms: f64,
     /// How far the impulses at the end of a substep are from solving its contact problem without springs:
     /// [`Residuals::e_vel`]. None where there are joints.

@@ -22,7 +22,7 @@ pub use survey::{Progress, Report, Survey};
 mod tests {
     use super::Row;
 
-    /// A row of an engine with a time and a mean overlap [m]; all of one run.
+    /// A row of an engine with a time and a mean overlap (m); all of one run.
     pub(super) fn row(engine: &str, ms: f64, mean: f64) -> Row {
         Row {
             scene: "scene".into(),

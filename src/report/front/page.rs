@@ -20,7 +20,7 @@ pub struct Page {
 /// Whose rows the other sides are compared with.
 const OWN: &str = "drystone";
 
-/// Errors that the profiles over the scenes are made at [m].
+/// Errors that the profiles over the scenes are made at (m).
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Makes the page; each race is one scene's.
@@ -326,7 +326,7 @@ fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     html.push_str("</div></details>\n");
 }
 
-/// Least time in which a solver had an error of at most `level` [ms].
+/// Least time in which a solver had an error of at most `level` (ms).
 fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)

@@ -3,7 +3,7 @@
 use super::race::Row;
 use crate::error::Result;
 
-/// Errors below this are taken as this [m], [m/s]: poses in f32 some ten meters from the origin say no more.
+/// Errors below this are taken as this (m), (m/s): poses in f32 some ten meters from the origin say no more.
 pub const FLOOR: f64 = 1e-6;
 
 /// What a row is judged by.
@@ -51,7 +51,7 @@ impl Fault {
         if self == Self::Speed { "mm/s" } else { "mm" }
     }
 
-    /// Of a row [m], [m/s]; at least [`FLOOR`].
+    /// Of a row (m), (m/s); at least [`FLOOR`].
     pub fn of(self, row: &Row) -> f64 {
         let error = match self {
             Self::Deepest => row.penetration_max,

@@ -30,7 +30,7 @@ pub struct Frame<'a> {
     pub y: &'a str,
     /// Whether y goes from 0 to 1 instead of over decades.
     pub share: bool,
-    /// Width and height [pixels].
+    /// Width and height (pixels).
     pub size: (u32, u32),
 }
 

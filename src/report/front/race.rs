@@ -54,9 +54,9 @@ pub struct Row {
     /// What times are of: `processor` time of the process where one thread does everything, `wall` time with several threads and
     /// on a GPU.
     pub clock: String,
-    /// Time of a step, median over the blocks [ms].
+    /// Time of a step, median over the blocks (ms).
     pub ms: f64,
-    /// Its lower and upper quartile [ms].
+    /// Its lower and upper quartile (ms).
     pub ms_low: f64,
     /// Upper quartile.
     pub ms_high: f64,
@@ -66,21 +66,21 @@ pub struct Row {
     pub ratio_low: f64,
     /// Its upper quartile.
     pub ratio_high: f64,
-    /// Deepest overlap [m].
+    /// Deepest overlap (m).
     pub penetration_max: f64,
-    /// Overlap that 95 % of the contacts do not exceed, median over the blocks [m].
+    /// Overlap that 95 % of the contacts do not exceed, median over the blocks (m).
     pub penetration_p95: f64,
-    /// Mean overlap, median over the blocks [m].
+    /// Mean overlap, median over the blocks (m).
     pub penetration_mean: f64,
-    /// Root mean square speed, median over the blocks [m/s].
+    /// Root mean square speed, median over the blocks (m/s).
     pub speed_rms: f64,
-    /// Largest horizontal distance of a body from where it began, at the end [m].
+    /// Largest horizontal distance of a body from where it began, at the end (m).
     pub drift: f64,
     /// Bodies that are in place at the end; none if the scene does not stand.
     pub in_place: Option<usize>,
-    /// Largest distance between the anchors of a joint [m]; none without joints.
+    /// Largest distance between the anchors of a joint (m); none without joints.
     pub joint_gap: Option<f64>,
-    /// Kinetic and potential energy gained over the whole run [J].
+    /// Kinetic and potential energy gained over the whole run (J).
     pub energy_gained: f64,
     /// Whether all numbers stayed finite.
     pub finite: bool,

@@ -49,11 +49,11 @@ pub struct SolveRow {
     pub backend: String,
     /// Sweeps from zero impulses.
     pub sweeps: u32,
-    /// Their time, median over the turns [ms].
+    /// Their time, median over the turns (ms).
     pub ms: f64,
-    /// The least of them [ms].
+    /// The least of them (ms).
     pub ms_low: f64,
-    /// The largest of them [ms].
+    /// The largest of them (ms).
     pub ms_high: f64,
     /// The error then, or the round number that it fell below there.
     pub e_vel: f64,
