@@ -571,6 +571,28 @@ fn friction(problem: &StepProblem) -> Vec3 {
     problem.contacts.iter().map(along).sum()
 }
 
+/// An end of a plank that turns comes down by 0.13 m a step, the plank itself by nothing.
+#[test]
+fn a_plank_that_turns_onto_a_board_meets_it() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    world.add(Body::fixed().shape(Shape::cuboid(5.0, 0.02, 5.0)).position(0.0, -0.02, 0.0));
+    let plank = Body::dynamic().shape(Shape::cuboid(1.0, 0.05, 0.1)).position(0.0, 0.3, 0.0);
+    // One end is 3 cm above the board, further than contacts are made.
+    let plank = plank.rotation(Quat::from_rotation_z(-0.2227)).velocity(Vec3::ZERO, Vec3::new(0.0, 0.0, -8.0));
+    let plank = world.add(plank);
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep());
+    let mut lowest = f32::INFINITY;
+    for _ in 0..30 {
+        simulation.step(DT).expect("a step");
+        let body = &simulation.world.bodies[plank];
+        let ends = [-1.0, 1.0].map(|x| body.position + body.rotation * Vec3::new(x, -0.05, 0.0));
+        lowest = ends.iter().map(|end| end.y).fold(lowest, f32::min);
+    }
+    assert!(lowest > -0.02, "an end is {lowest} m above the board");
+    assert!(simulation.world.bodies[plank].linear_velocity.y > 0.5, "the board pushes it up");
+}
+
 #[test]
 fn settings_out_of_their_range_are_refused_by_name() {
     for (name, good, bad) in [

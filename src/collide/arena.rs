@@ -90,6 +90,10 @@ impl Arena {
             let pose = Pose::from_parts(body.position, body.rotation);
             let mut aabb = c.aabb(pose).loosened(now.margins.speculative * c.size + now.margins.fall);
             let sweep = body.v * now.margins.dt;
+            // What turns reaches no further out than from one side of the body to the other, and its box no further than its
+            // longest half diagonal.
+            let most = c.reach - c.size + c.local.translation.length();
+            aabb = aabb.loosened((c.reach * body.w.length() * now.margins.dt).min(most).max(0.0));
             aabb.mins += sweep.min(glam::Vec3::ZERO);
             aabb.maxs += sweep.max(glam::Vec3::ZERO);
             aabb
