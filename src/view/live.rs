@@ -309,6 +309,33 @@ mod tests {
         assert!(live.world().joints.is_empty() && live.world().bodies[top].position.y < before.y + 0.5, "it falls");
     }
 
+    /// The number of joints is then the same as before, and the joint is another one.
+    #[test]
+    fn another_body_can_be_grabbed_right_after_one_was_let_go() {
+        let mut live = live("tower");
+        let camera = live.camera(1.5);
+        let projection = camera.projection(1.5, 10.0);
+        let top = live.world().bodies.len() - 1;
+        let above = |live: &Live, body: usize| {
+            let at = projection.project_point3(live.world().bodies[body].position).truncate();
+            let (origin, direction) = camera.ray(at, 1.5);
+            Pointer { at, origin, direction }
+        };
+        assert!(live.grab(&above(&live, top)));
+        live.step().expect("a step");
+        press(&mut live, " ");
+        live.release();
+        assert!(live.grab(&above(&live, top - 3)));
+        let grabbed = live.grabbed.as_ref().expect("a body").body;
+        assert_eq!(grabbed, top - 3);
+        for _ in 0..30 {
+            live.step().expect("a step");
+            let world = live.world();
+            assert!(world.joint_gap() < 0.05, "{} m", world.joint_gap());
+            assert!((world.bodies[top].position.x.abs()).max(world.bodies[top].position.z.abs()) < 0.05);
+        }
+    }
+
     #[test]
     fn settings_and_backend_change_while_it_runs_and_what_contradicts_is_refused() {
         let mut live = live("tower");
