@@ -189,3 +189,43 @@ fn triangle_contact(
     }
     Some(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::mixed;
+    use glam::Quat;
+    use parry3d::shape::{SharedShape, TriMesh};
+
+    /// Above a triangle, below it, beside its edges and at its corners.
+    #[test]
+    fn a_solid_is_as_far_from_a_triangle_of_two_sides_as_it_is() {
+        let corners = vec![Vec3::new(-1.0, 0.0, -0.8), Vec3::new(0.2, 0.0, 1.0), Vec3::new(1.0, 0.0, -0.6)];
+        let mesh = TriMesh::new(corners, vec![[0, 1, 2]]).expect("a triangle");
+        let shapes = [SharedShape::cone(0.2, 0.1), SharedShape::cylinder(0.1, 0.2), SharedShape::cuboid(0.1, 0.2, 0.3)];
+        let search = Search { look: 0.1, size: 0.1 };
+        let mut state = 7;
+        let mut next = || {
+            state = mixed(state + 1);
+            (state >> 40) as f32 / (1 << 24) as f32 * 2.0 - 1.0
+        };
+        let (mut checked, mut beside) = (0, 0);
+        for i in 0..6000 {
+            let turn = Quat::from_scaled_axis(3.0 * Vec3::new(next(), next(), next()));
+            let pose = Pose::from_parts(Vec3::new(1.3 * next(), 0.4 * next(), 1.3 * next()), turn);
+            let shape = &shapes[i % 3];
+            let exact = parry3d::query::distance(&Pose::IDENTITY, &mesh, &pose, &**shape).expect("a distance").distance;
+            if !(0.002..0.09).contains(&exact) {
+                continue;
+            }
+            let mut many = Vec::new();
+            composite_contacts(&mesh, &**shape, &pose, search, &mut Cutting::default(), &mut many);
+            let points = many.iter().flat_map(|found| &found.points);
+            let least = points.map(|point| point.dist).fold(f32::INFINITY, f32::min);
+            assert!((least - exact).abs() < 2.0 * EXACT * search.size, "{i}: {least} m and not {exact} m");
+            checked += 1;
+            beside += usize::from(many[0].local_n1.y.abs() < 0.99);
+        }
+        assert!(checked > 500 && beside > 100, "{checked} checked, {beside} of them beside");
+    }
+}
