@@ -3,7 +3,7 @@
 use drystone::compare::Difference;
 use drystone::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Backend, BallJoint, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, BallJoint, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -198,6 +198,53 @@ fn a_pile_at_rest_stays_so_with_fewer_substeps_and_with_longer_steps() {
     }
 }
 
+/// Every impulse of a world at rest is a force times the length of a substep: a step of another length begins with the same forces.
+#[test]
+fn forces_stay_as_they_are_in_a_step_of_another_length() {
+    let config = SolverConfig::default().without_sleep();
+    for backend in BOTH {
+        let mut simulation = simulation(&standing(), &config, backend);
+        run(&mut simulation, 300);
+        let problem = simulation.problem();
+        assert!(problem.impulses.iter().all(|i| i.normal > 0.0) && problem.impulses.iter().any(|i| i.tangent_1 != 0.0));
+        assert!(problem.joint_impulses.iter().all(|j| j.linear[1] != 0.0));
+        for dt in [0.5 * DT, DT, 2.0 * DT, DT] {
+            let (next, _) = simulation.next_problem(dt).expect("a step");
+            let substep = dt / config.substeps as f32;
+            let old = simulation.problem().clone();
+            let factor = substep / old.params.substep;
+            assert_eq!(old.points.len(), next.points.len(), "the same contacts");
+            let all = |p: &StepProblem| -> Vec<f32> {
+                let contacts = p.impulses.iter().flat_map(|i| [i.normal, i.tangent_1, i.tangent_2]);
+                contacts.chain(p.joint_impulses.iter().flat_map(|j| [j.linear[0], j.linear[1], j.linear[2]])).collect()
+            };
+            for (old, next) in all(&old).into_iter().zip(all(&next)) {
+                assert!((next - factor * old).abs() <= 1e-6 * old.abs(), "{next} and not {factor} x {old} N s");
+            }
+            simulation.step(dt).expect("a step");
+            // A joint has no preload: its gap closes or opens to what the other substep asks for.
+            let speed = simulation.world.bodies[..18].iter().map(|b| b.linear_velocity.length()).fold(0.0, f32::max);
+            assert!(speed < 2e-3, "{dt} s: {speed} m/s");
+        }
+    }
+}
+
+/// A preload is an overlap at rest, which goes with the square of the substep where the contact is as stiff as the substep is short.
+#[test]
+fn preloads_follow_the_length_of_a_step() {
+    let config = SolverConfig { preload_rate: 0.0, ..SolverConfig::default().without_sleep() };
+    let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), reference);
+    run(&mut simulation, 300);
+    simulation.set_config(config).expect("a setting");
+    run(&mut simulation, 1);
+    let before: Vec<f32> = simulation.problem().contacts.iter().map(|c| c.preload).collect();
+    assert!(before.iter().all(|&p| p > 0.0), "{before:?} m");
+    let (half, _) = simulation.next_problem(0.5 * DT).expect("a step");
+    for (contact, before) in half.contacts.iter().zip(before) {
+        assert!((contact.preload / before - 0.25).abs() < 1e-3, "{} of {before} m", contact.preload);
+    }
+}
+
 #[test]
 fn bodies_may_fall_asleep_once_the_settings_say_so() {
     let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
@@ -230,6 +277,86 @@ fn a_setting_that_changes_wakes_what_sleeps() {
     run(&mut simulation, 30);
     let slid = simulation.world.bodies[block].linear_velocity.length();
     assert!((slid - 9.81 * 0.2_f32.sin() * 30.0 * DT).abs() < 0.02, "{slid} m/s");
+}
+
+/// Neither a setting of sleeping nor a mass that changed long ago keeps anything awake.
+#[test]
+fn what_was_changed_once_sleeps_again() {
+    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let mut simulation = simulation(&standing(), &config, cpu);
+    run(&mut simulation, 240);
+    assert!(simulation.is_asleep(5));
+    simulation.world.bodies[5].mass.mass *= 1.5;
+    run(&mut simulation, 1);
+    assert!(!simulation.is_asleep(5), "its mass changed");
+    run(&mut simulation, 120);
+    assert!(simulation.is_asleep(5), "its mass changed two seconds ago");
+    simulation.set_config(SolverConfig { sleep_after: 0.4, ..config }).expect("a setting");
+    run(&mut simulation, 1);
+    assert!(simulation.is_asleep(5), "only the time until bodies sleep changed");
+}
+
+#[test]
+fn as_many_colors_as_are_allowed_are_taken_from_the_step_on_in_which_they_are() {
+    let config = SolverConfig::default().without_sleep();
+    let mut simulation = simulation(&net(), &config, cpu);
+    run(&mut simulation, 3);
+    let colors = |s: &mut Simulation| s.problem().joint_colors().len();
+    let many = colors(&mut simulation);
+    assert!(many > 2, "{many} colors");
+    simulation.set_config(SolverConfig { max_colors: 1, ..config.clone() }).expect("a setting");
+    run(&mut simulation, 1);
+    let mut anew = Simulation::new(net(), simulation.config().clone(), cpu()).expect("a good world");
+    run(&mut anew, 1);
+    assert_eq!(colors(&mut simulation), colors(&mut anew));
+    assert_ne!(colors(&mut simulation), many);
+    simulation.set_config(config).expect("a setting");
+    run(&mut simulation, 1);
+    assert_eq!(colors(&mut simulation), many);
+}
+
+/// The plan of a step is that of its problem, whatever began or ended before it.
+#[test]
+fn a_plan_is_always_that_of_its_problem() {
+    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let mut world = standing();
+    // A ball that comes down after the rest fell asleep, and bounces; cubes and balls turn without a gyroscopic pass.
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 60.0, 0.0).restitution(0.8));
+    let mut simulation = simulation(&world, &config, cpu);
+    let (mut plans, mut steps) = (Vec::new(), 0);
+    for step in 0..420 {
+        if step == 200 {
+            simulation.world.joints.pop();
+        }
+        if simulation.step(DT).expect("a step").dispatches == 0 {
+            continue;
+        }
+        steps += 1;
+        let fresh = drystone::StepPlan::new(&config, &simulation.problem().clone());
+        assert_eq!(simulation.plan(), &fresh, "step {step}");
+        if plans.last() != Some(&fresh) {
+            plans.push(fresh);
+        }
+    }
+    assert!(!simulation.is_asleep(ball) || steps > 100);
+    assert!(plans.len() > 4, "{} plans in {steps} steps: hardly a test", plans.len());
+}
+
+#[test]
+fn friction_that_acts_elsewhere_begins_without_impulses() {
+    let config = SolverConfig::default().without_sleep();
+    let mut simulation = simulation(&standing(), &config, reference);
+    run(&mut simulation, 60);
+    assert!(simulation.problem().impulses.iter().any(|i| i.tangent_1 != 0.0 || i.tangent_2 != 0.0));
+    for friction_at in [FrictionAt::Manifold, FrictionAt::Points] {
+        // All contacts are computed anew.
+        let other = SolverConfig { friction_at, recycle_distance: 0.0, ..config.clone() };
+        simulation.set_config(other).expect("a setting");
+        let (next, _) = simulation.next_problem(DT).expect("a step");
+        assert!(next.impulses.iter().all(|i| i.tangent_1 == 0.0 && i.tangent_2 == 0.0), "{friction_at:?}");
+        run(&mut simulation, 60);
+        assert!(simulation.problem().impulses.iter().any(|i| i.tangent_1 != 0.0 || i.tangent_2 != 0.0));
+    }
 }
 
 /// Asking for the next step is no step: whatever is asked, the run goes on with the same bits.
@@ -358,6 +485,71 @@ fn a_changed_joint_wakes_what_it_held() {
     assert!((fallen + 9.81 * 30.0 * DT).abs() < 0.1, "{fallen} m/s");
 }
 
+/// Two chains hang still. What changes of one wakes that one.
+#[test]
+fn a_changed_joint_wakes_only_what_it_holds() {
+    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let mut world = World::new();
+    for x in [0.0, 5.0] {
+        let upper = world.add(cube(x, -1.0, 0.0));
+        let lower = world.add(cube(x, -2.5, 0.0));
+        world.join(BallJoint::to_world(upper, Vec3::Y, Vec3::new(x, 0.0, 0.0)));
+        world.join(BallJoint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
+    }
+    let mut simulation = simulation(&world, &config, cpu);
+    let asleep = |s: &Simulation| [0, 1, 2, 3].map(|i| s.is_asleep(i));
+    run(&mut simulation, 300);
+    assert_eq!(asleep(&simulation), [true; 4]);
+    // The same joints in another order are no change.
+    simulation.world.joints.reverse();
+    run(&mut simulation, 1);
+    assert_eq!(asleep(&simulation), [true; 4]);
+    simulation.world.joints.reverse();
+    // An anchor that moves wakes its chain.
+    simulation.world.joints[3].anchor_a.y -= 0.1;
+    run(&mut simulation, 1);
+    assert_eq!(asleep(&simulation), [true, true, false, false]);
+    run(&mut simulation, 300);
+    assert_eq!(asleep(&simulation), [true; 4]);
+    // So does the end of a joint.
+    simulation.world.joints.remove(1);
+    run(&mut simulation, 1);
+    assert_eq!(asleep(&simulation), [false, false, true, true]);
+}
+
+#[test]
+fn a_new_joint_wakes_both_of_its_bodies() {
+    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
+    for swap in [false, true] {
+        let mut simulation = simulation(&standing(), &config, cpu);
+        run(&mut simulation, 240);
+        let (one, other) = (5, 10);
+        assert!(simulation.is_asleep(one) && simulation.is_asleep(other));
+        let [a, b] = if swap { [other, one] } else { [one, other] };
+        let at = |i: usize| simulation.world.bodies[i].position;
+        let half = 0.5 * (at(b) - at(a));
+        simulation.world.join(BallJoint::new(a, half, b, -half));
+        run(&mut simulation, 1);
+        assert!(!simulation.is_asleep(one) && !simulation.is_asleep(other));
+    }
+}
+
+#[test]
+fn a_body_that_is_untied_rests_on_a_half_space() {
+    let mut world = World::new();
+    let ground = world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
+    world.join(BallJoint::new(ball, Vec3::ZERO, ground, 0.49 * Vec3::Y));
+    let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
+    run(&mut simulation, 10);
+    assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);
+    simulation.world.joints.clear();
+    assert_eq!(simulation.step(DT).expect("a step").manifolds, 1);
+    run(&mut simulation, 60);
+    let height = simulation.world.bodies[ball].position.y;
+    assert!((height - 0.5).abs() < 0.01, "{height} m");
+}
+
 #[test]
 fn masses_and_materials_may_change() {
     let mut simulation =
@@ -389,7 +581,7 @@ type Change = fn(&mut World);
 /// Bodies cannot come, go or change kind or shape yet: the step says so and does nothing.
 #[test]
 fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
-    let cases: [(&str, Change); 9] = [
+    let cases: [(&str, Change); 10] = [
         ("the world has 25 bodies", |w| {
             w.add(cube(0.0, 20.0, 0.0));
         }),
@@ -403,6 +595,10 @@ fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
         ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].position.x = 0.1),
         ("body 3 \"\" changed", |w| w.bodies[3].colliders.clear()),
         ("body 3 \"\" changed", |w| w.bodies.swap(3, 4)),
+        ("body 3 \"\" changed", |w| {
+            let shape = w.bodies[4].colliders.remove(0);
+            w.bodies[3].colliders.push(shape);
+        }),
     ];
     for (start, change) in cases {
         let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
@@ -455,7 +651,8 @@ fn a_plan_belongs_to_a_length_of_step() {
 
 #[test]
 fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
-    let cases: [(&str, Change); 5] = [
+    let cases: [(&str, Change); 6] = [
+        ("gravity", |w| w.gravity.y = f32::NAN),
         ("joint 6: names a body beyond", |w| w.joints.push(BallJoint::to_world(99, Vec3::ZERO, Vec3::ZERO))),
         ("joint 0: ties body 1 to itself", |w| w.joints[0] = BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
         ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
@@ -496,6 +693,35 @@ fn no_number_that_a_body_can_have_makes_a_step_panic() {
                 simulation.pairs().count();
                 // What does not touch it does not mind.
                 assert!(others.iter().all(|&i| simulation.world.bodies[i].is_finite()), "{bad} in change {k}");
+            }
+        }
+    }
+}
+
+/// A body whose numbers are none touches nothing: its neighbors stay numbers, and what falls is still found.
+#[test]
+fn a_body_whose_numbers_are_none_touches_nothing() {
+    let changes: [fn(&mut Body, f32); 4] = [
+        |b, x| b.position.y = x,
+        |b, x| b.rotation.x = x,
+        |b, x| b.linear_velocity.x = x,
+        |b, x| b.angular_velocity.z = x,
+    ];
+    for bad in [f32::NAN, f32::INFINITY] {
+        for (k, change) in changes.into_iter().enumerate() {
+            for early in [true, false] {
+                let mut world = standing();
+                let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 1.5, 0.0));
+                let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
+                run(&mut simulation, if early { 0 } else { 3 });
+                change(&mut simulation.world.bodies[4], bad);
+                run(&mut simulation, 1);
+                assert!(simulation.pairs().all(|p| ![p.body_a, p.body_b].contains(&4) || p.manifolds.is_empty()));
+                run(&mut simulation, 90);
+                let bodies = &simulation.world.bodies;
+                let others = bodies.iter().enumerate().filter(|(i, _)| *i != 4);
+                assert!(others.clone().all(|(_, b)| b.is_finite()), "{bad} in change {k}");
+                assert!((bodies[ball].position.y - 0.3).abs() < 0.01, "{bad} in change {k}: {}", bodies[ball].position);
             }
         }
     }

@@ -65,7 +65,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 21] = [
+    let cases: [(&str, Break); 24] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -76,6 +76,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[1]: bodies", |p, n| p.contacts[1].body_b = n),
         ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
+        ("joints[1]: bodies", |p, n| p.joints[1].body_b = n),
         ("inertias[0]: body", |p, n| p.inertias[0].body = n),
         ("inertias[1]: body", |p, _| p.inertias[1] = InertiaRow { ..p.inertias[0] }),
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),
@@ -87,9 +88,17 @@ fn what_is_not_there_is_refused_by_row_and_field() {
             p.impulses.push(p.impulses[0]);
             p.params.point_count += 1;
         }),
+        ("points: ", |p, _| {
+            // The contacts but one are gone, their points are not.
+            p.contacts.truncate(1);
+            p.points.truncate(p.contacts[0].point_count as usize + 2);
+            p.impulses.truncate(p.points.len());
+            p.params.point_count = p.points.len() as u32;
+        }),
         ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32 + 1),
         ("colors of contacts", |p, _| p.colors[1] = u32::MAX),
         ("colors of contacts", |p, _| p.colors[0] = 1),
+        ("colors of contacts", |p, _| p.colors[p.first_joint_color as usize - 1] -= 1),
         ("colors of joints", |p, _| *p.colors.last_mut().expect("joints") += 1),
         ("color 0: body", |p, _| {
             // All contacts in one color.

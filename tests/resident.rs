@@ -21,6 +21,7 @@ tests! {
         islands_fall_asleep_and_wake_with_their_impulses,
         a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
         two_rows_in_each_others_places_are_found,
+        places_that_were_not_there_are_refused,
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
         a_device_carries_no_friction_that_a_surface_lost,
         a_device_takes_the_points_that_are_sent,
@@ -105,6 +106,7 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
         for simulation in &mut both {
             match step {
                 40 => simulation.world.bodies[30].linear_velocity.y += 3.0,
+                45 => simulation.world.bodies[25].mass.mass *= 3.0,
                 50 => simulation.world.bodies[40].position.y += 0.01,
                 60 => simulation.world.bodies[20].force.x = 1e4,
                 70 => simulation.world.gravity.x = 2.0,
@@ -116,9 +118,10 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
                     .expect("good"),
                 _ => {}
             }
-            simulation.step(scene.dt).expect("a step");
+            let dt = if (53..57).contains(&step) { 0.5 * scene.dt } else { scene.dt };
+            simulation.step(dt).expect("a step");
         }
-        if step % 10 == 3 {
+        if step % 10 == 3 || [45, 46, 54, 57].contains(&step) {
             assert_same(&mut both, &format!("step {step}"));
         }
     }
@@ -160,7 +163,7 @@ fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
 }
 
 /// A GPU whose map of rows has a mistake.
-struct Confused(drystone::Gpu);
+struct Confused(drystone::Gpu, fn(&mut Carry));
 
 impl Backend for Confused {
     fn name(&self) -> &'static str {
@@ -175,7 +178,7 @@ impl Backend for Confused {
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let mut carry = carry.clone();
         if carry.rows_before.len() > 1 {
-            carry.rows_before.swap(0, 1);
+            (self.1)(&mut carry);
         }
         self.0.step(step, &carry)
     }
@@ -190,12 +193,33 @@ impl Backend for Confused {
 fn two_rows_in_each_others_places_are_found() {
     let scene = pile(60);
     let [mut ours, _] = both(&scene, &SolverConfig::default().without_sleep());
-    let mut theirs = simulation(&scene, &SolverConfig::default().without_sleep(), Box::new(Confused(gpu::exact())));
+    let confused = Confused(gpu::exact(), |carry| carry.rows_before.swap(0, 1));
+    let mut theirs = simulation(&scene, &SolverConfig::default().without_sleep(), Box::new(confused));
     for _ in 0..80 {
         ours.step(scene.dt).expect("a step");
         theirs.step(scene.dt).expect("a step");
     }
     assert_ne!(rows(ours.problem()), rows(theirs.problem()));
+}
+
+/// Kernels would read other rows in their place.
+fn places_that_were_not_there_are_refused() {
+    let spoils: [fn(&mut Carry); 6] = [
+        |carry| carry.rows_before.push(0),
+        |carry| carry.rows_before[0] = 1 << 20,
+        |carry| carry.computed.truncate(carry.computed.len().saturating_sub(1)),
+        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.row = 1 << 20),
+        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.contact = 1 << 20),
+        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.points[0] = 1 << 20),
+    ];
+    let scene = pile(60);
+    for (i, spoil) in spoils.into_iter().enumerate() {
+        let confused = Box::new(Confused(gpu::exact(), spoil));
+        let mut simulation = simulation(&scene, &SolverConfig::default().without_sleep(), confused);
+        let line =
+            (0..80).find_map(|_| simulation.step(scene.dt).err()).unwrap_or_else(|| panic!("case {i} was taken"));
+        assert!(line.to_string().starts_with("carry: names rows"), "case {i}: {line}");
+    }
 }
 
 /// What each of the last steps of a scene moved to the device and back, and the simulation.

@@ -170,5 +170,8 @@ mod tests {
         // Equal ones are taken in order, each once.
         assert_eq!(matched(&[a, a], &[d, a, a, a]), [None, Some(1), Some(0), None]);
         assert_eq!(matched(&[], &[a]), [None]);
+        // Of many whose anchors all moved, each is the one in its place.
+        let many = |from: f32| (0..40).map(|i| joint(1, from + i as f32)).collect::<Vec<_>>();
+        assert_eq!(matched(&many(0.0), &many(100.0)), (0..40).map(Some).collect::<Vec<_>>());
     }
 }
