@@ -342,6 +342,59 @@ fn a_plan_is_always_that_of_its_problem() {
     assert!(plans.len() > 4, "{} plans in {steps} steps: hardly a test", plans.len());
 }
 
+/// Asserts that the plan of the last step is that of its problem, and that its colors are still `colors`.
+#[track_caller]
+fn assert_planned_anew(simulation: &mut Simulation, colors: &[u32]) {
+    let config = simulation.config().clone();
+    let problem = simulation.problem().clone();
+    assert_eq!(problem.colors, colors, "other colors ask for another plan anyway");
+    assert_eq!(simulation.plan(), &drystone::StepPlan::new(&config, &problem));
+}
+
+#[test]
+fn a_plan_follows_contacts_and_lengths_of_steps_where_its_colors_stay() {
+    let mut world = World::new();
+    world.add(ground());
+    let cube = world.add(cube(0.0, 0.5, 0.0));
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 9.0, 0.0).restitution(0.5));
+    let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
+    run(&mut simulation, 10);
+    let colors = simulation.problem().colors.clone();
+    simulation.step(1e-4).expect("a step");
+    assert_planned_anew(&mut simulation, &colors);
+    run(&mut simulation, 1);
+    // A flat contact goes, and a round one that bounces comes.
+    for (body, height) in [(cube, 9.0), (ball, 0.3)] {
+        let body = &mut simulation.world.bodies[body];
+        (body.position.y, body.linear_velocity) = (height, Vec3::ZERO);
+    }
+    run(&mut simulation, 1);
+    assert_planned_anew(&mut simulation, &colors);
+}
+
+/// A ball falls asleep and a rod wakes: as many joints as before, but a spin that turns.
+#[test]
+fn a_plan_follows_spins_where_its_colors_stay() {
+    let mut world = World::new();
+    let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1)).position(0.0, -0.5, 0.0));
+    world.join(BallJoint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 0.0, 0.0));
+    world.join(BallJoint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
+    let mut simulation = simulation(&world, &SolverConfig { sleep_after: 0.3, ..SolverConfig::default() }, cpu);
+    for _ in 0..60 {
+        simulation.world.bodies[ball].linear_velocity.y = 0.1;
+        run(&mut simulation, 1);
+    }
+    assert!(simulation.is_asleep(rod) && !simulation.is_asleep(ball));
+    run(&mut simulation, 60);
+    assert!(simulation.is_asleep(ball) && simulation.problem().inertias.is_empty());
+    let colors = simulation.problem().colors.clone();
+    simulation.wake(rod);
+    run(&mut simulation, 1);
+    assert!(!simulation.problem().inertias.is_empty());
+    assert_planned_anew(&mut simulation, &colors);
+}
+
 #[test]
 fn friction_that_acts_elsewhere_begins_without_impulses() {
     let config = SolverConfig::default().without_sleep();

@@ -3,10 +3,9 @@
 // manifold. Doubles: Writer::write in src/problem/contacts.rs, give_back in src/problem/store.rs.
 
 // An impulse of a manifold that was computed since, along the tangents that it has now.
-fn turned_impulse(before: Contact, now: Contact, impulse: Impulse, has_friction: bool) -> Impulse {
-    let p = before.tangent * impulse.tangent_1 + cross3(before.normal, before.tangent) * impulse.tangent_2;
-    // Friction that a rule no longer allows is not carried over.
-    let friction = select(vec3f(), p, has_friction);
+// Rules and materials are those of the step before: where they change, no row is carried on the device.
+fn turned_impulse(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
+    let friction = before.tangent * impulse.tangent_1 + cross3(before.normal, before.tangent) * impulse.tangent_2;
     let tangent_2 = cross3(now.normal, now.tangent);
     return Impulse(impulse.normal, dot3(friction, now.tangent), dot3(friction, tangent_2), 0.0);
 }
@@ -30,12 +29,12 @@ fn carry_contact(i: u32) {
             for (var k = 0u; k < contact.point_count; k++) {
                 if origin.points[k] != NO_ROW {
                     let impulse = impulses_before[origin.points[k]];
-                    impulses[place.first_point + k] = turned_impulse(before, contact, impulse, contact.friction > 0.0);
+                    impulses[place.first_point + k] = turned_impulse(before, contact, impulse);
                 }
             }
             if carry.patches == 1u {
                 let whole = impulses_before[before.first_point + before.point_count];
-                impulses[place.first_point + contact.point_count] = turned_impulse(before, contact, whole, true);
+                impulses[place.first_point + contact.point_count] = turned_impulse(before, contact, whole);
             }
         }
     }
