@@ -86,7 +86,7 @@ pub(super) fn composite_contacts(
 /// The contact of a triangle with a convex shape, where it is nearer than `look` and on the triangle's side. Only what is in the
 /// box `near` counts. Normals stay within `cone`, so that nothing stumbles over edges between triangles; without one the triangle
 /// has two sides.
-fn triangle_contact(
+pub(super) fn triangle_contact(
     [a, mut b, mut c]: [Vec3; 3],
     cone: &dyn Fn() -> Option<TrianglePseudoNormals>,
     convex: &Solid,
@@ -180,9 +180,13 @@ fn triangle_contact(
         let contacts = convex.contacts(polygon, [normal, face, a]);
         found.points.extend(contacts.filter(|contact| contact.dist <= look && contact.dist >= least));
     }
-    if let Some((d, on_patch, on_solid, claimed)) = closest
-        && d == normal
-    {
+    let mut closest = closest.filter(|closest| closest.0 == normal);
+    if closest.is_none() && found.points.is_empty() && normal == direction {
+        // Beside the triangle: the solid's nearest point touches the edge.
+        let on_solid = convex.furthest(-normal);
+        closest = Some((normal, on_solid - normal * (distance + convex.radius), on_solid, distance));
+    }
+    if let Some((_, on_patch, on_solid, claimed)) = closest {
         let on_surface = convex.pose.inverse_transform_point(on_solid - normal * convex.radius);
         let unknown = PackedFeatureId::UNKNOWN;
         found.points.push(TrackedContact::new(on_patch, on_surface, unknown, unknown, claimed));

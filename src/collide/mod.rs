@@ -5,6 +5,8 @@
 //! beside each other have a tree and pairs each, so that what one finds does not depend on the others.
 
 mod arena;
+#[cfg(test)]
+mod distances;
 mod facet;
 mod manifold;
 mod narrow;
