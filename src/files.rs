@@ -79,7 +79,7 @@ impl Drop for Draft {
     }
 }
 
-/// Removes all drafts, for who is about to end the process.
+/// Removes all drafts, right before the process ends.
 pub fn discard_drafts() {
     drafts().drain(..).for_each(|draft| discard(&draft));
 }

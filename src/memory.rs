@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 /// joints, 4 kB in a pile that still falls.
 pub(crate) const BODY: f64 = 2000.0;
 
-/// Refuses what takes more memory than there is; where nobody says how much that is, nothing is refused.
+/// Refuses a world or film that takes more memory than the machine has. Where the machine does not say, all pass.
 ///
 /// # Errors
 /// One line that names `what`, what it takes and what there is.

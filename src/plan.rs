@@ -153,17 +153,17 @@ pub(crate) struct PlanKey {
     colors: Vec<u32>,
     first_joint_color: u32,
     has_inertias: bool,
-    is_carried: bool,
+    is_long_enough: bool,
 }
 
 impl PlanKey {
     /// Becomes the key of `problem`; whether it was another one, so that its plan has to be made anew.
     pub fn update(&mut self, problem: &StepProblem, contacts_changed: bool) -> bool {
         let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
-        let known = (self.first_joint_color, self.has_inertias, self.is_carried);
+        let known = (self.first_joint_color, self.has_inertias, self.is_long_enough);
         let same = self.is_made && !contacts_changed && others == known && self.colors == problem.colors;
         self.is_made = true;
-        (self.first_joint_color, self.has_inertias, self.is_carried) = others;
+        (self.first_joint_color, self.has_inertias, self.is_long_enough) = others;
         self.colors.clone_from(&problem.colors);
         !same
     }

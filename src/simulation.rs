@@ -133,7 +133,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The next step of `dt` seconds as values, the problem and its plan. The run goes on as if nobody had asked.
+    /// The next step of `dt` seconds as values, the problem and its plan. The call changes nothing of the run.
     ///
     /// # Errors
     /// As [`Simulation::step`], the backend apart.

@@ -171,7 +171,7 @@ impl Sleep {
         }
     }
 
-    /// Wakes a body that somebody changed, or lets the next step wake what touches a body that never sleeps.
+    /// Wakes a body that the caller changed. A body that never sleeps wakes what touches it in the next step.
     pub fn disturb(&mut self, body: usize) {
         self.wake(body);
         if let Some(known) = self.known.get_mut(body) {

@@ -1,4 +1,4 @@
-//! Which name somebody meant who typed another.
+//! The known name that is nearest to one that is not known.
 
 use std::fmt::Display;
 

@@ -1,4 +1,4 @@
-//! Problems that anybody may have made are checked before threads or drivers rely on them.
+//! Problems from any source are checked before threads or drivers rely on them.
 
 use drystone::backend::CheckedStep;
 use drystone::plan::{Kernel, Pass};

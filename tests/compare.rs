@@ -100,11 +100,12 @@ fn whatever_a_backend_gives_back_is_compared() {
     problem.joint_impulses.push(JointImpulseRow::default());
     problem.params.joint_count = 1;
     problem.colors.extend([0, 1]);
-    let spoils: [fn(&mut StepProblem); 4] = [
+    let spoils: [fn(&mut StepProblem); 5] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
         |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),
         |problem| problem.joint_impulses[0].linear[1] = -0.0,
         |problem| problem.convergence.sweeps += 1,
+        |problem| problem.momentum.restarts += 1,
     ];
     let last = plan.passes.len() - 1;
     for spoil in spoils {

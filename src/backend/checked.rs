@@ -1,4 +1,4 @@
-//! The boundary between problems that anybody may have made and backends that rely on them.
+//! The boundary between problems from any source and the backends that rely on them.
 
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass};
@@ -43,18 +43,17 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
     let (contacts, joints) = (problem.contact_colors(), problem.joint_colors());
     for (i, Pass { kernel, colors }) in passes.iter().enumerate() {
         let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));
-        let known = match kernel {
-            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => &contacts,
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => &joints,
-            _ => &(0..0),
+        let (known, patch) = match kernel {
+            Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
+                (&contacts, Some(rules.patch))
+            }
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (&joints, None),
+            _ => (&(0..0), None),
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
             return refuse(format!("colors {colors:?}: there are {known:?}"));
         }
-        let over_contacts =
-            matches!(kernel, Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_));
-        let patch = kernel.rules().is_some_and(|rules| rules.patch);
-        if over_contacts && !problem.contacts.is_empty() && patch != problem.has_patches() {
+        if let Some(patch) = patch.filter(|patch| !problem.contacts.is_empty() && *patch != problem.has_patches()) {
             return refuse(format!("patch = {patch}: the contacts of this problem say otherwise"));
         }
     }

@@ -268,13 +268,13 @@ fn step_with_contacts(
     }
 }
 
-/// Worlds with fewer bodies are built before anybody wonders.
+/// Worlds with fewer bodies are built within a second.
 const MANY_BODIES: u64 = 200_000;
 
 /// Says that a world is built, where that takes a while.
 fn announce(scene: &str, parameters: &[String], worlds: usize) {
     let Some(entry) = CATALOGUE.iter().find(|e| e.name == scene) else { return };
-    // What is wrong with the parameters is said by who builds.
+    // `Scene::find_worlds` refuses wrong parameters.
     let bodies = entry.body_count(parameters).unwrap_or(0).saturating_mul(worlds as u64);
     // What does not fit is refused before anything is built.
     if bodies >= MANY_BODIES && memory::check(bodies as f64 * memory::BODY, scene).is_ok() {
@@ -375,11 +375,11 @@ fn arguments() -> Cli {
     })
 }
 
-/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 where
-/// somebody ended it.
+/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 after
+/// Ctrl-C.
 pub fn main() -> std::process::ExitCode {
     let cli = arguments();
-    // Files that are not finished go away; fails only if somebody else handles signals already.
+    // Ctrl-C removes unfinished files. The call fails only if the process handles signals already.
     let _ = ctrlc::set_handler(|| {
         files::discard_drafts();
         std::process::exit(130);

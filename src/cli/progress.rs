@@ -11,7 +11,7 @@ use super::say;
 /// Time between two lines where standard error is no terminal.
 const BETWEEN: Duration = Duration::from_secs(10);
 
-/// The unit of what is counted in nothing that a person knows.
+/// The unit of progress that is shown as a share of the whole.
 pub const PERCENT: &str = "%";
 
 /// How far something is.

@@ -176,7 +176,8 @@ impl Arena {
         }
     }
 
-    /// Ends the pairs whose boxes came apart or whose bodies a joint holds; the last pair takes an ended one's slot. Returns whether there were any.
+    /// Ends the pairs whose boxes came apart or whose bodies a joint holds; the last pair takes an ended one's slot. Returns
+    /// whether it ended any.
     fn drop_parted(&mut self, now: &Now) -> bool {
         let (mut slot, before) = (0, self.pairs.len());
         while slot < self.pairs.len() {

@@ -1,4 +1,4 @@
-//! Whether a problem that anybody may have made keeps what backends rely on.
+//! Whether a problem from any source keeps what backends rely on.
 
 use std::fmt::Display;
 use std::ops::Range;

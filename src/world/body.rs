@@ -90,10 +90,8 @@ impl MassProperties {
 
     /// Refuses what a dynamic body cannot have.
     pub(crate) fn check(&self) -> Result<()> {
-        let Self { mass, center, principal_inertia, principal_frame } = *self;
-        if !(center.is_finite() && principal_frame.is_finite()) {
-            return Err(Error::input(format!("center of mass = {center}, frame = {principal_frame}: must be finite")));
-        }
+        self.check_frame()?;
+        let Self { mass, principal_inertia, .. } = *self;
         let moments = principal_inertia.to_array();
         if !(Self::MASSES.contains(&mass)
             && moments.iter().all(|i| Self::MOMENTS.contains(i))
@@ -105,6 +103,17 @@ impl MassProperties {
             )));
         }
         Ok(())
+    }
+
+    /// Refuses what no body can have: a center that is no place, a frame that is no rotation.
+    fn check_frame(&self) -> Result<()> {
+        let Self { center, principal_frame, .. } = *self;
+        if is_place(center) && is_rotation(principal_frame) {
+            return Ok(());
+        }
+        Err(Error::input(format!(
+            "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
+        )))
     }
 
     /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.
@@ -383,16 +392,7 @@ impl Body {
                 "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
             ));
         }
-        let MassProperties { center, principal_frame, .. } = self.mass;
-        if !is_place(center) || !is_rotation(principal_frame) {
-            return refuse(format!(
-                "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
-            ));
-        }
-        if self.kind == BodyKind::Dynamic {
-            self.mass.check()?;
-        }
-        Ok(())
+        if self.kind == BodyKind::Dynamic { self.mass.check() } else { self.mass.check_frame() }
     }
 
     /// Whether pose and velocity are finite.
