@@ -12,14 +12,12 @@ fn main() -> Result<()> {
     for _ in 0..300 {
         simulation.step(scene.dt)?;
     }
-    for pair in simulation.pairs() {
-        for manifold in &pair.manifolds {
-            println!("body {} on body {}, normal {:.2}", pair.body_b, pair.body_a, manifold.normal);
-            for point in manifold.points() {
-                // Impulses are those of the last substep: over its length they are forces.
-                let force = point.normal_impulse / substep;
-                println!("    {:.3} mm apart, {force:.0} N", point.separation * 1e3);
-            }
+    for manifold in simulation.manifolds() {
+        println!("body {} on body {}, normal {:.2}", manifold.body_b, manifold.body_a, manifold.normal);
+        for point in manifold.points() {
+            // Impulses are those of the last substep: over its length they are forces.
+            let force = point.normal_impulse / substep;
+            println!("    {:.3} mm apart, {force:.0} N", point.separation * 1e3);
         }
     }
     Ok(())

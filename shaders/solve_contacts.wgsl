@@ -21,8 +21,8 @@ fn solve_contact(i: u32) {
 fn solve_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let converged = is_converged();
     for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
-            if !converged { solve_contact(i); }
+        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
+            if !converged { solve_contact(colors[at]); }
         }
         storageBarrier();
     }

@@ -35,8 +35,8 @@ fn solve_joint(i: u32) {
 fn solve_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let converged = is_converged();
     for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
-            if !converged { solve_joint(i); }
+        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
+            if !converged { solve_joint(colors[at]); }
         }
         storageBarrier();
     }

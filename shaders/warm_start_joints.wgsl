@@ -14,8 +14,8 @@ fn warm_start_joint(i: u32) {
 @compute @workgroup_size(WORKGROUP)
 fn warm_start_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var i = colors[color] + id.x; i < colors[color + 1u]; i += groups.x * WORKGROUP) {
-            warm_start_joint(i);
+        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
+            warm_start_joint(colors[at]);
         }
         storageBarrier();
     }

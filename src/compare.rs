@@ -178,7 +178,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 13] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 14] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -188,6 +188,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 13] {
         contacts,
         points,
         impulses,
+        order,
         colors,
         first_joint_color,
         joints,
@@ -203,6 +204,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 13] {
         ("contacts", bytemuck::cast_slice(contacts)),
         ("points", bytemuck::cast_slice(points)),
         ("impulses", bytemuck::cast_slice(impulses)),
+        ("order", bytemuck::cast_slice(order)),
         ("colors", bytemuck::cast_slice(colors)),
         ("first_joint_color", bytemuck::bytes_of(first_joint_color)),
         ("joints", bytemuck::cast_slice(joints)),

@@ -17,8 +17,8 @@ pub struct Edge {
     pub b: u32,
     /// Its color among those of its kind; none if it is new, or found none.
     pub color: Option<u8>,
-    /// New ones choose in the order of their ranks, then of their places.
-    pub rank: u32,
+    /// New ones choose in the order of their ranks, then of their indices.
+    pub rank: u64,
 }
 
 impl Edge {
@@ -27,7 +27,7 @@ impl Edge {
     }
 }
 
-/// The constraints in the order in which they are swept.
+/// The constraints that take part, in the order in which they are swept.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Coloring {
     /// Indices of the edges, color by color.
@@ -53,25 +53,38 @@ pub struct ConstraintGraph {
 }
 
 impl ConstraintGraph {
-    /// Gives every edge a color among at most `max_colors` (1 to 64) a kind, and lays them out for sweeping.
+    /// Gives every edge a color; see [`Self::color_members`].
     pub fn color(&mut self, body_count: usize, edges: &mut [Edge], max_colors: u32) -> Coloring {
+        let members: Vec<u32> = (0..edges.len() as u32).collect();
+        self.color_members(body_count, edges, &members, max_colors)
+    }
+
+    /// Gives the edges that take part, `members` by their indices, a color each among at most `max_colors` (1 to 64) a kind, and lays
+    /// them out for sweeping. An edge that takes no part keeps the color that it had, and holds it for nobody.
+    pub fn color_members(
+        &mut self,
+        body_count: usize,
+        edges: &mut [Edge],
+        members: &[u32],
+        max_colors: u32,
+    ) -> Coloring {
         let available = if max_colors >= 64 { u64::MAX } else { (1 << max_colors) - 1 };
         for used in &mut self.used {
             used.clear();
             used.resize(body_count, 0);
         }
-        // Those that have a color keep it, and so take their place first.
-        for edge in edges.iter_mut() {
-            if let Some(color) = edge.color {
-                if color < 64 && self.free(edge) & available & (1 << color) != 0 {
-                    self.take(edge, color);
-                } else {
+        // Edges that have a color keep it, and so take their place first.
+        let mut new = Vec::new();
+        for &i in members {
+            let edge = &mut edges[i as usize];
+            match edge.color {
+                Some(color) if color < 64 && self.free(edge) & available & (1 << color) != 0 => self.take(edge, color),
+                _ => {
                     edge.color = None;
+                    new.push(i);
                 }
             }
         }
-        let is_new = |&i: &u32| edges[i as usize].color.is_none();
-        let mut new: Vec<u32> = (0..edges.len() as u32).filter(is_new).collect();
         new.sort_unstable_by_key(|&i| (edges[i as usize].rank, i));
         for i in new {
             let edge = &mut edges[i as usize];
@@ -82,7 +95,7 @@ impl ConstraintGraph {
                 self.take(edge, color);
             }
         }
-        lay_out(edges)
+        lay_out(edges, members)
     }
 
     /// Colors in which neither body is.
@@ -133,13 +146,16 @@ impl Islands {
     }
 }
 
-/// Sorts the edges by color: movable ones, their overflow, those with fixed bodies, their overflow.
-fn lay_out(edges: &[Edge]) -> Coloring {
+/// Sorts the members by color: movable ones, their overflow, those with fixed bodies, their overflow.
+fn lay_out(edges: &[Edge], members: &[u32]) -> Coloring {
     // 64 colors and one bucket for the overflow, twice.
-    let bucket = |e: &Edge| 65 * usize::from(e.is_fixed()) + e.color.map_or(64, usize::from);
+    let bucket = |i: u32| {
+        let edge = &edges[i as usize];
+        65 * usize::from(edge.is_fixed()) + edge.color.map_or(64, usize::from)
+    };
     let mut begins = [0_u32; 131];
-    for edge in edges {
-        begins[bucket(edge) + 1] += 1;
+    for &i in members {
+        begins[bucket(i) + 1] += 1;
     }
     for i in 0..130 {
         begins[i + 1] += begins[i];
@@ -157,12 +173,12 @@ fn lay_out(edges: &[Edge]) -> Coloring {
             offsets.push(begins[i]);
         }
     }
-    offsets.push(edges.len() as u32);
-    let mut order = vec![0; edges.len()];
+    offsets.push(members.len() as u32);
+    let mut order = vec![0; members.len()];
     let mut next = begins;
-    for (i, edge) in edges.iter().enumerate() {
-        let place = &mut next[bucket(edge)];
-        order[*place as usize] = i as u32;
+    for &i in members {
+        let place = &mut next[bucket(i)];
+        order[*place as usize] = i;
         *place += 1;
     }
     Coloring { order, offsets, overflow }

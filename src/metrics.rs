@@ -1,6 +1,6 @@
 //! What a run got wrong: penetration, speed and what fell, in f64.
 
-use crate::collide::{Detector, Pair};
+use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::stats::largest;
 use crate::world::{Body, BodyKind, World};
@@ -20,14 +20,15 @@ impl Penetration {
     /// Of a world as it is, from contacts computed anew; `config` says how near counts as contact.
     pub fn of_world(world: &World, config: &SolverConfig) -> Self {
         let mut detector = Detector::new(world);
-        detector.detect(world, config, 0.0, &[], &|_| ());
-        Self::of(detector.pairs())
+        detector.detect(world, config, 0.0, &[]);
+        let manifolds = detector.pairs().flat_map(|pair| &pair.manifolds);
+        Self::of(manifolds.map(|manifold| manifold.points().iter().map(|point| point.separation)))
     }
 
-    /// Of the manifolds of `pairs`; a manifold that is apart counts as zero.
-    pub fn of<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> Self {
-        let deepest = |m: &crate::collide::Manifold| largest(0.0, m.points().iter().map(|p| f64::from(-p.separation)));
-        let mut depths: Vec<f64> = pairs.into_iter().flat_map(|p| &p.manifolds).map(deepest).collect();
+    /// Of the separations (m) of the points of each manifold; a manifold that is apart counts as zero.
+    pub fn of<Points: Iterator<Item = f32>>(manifolds: impl IntoIterator<Item = Points>) -> Self {
+        let deepest = |points: Points| largest(0.0, points.map(|separation| f64::from(-separation)));
+        let mut depths: Vec<f64> = manifolds.into_iter().map(deepest).collect();
         // NaN sorts last, so that it spoils the largest.
         depths.sort_by(f64::total_cmp);
         let max = depths.last().copied().unwrap_or(0.0);

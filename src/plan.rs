@@ -25,7 +25,7 @@ pub enum Kernel {
     },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic,
-    /// Forgets impulses; over points.
+    /// Forgets impulses; over contact colors, all at once.
     ClearImpulses,
     /// Impulses that the joints carry; over joint colors.
     WarmStartJoints,
@@ -147,9 +147,8 @@ pub struct StepPlan {
 }
 
 /// What a plan was made for, besides the settings and what is in the rows of contacts.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PlanKey {
-    is_made: bool,
     colors: Vec<u32>,
     first_joint_color: u32,
     has_inertias: bool,
@@ -157,15 +156,14 @@ pub(crate) struct PlanKey {
 }
 
 impl PlanKey {
-    /// Becomes the key of `problem`; whether it was another one, so that its plan has to be made anew.
-    pub fn update(&mut self, problem: &StepProblem, contacts_changed: bool) -> bool {
-        let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
-        let known = (self.first_joint_color, self.has_inertias, self.is_long_enough);
-        let same = self.is_made && !contacts_changed && others == known && self.colors == problem.colors;
-        self.is_made = true;
-        (self.first_joint_color, self.has_inertias, self.is_long_enough) = others;
-        self.colors.clone_from(&problem.colors);
-        !same
+    /// That of the plan of a problem.
+    pub fn of(problem: &StepProblem) -> Self {
+        Self {
+            colors: problem.colors.clone(),
+            first_joint_color: problem.first_joint_color,
+            has_inertias: !problem.inertias.is_empty(),
+            is_long_enough: is_long_enough(problem),
+        }
     }
 }
 
@@ -226,8 +224,8 @@ impl StepPlan {
                 // Done already.
             } else if shared.accumulated {
                 plan.over_colors(Kernel::WarmStart(shared.of_warm_start()), &contacts);
-            } else {
-                plan.over_bodies(Kernel::ClearImpulses);
+            } else if !problem.contact_colors().is_empty() {
+                plan.passes.push(Pass { kernel: Kernel::ClearImpulses, colors: problem.contact_colors() });
             }
             plan.sweeps(sweeps(config.iterations), biased);
             plan.over_bodies(Kernel::IntegratePositions);
@@ -297,13 +295,24 @@ impl StepPlan {
 
     /// Bytes that the kernels read and write when every row that a thread names is moved once.
     pub fn bytes_moved(&self, problem: &StepProblem) -> u64 {
-        self.passes.iter().map(|p| p.bytes_moved(problem)).sum()
+        self.bytes_of_passes(problem).sum()
+    }
+
+    /// The same, pass by pass.
+    pub fn bytes_of_passes(&self, problem: &StepProblem) -> impl Iterator<Item = u64> {
+        // Points of the contacts before each place in the order.
+        let mut points = vec![0];
+        points.extend(problem.swept_contacts().scan(0, |sum, contact| {
+            *sum += contact.point_count as usize;
+            Some(*sum)
+        }));
+        self.passes.iter().map(move |pass| pass.bytes_moved(problem, &points))
     }
 }
 
 impl Pass {
-    /// Bytes that this pass reads and writes.
-    pub fn bytes_moved(&self, problem: &StepProblem) -> u64 {
+    /// Bytes that this pass reads and writes; `points` are those of the contacts before each place in the order.
+    fn bytes_moved(&self, problem: &StepProblem, points: &[usize]) -> u64 {
         const BODY: usize = size_of::<BodyRow>();
         const MASS: usize = size_of::<MassRow>();
         // Velocities are the half of a body that a sweep writes.
@@ -311,6 +320,10 @@ impl Pass {
         const PAIR: usize = 2 * (BODY + MASS + VELOCITIES);
         const IMPULSE: usize = size_of::<ImpulseRow>();
         let rows = problem.rows_of(&self.colors);
+        let points_of = |colors: &Range<u32>| {
+            let [first, end] = [colors.start, colors.end].map(|color| points[problem.colors[color as usize] as usize]);
+            end - first
+        };
         let bytes = match self.kernel {
             Kernel::IntegrateVelocities { carry } => {
                 problem.bodies.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
@@ -319,7 +332,6 @@ impl Pass {
             Kernel::IntegrateGyroscopic => {
                 problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
             }
-            Kernel::ClearImpulses => problem.impulses.len() * 2 * IMPULSE,
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
@@ -327,8 +339,12 @@ impl Pass {
             Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<StepLength<f32>>(),
             Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::ClearImpulses => {
+                let patches = if problem.has_patches() { rows.len() } else { 0 };
+                (points_of(&self.colors) + patches) * 2 * IMPULSE
+            }
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
-                let (contacts, points) = (rows.len(), problem.point_count(rows));
+                let (contacts, points) = (rows.len(), points_of(&self.colors));
                 let patches = if rules.patch { contacts } else { 0 };
                 let writes = !matches!(self.kernel, Kernel::WarmStart(_));
                 let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };

@@ -1,10 +1,10 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod manifolds;
 mod stages;
 
 use crate::backend::cpu::Reference;
 use crate::backend::{Backend, CheckedStep};
-use crate::collide::Pair;
 use crate::config::{SolverConfig, check_step_length};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
@@ -14,6 +14,8 @@ use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
 use stages::Stages;
+
+pub use manifolds::{SolvedManifold, SolvedPoint};
 
 /// A world that moves.
 ///
@@ -94,7 +96,7 @@ impl Simulation {
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         check_step_length(dt)?;
         let changes = timed(&mut stats.times.detect, || self.stages.changes(&self.world, &self.config, dt))?;
-        if changes.rows {
+        if changes.all_rows() || self.stages.prepared.are_slots_unsorted() {
             self.leave_device();
         }
         self.stages.follow(&self.world, &self.config, dt, changes);
@@ -121,11 +123,7 @@ impl Simulation {
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
-        let store = &mut stats.times.store;
-        if timed(store, || stages.store(&mut self.world, dt)) {
-            // The impulses of sleeping bodies are stored in their manifolds.
-            timed(store, || self.fetch());
-        }
+        timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
@@ -179,22 +177,21 @@ impl Simulation {
         Penetration::of_world(&self.world, &self.config)
     }
 
-    /// Contacts and impulses of the last step.
-    pub fn pairs(&mut self) -> impl Iterator<Item = &Pair> + Clone {
-        self.world_and_pairs().1
+    /// What touched in the last step, with the impulses that the step left.
+    pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
+        self.fetch();
+        manifolds::of(&self.stages.detector, &self.stages.prepared, &self.stages.problem)
     }
 
-    /// The bodies, and contacts and impulses of the last step.
-    pub fn world_and_pairs(&mut self) -> (&World, impl Iterator<Item = &Pair> + Clone) {
-        self.fetch();
-        let Stages { detector, prepared, problem, .. } = &mut self.stages;
-        detector.pairs_mut().flatten().for_each(|pair| prepared.give_back(problem, pair));
-        (&self.world, self.stages.detector.pairs())
+    /// Overlap when the last step began, from the contacts that it went by.
+    pub fn solved_penetration(&mut self) -> Penetration {
+        let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
+        Penetration::of(self.manifolds().map(separations))
     }
 
     /// Impulse of each joint of the world on its body b, in the last substep, world axes (N s).
-    pub fn joint_impulses(&self) -> &[glam::Vec3] {
-        self.stages.prepared.joint_impulses()
+    pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
+        self.stages.problem.joint_impulses.iter().map(|row| row.linear.into()).collect()
     }
 
     /// Changes the settings from the next step on.
@@ -203,11 +200,7 @@ impl Simulation {
     /// One is out of range or contradicts another; they are then as they were.
     pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
         config.check()?;
-        if config != self.config {
-            self.leave_device();
-            self.stages.change_settings(&self.world, &self.config, &config);
-            self.config = config;
-        }
+        self.config = config;
         Ok(())
     }
 

@@ -147,7 +147,7 @@ impl Sleep {
     pub fn wake_touched(&mut self, detector: &Detector) -> bool {
         let before = self.count;
         if before > 0 && self.activity.iter().any(|a| *a != Activity::Still) {
-            for pair in detector.pairs().filter(|p| !p.manifolds.is_empty()) {
+            for pair in detector.pairs().filter(|p| p.is_touching()) {
                 let [a, b] = [pair.body_a as usize, pair.body_b as usize];
                 for (one, other) in [(a, b), (b, a)] {
                     if self.asleep[one] && self.activity[other] != Activity::Still {
@@ -180,9 +180,8 @@ impl Sleep {
         }
     }
 
-    /// Notes who was slow in a step of `dt` seconds, and lets islands fall asleep that were for long enough. Returns whether
-    /// any did.
-    pub fn after_step(&mut self, world: &mut World, detector: &Detector, dt: f32) -> bool {
+    /// Notes which bodies were slow in a step of `dt` seconds, and lets islands fall asleep that were slow for long enough.
+    pub fn after_step(&mut self, world: &mut World, detector: &Detector, dt: f32) {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
             if body.kind != BodyKind::Dynamic {
@@ -194,11 +193,9 @@ impl Sleep {
             }
         }
         self.steps += 1;
-        let before = self.count;
         if ready && self.steps.is_multiple_of(EVERY) {
             self.let_islands_sleep(world, detector);
         }
-        self.count > before
     }
 
     fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector) {
@@ -208,7 +205,7 @@ impl Sleep {
         let mut driven = vec![false; self.asleep.len()];
         self.islands.reset(self.asleep.len());
         let touching =
-            detector.pairs().filter(|p| !p.manifolds.is_empty()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
+            detector.pairs().filter(|p| p.is_touching()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
         let joined = world.joints.iter().map(|j| (j.body_a, j.body_b));
         for (a, b) in touching.chain(joined) {
             for (one, other) in [(Some(a), b), (b, Some(a))] {

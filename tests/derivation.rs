@@ -78,7 +78,7 @@ impl Case {
         let point = Point { r_a: lane(self.r[0]), r_b: lane(self.r[1]), separation: 0.125, ..Point::default() };
         let contact = Contact { normal: lane(self.normal), ..Contact::default() };
         let movement = normal_movement(Rules::default(), pair, &contact);
-        current_separation(&movement, &point)
+        current_separation(&movement, &contact, &point)
     }
 }
 

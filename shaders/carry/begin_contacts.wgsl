@@ -1,6 +1,6 @@
-// begin_contacts: one thread lets one manifold begin a step: how far its points are apart now, less its preload, which follows
-// from the impulses that it carries. Reads separations, masses. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::write in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
+// begin_contacts: one thread lets one manifold begin a step: how far its points are apart now, and its preload, which follows
+// from the impulses that it carries. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
+// Doubles: Writer::write_slot in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
 
 fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = select(carry.preload.fixed_compliance, carry.preload.movable_compliance, both_movable);
@@ -9,7 +9,8 @@ fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     return smaller(before + carry.preload.share * (sag - before), 2.0 * sag);
 }
 
-fn begin_contact(i: u32) {
+fn begin_contact(at: u32) {
+    let i = colors[carry.order + at];
     let contact = contacts[i];
     let end = contact.first_point + contact.point_count;
     let both_movable = masses[contact.body_a].inv_mass > 0.0 && masses[contact.body_b].inv_mass > 0.0;
@@ -19,9 +20,10 @@ fn begin_contact(i: u32) {
         pressed += impulses[k].normal;
         mass += points[k].normal_mass;
     }
-    let preload = preloaded(contact.preload, both_movable, pressed, mass);
-    contacts[i].preload = preload;
-    for (var k = contact.first_point; k < end; k++) { points[k].separation = separations[k] - preload; }
+    contacts[i].preload = preloaded(contact.preload, both_movable, pressed, mass);
+    for (var k = 0u; k < contact.point_count; k++) {
+        points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
+    }
     for (var k = contact.first_point; k < end + carry.patches; k++) {
         if carry.preload.warm_start == 1u {
             impulses[k].peak = 0.0;
@@ -33,5 +35,5 @@ fn begin_contact(i: u32) {
 
 @compute @workgroup_size(WORKGROUP)
 fn begin_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var i = id.x; i < carry.contact_count; i += groups.x * WORKGROUP) { begin_contact(i); }
+    for (var at = id.x; at < carry.contact_count; at += groups.x * WORKGROUP) { begin_contact(at); }
 }

@@ -17,9 +17,9 @@ fn normal_movement(pair: ptr<function, Pair>, contact: Contact) -> NormalMovemen
     return NormalMovement(shift, turn_a, turn_b);
 }
 
-// Separation now: what it was when the step began, and what the bodies moved since.
-fn current_separation(movement: NormalMovement, point: Point) -> f32 {
-    return point.separation + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
+// What the contact answers to: the separation when the step began, less the preload, and what the bodies moved since.
+fn current_separation(movement: NormalMovement, contact: Contact, point: Point) -> f32 {
+    return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }
 
 fn pair_softness(pair: ptr<function, Pair>) -> Softness {
@@ -34,7 +34,7 @@ fn clamp_normal(sum: f32, correction: f32) -> f32 {
 }
 
 fn solve_normal(pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
-    let s = current_separation(movement, point);
+    let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, 0.0), -softness.push_limit);

@@ -45,8 +45,9 @@ struct Params {
     fixed: Softness,
     joint: Softness,
     body_count: u32, point_count: u32, slop: f32, relaxation: f32,
-    tolerance: f32, joint_count: u32,
+    tolerance: f32, joint_count: u32, patches: u32,
 }
 
-// The colors that one dispatch sweeps, one after another.
+// The colors that one dispatch sweeps, one after another. `colors` holds where each begins, and where the last ends, in itself; and there
+// the rows of the contacts, or joints, that are in it.
 struct PassColors { first: u32, end: u32 }

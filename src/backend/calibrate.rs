@@ -74,6 +74,7 @@ fn pile(side: u32) -> StepProblem {
     };
     let substep = 1.0 / 480.0;
     let soft = Softness { bias_rate: 30.0, mass_scale: 0.9, impulse_scale: 0.1, push_limit: 3.0 };
+    let mut colors = vec![0];
     let mut problem = StepProblem {
         bodies: vec![BodyRow::AT_REST; count],
         masses: vec![mass; count],
@@ -86,7 +87,6 @@ fn pile(side: u32) -> StepProblem {
             relaxation: 1.0,
             ..Params::default()
         },
-        colors: vec![0],
         ..StepProblem::default()
     };
     // Every other contact along an axis: no body twice.
@@ -113,10 +113,11 @@ fn pile(side: u32) -> StepProblem {
                     problem.points.push(PointRow { r_a: r_a.to_array(), r_b: r_b.to_array(), ..masses });
                 }
             }
-            problem.colors.push(problem.contacts.len() as u32);
+            colors.push(problem.contacts.len() as u32);
         }
     }
-    problem.first_joint_color = problem.colors.len() as u32;
+    problem.sweep_in_order_of_rows();
+    (problem.first_joint_color, problem.colors) = (colors.len() as u32 - 1, colors);
     problem.params.point_count = problem.points.len() as u32;
     problem.impulses = vec![ImpulseRow::default(); problem.points.len()];
     problem
@@ -207,8 +208,8 @@ mod tests {
         assert_eq!((pile.bodies.len(), pile.contacts.len(), pile.points.len()), (216, 540, 2160));
         for color in pile.contact_colors() {
             let mut seen = std::collections::HashSet::new();
-            let own = &pile.contacts[pile.rows_of(&(color..color + 1))];
-            assert!(own.iter().all(|c| seen.insert(c.body_a) && seen.insert(c.body_b)), "color {color}");
+            let own = pile.rows_of(&(color..color + 1)).iter().map(|&row| &pile.contacts[row as usize]);
+            assert!(own.into_iter().all(|c| seen.insert(c.body_a) && seen.insert(c.body_b)), "color {color}");
         }
         let plan = StepPlan::new(&SolverConfig::default(), &pile);
         let after = |backend: &mut dyn Backend| {

@@ -47,6 +47,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 (&contacts, Some(rules.patch))
             }
+            Kernel::ClearImpulses => (&contacts, None),
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (&joints, None),
             _ => (&(0..0), None),
         };

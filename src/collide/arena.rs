@@ -9,7 +9,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
 use super::narrow::{ColliderInfo, FARTHEST, Margins, Moving, Pair, Scratch, Update};
-use super::{Activity, DetectStats};
+use super::{Activity, Change, DetectStats, NO_SLOT};
 use crate::world::BodyKind;
 
 /// What all worlds are told about one detection; bodies are counted over all of them.
@@ -39,8 +39,18 @@ pub(super) struct Arena {
     pub pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
+    /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`Arena::take_changes`] last told of them.
+    ended: Vec<u32>,
+    changed: Vec<Changed>,
     /// Whether other pairs may meet than before, so that all are looked for.
     look_again: bool,
+}
+
+/// A pair, by its place, that is not as it was.
+#[derive(Clone, Copy)]
+struct Changed {
+    pair: u32,
+    computed: bool,
 }
 
 /// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
@@ -60,6 +70,8 @@ impl Arena {
             pairs: Vec::new(),
             slots: HashMap::default(),
             found: Vec::new(),
+            ended: Vec::new(),
+            changed: Vec::new(),
             look_again: false,
         }
     }
@@ -74,10 +86,20 @@ impl Arena {
         self.look_again = true;
     }
 
+    /// Tells what changed since the last call; this is the arena number `world`.
+    pub fn take_changes(&mut self, world: u32, tell: &mut dyn FnMut(Change)) {
+        self.ended.drain(..).for_each(|slot| tell(Change::Ended(slot)));
+        for Changed { pair: i, computed } in self.changed.drain(..) {
+            if let Some(pair) = self.pairs.get_mut(i as usize) {
+                tell(Change::Pair { place: [world, i], pair, computed });
+            }
+        }
+    }
+
     /// Brings the pairs to where the bodies are.
-    pub fn detect(&mut self, now: &Now, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+    pub fn detect(&mut self, now: &Now) -> DetectStats {
         let parted = self.broad_phase(now);
-        let stats = self.narrow_phase(now, give_back);
+        let stats = self.narrow_phase(now);
         DetectStats { reshaped: stats.reshaped | parted, ..stats }
     }
 
@@ -188,9 +210,11 @@ impl Arena {
                 continue;
             }
             self.slots.remove(&key(pair.collider_a, pair.collider_b));
-            self.pairs.swap_remove(slot);
+            let ended = self.pairs.swap_remove(slot);
+            self.ended.extend(ended.manifolds.iter().map(|m| m.slot).filter(|&slot| slot != NO_SLOT));
             if let Some(moved) = self.pairs.get(slot) {
                 self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
+                self.changed.push(Changed { pair: slot as u32, computed: false });
             }
         }
         self.pairs.len() < before
@@ -216,36 +240,33 @@ impl Arena {
         }
     }
 
-    fn narrow_phase(&mut self, now: &Now, give_back: &(dyn Fn(&mut Pair) + Sync)) -> DetectStats {
+    fn narrow_phase(&mut self, now: &Now) -> DetectStats {
         let (colliders, moving, margins) = (&self.colliders, now.moving, now.margins);
-        let update = |scratch: &mut Scratch, pair: &mut Pair| {
+        let update = |scratch: &mut Scratch, (i, pair): (usize, &mut Pair)| {
             let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
             let of = |body: u32| now.activity.get(body as usize).copied().unwrap_or(Activity::Awake);
             let both = [of(pair.body_a), of(pair.body_b)];
-            // What a pair has belongs to its manifolds while it takes no part, and to their rows while it does.
-            let takes_part = both.contains(&Activity::Awake);
-            let changes = pair.rests == takes_part;
-            if changes && !takes_part {
-                give_back(pair);
-                pair.forget_rows();
-            }
             let mut update = Update::Reused;
             if both != [Activity::Still; 2] {
-                update = pair.update(colliders, a, b, margins, scratch, give_back);
+                update = pair.update(colliders, a, b, margins, scratch);
             }
-            if changes && takes_part {
-                pair.computed_in = margins.detection;
-            }
-            pair.rests = !takes_part;
-            if changes && !pair.manifolds.is_empty() {
-                update = Update::Reshaped;
-            }
-            (usize::from(update != Update::Reused), update == Update::Reshaped)
+            let computed = update != Update::Reused;
+            let takes_part = both.contains(&Activity::Awake);
+            let changes = pair.takes_part != takes_part;
+            pair.takes_part = takes_part;
+            let changed = Changed { pair: i as u32, computed };
+            let reshaped = update == Update::Reshaped || changes && pair.is_touching();
+            (computed || changes).then_some((changed, reshaped))
         };
-        let both = |x: (usize, bool), y: (usize, bool)| (x.0 + y.0, x.1 | y.1);
-        let updates = self.pairs.par_iter_mut().with_min_len(64).map_init(Scratch::default, update);
-        let (computed, reshaped) = updates.reduce(|| (0, false), both);
-        DetectStats { pairs: self.pairs.len(), computed, reshaped }
+        let pairs = self.pairs.par_iter_mut().enumerate().with_min_len(64);
+        let updates: Vec<_> = pairs.map_init(Scratch::default, update).flatten_iter().collect();
+        let mut stats = DetectStats { pairs: self.pairs.len(), ..DetectStats::default() };
+        for (changed, reshaped) in updates {
+            stats.computed += usize::from(changed.computed);
+            stats.reshaped |= reshaped;
+            self.changed.push(changed);
+        }
+        stats
     }
 }
 

@@ -16,21 +16,18 @@ pub struct ManifoldPoint {
     pub r_a: Vec3,
     /// From the centre of mass of b to that point (m).
     pub r_b: Vec3,
-    /// Distance along the normal now, negative when overlapping (m).
+    /// Distance along the normal when the manifold was computed, negative when overlapping (m).
     pub separation: f32,
-    /// The same when the manifold was computed.
-    pub(crate) computed_separation: f32,
     /// parry's features of a and b; 0 if unknown.
     pub features: u64,
-    /// Normal impulse of the last substep (N s).
-    pub normal_impulse: f32,
-    /// Friction impulse on b of the last substep, world axes (N s).
-    pub friction_impulse: Vec3,
-    /// Its row in the last step, if it had one. Written by `problem`.
-    pub(crate) row_before: Option<u32>,
+    /// Which point of the manifold before it is the same point; none if it is new.
+    pub before: Option<u8>,
 }
 
-/// The contact of two bodies over one pair of convex parts.
+/// The slot of a manifold that has none yet.
+pub const NO_SLOT: u32 = u32::MAX;
+
+/// The contact of two bodies over one pair of convex parts: where they touch. A manifold without points has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifold {
     /// Unit normal from a to b, world axes.
@@ -41,16 +38,9 @@ pub struct Manifold {
     pub radius_a: f32,
     /// Radius of curvature of b's surface where it touches (m).
     pub radius_b: f32,
-    /// Impulse of the twist about the normal, with friction per manifold (N m s).
-    pub twist_impulse: f32,
-    /// Friction impulse on b, with friction per manifold, world axes (N s).
-    pub friction_impulse: Vec3,
-    /// How far the springs of its soft contacts are compressed while the surfaces just touch (m).
-    pub preload: f32,
-    /// Color in the constraint graph; none until it has been given one.
-    pub color: Option<u8>,
-    /// Its row in the last step, if it had one. Written by `problem`.
-    pub(crate) row_before: Option<u32>,
+    /// Where its rows are as long as it lasts, [`NO_SLOT`] until it has been given some. It goes on to the manifold that is computed
+    /// in place of this one.
+    pub slot: u32,
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
 }
@@ -65,11 +55,7 @@ impl Manifold {
             parts,
             radius_a: 0.0,
             radius_b: 0.0,
-            twist_impulse: 0.0,
-            friction_impulse: Vec3::ZERO,
-            preload: 0.0,
-            color: None,
-            row_before: None,
+            slot: NO_SLOT,
             points,
             count: count as u8,
         }
@@ -80,48 +66,26 @@ impl Manifold {
         &self.points[..self.count as usize]
     }
 
-    /// Its points, to write impulses and separations into.
-    pub fn points_mut(&mut self) -> &mut [ManifoldPoint] {
-        &mut self.points[..self.count as usize]
+    /// Ends: no point is left, and the slot is free for another manifold.
+    pub(super) fn end(&mut self) {
+        self.count = 0;
     }
 
-    /// Forgets where its rows were.
-    pub(super) fn forget_rows(&mut self) {
-        self.row_before = None;
-        self.points.iter_mut().for_each(|point| point.row_before = None);
+    /// Whether it has ended.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.count == 0
     }
 
-    /// Makes all impulses `impulses` times as large, and the preload `preload` times.
-    pub(crate) fn rescale(&mut self, impulses: f32, preload: f32) {
-        self.preload *= preload;
-        self.twist_impulse *= impulses;
-        self.friction_impulse *= impulses;
-        for point in self.points_mut() {
-            point.normal_impulse *= impulses;
-            point.friction_impulse *= impulses;
-        }
-    }
-
-    /// Forgets the impulses of friction.
-    pub(crate) fn forget_friction(&mut self) {
-        (self.twist_impulse, self.friction_impulse) = (0.0, Vec3::ZERO);
-        self.points_mut().iter_mut().for_each(|point| point.friction_impulse = Vec3::ZERO);
-    }
-
-    /// Takes over color and impulses of the same contact one step earlier: points match by feature and, where that
-    /// fails (two aligned boxes whose offset changes sign share no feature), by nearness within `distance` (m).
-    pub(super) fn inherit(&mut self, old: &Self, distance: f32) {
-        self.color = old.color;
-        self.twist_impulse = old.twist_impulse;
-        self.friction_impulse = old.friction_impulse;
-        self.preload = old.preload;
-        self.row_before = old.row_before;
+    /// Takes over the slot of the same contact one step earlier: points match by feature and, where that fails (two aligned boxes
+    /// whose offset changes sign share no feature), by nearness within `distance` (m).
+    pub(super) fn succeed(&mut self, old: &Self, distance: f32) {
+        self.slot = old.slot;
         let mut taken = [false; MAX_POINTS];
         let mut matched = [false; MAX_POINTS];
         for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
             let same = |o: &ManifoldPoint| o.features == point.features && point.features != 0;
             if let Some(j) = (0..old.points().len()).find(|&j| !taken[j] && same(&old.points[j])) {
-                point.take_impulses(&old.points[j]);
+                point.before = Some(j as u8);
                 (taken[j], matched[i]) = (true, true);
             }
         }
@@ -136,18 +100,10 @@ impl Manifold {
             let free = (0..old.points().len()).filter(|&j| !taken[j]);
             let nearest = free.map(|j| (apart(&old.points[j]), j)).min_by(|x, y| x.0.total_cmp(&y.0));
             if let Some((_, j)) = nearest.filter(|n| n.0 <= distance * distance) {
-                point.take_impulses(&old.points[j]);
+                point.before = Some(j as u8);
                 taken[j] = true;
             }
         }
-    }
-}
-
-impl ManifoldPoint {
-    fn take_impulses(&mut self, old: &Self) {
-        self.normal_impulse = old.normal_impulse;
-        self.friction_impulse = old.friction_impulse;
-        self.row_before = old.row_before;
     }
 }
 
@@ -204,6 +160,10 @@ mod tests {
         ManifoldPoint { anchor_a: at, anchor_b: at, r_a: at, separation, ..Default::default() }
     }
 
+    fn before(manifold: &Manifold) -> Vec<Option<u8>> {
+        manifold.points().iter().map(|p| p.before).collect()
+    }
+
     fn octagon() -> Vec<ManifoldPoint> {
         let corner = |i: i32| {
             let (s, c) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
@@ -242,31 +202,23 @@ mod tests {
     #[test]
     fn points_match_by_feature_then_by_position_and_never_twice() {
         let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0), point(1.0, 0.0, 0.0)]);
-        old.points_mut()[0].features = 7;
-        old.points_mut()[0].normal_impulse = 3.0;
-        old.points_mut()[1].normal_impulse = 5.0;
+        old.points[0].features = 7;
         // The first moved far but kept its feature, the second kept its place, the third is new.
         let mut moved = [point(0.5, 0.0, 0.0), point(1.001, 0.0, 0.0), point(1.002, 0.0, 0.0)];
         moved[0].features = 7;
         let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);
-        new.inherit(&old, 0.01);
-        let impulses: Vec<f32> = new.points().iter().map(|p| p.normal_impulse).collect();
-        assert_eq!(impulses, [3.0, 5.0, 0.0]);
+        new.succeed(&old, 0.01);
+        assert_eq!(before(&new), [Some(0), Some(1), None]);
     }
 
     #[test]
-    fn a_manifold_computed_anew_has_all_that_the_old_one_carried() {
+    fn a_manifold_computed_anew_has_the_slot_of_the_old_one() {
         let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
-        old.color = Some(5);
-        (old.twist_impulse, old.friction_impulse, old.preload, old.row_before) = (2.0, Vec3::X, 0.25, Some(7));
-        let own = &mut old.points_mut()[0];
-        (own.normal_impulse, own.friction_impulse, own.row_before) = (3.0, Vec3::Z, Some(9));
+        old.slot = 5;
         let mut new = Manifold::new(Vec3::Y, (0, 0), &[point(0.001, 0.0, 0.0)]);
-        new.inherit(&old, 0.01);
-        assert_eq!((new.color, new.twist_impulse, new.friction_impulse), (Some(5), 2.0, Vec3::X));
-        assert_eq!((new.preload, new.row_before), (0.25, Some(7)));
-        let own = &new.points()[0];
-        assert_eq!((own.normal_impulse, own.friction_impulse, own.row_before), (3.0, Vec3::Z, Some(9)));
+        assert_eq!((new.slot, before(&new)), (NO_SLOT, vec![None]));
+        new.succeed(&old, 0.01);
+        assert_eq!((new.slot, before(&new)), (5, vec![Some(0)]));
     }
 
     #[test]
@@ -281,11 +233,11 @@ mod tests {
     #[test]
     fn a_point_that_was_matched_by_its_feature_is_not_matched_again_by_its_place() {
         let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0)]);
-        (old.points_mut()[0].features, old.points_mut()[0].normal_impulse) = (7, 3.0);
+        old.points[0].features = 7;
         let mut moved = [point(0.5, 0.0, 0.0), point(0.001, 0.0, 0.0)];
         moved[0].features = 7;
         let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);
-        new.inherit(&old, 0.01);
-        assert_eq!(new.points().iter().map(|p| p.normal_impulse).collect::<Vec<_>>(), [3.0, 0.0]);
+        new.succeed(&old, 0.01);
+        assert_eq!(before(&new), [Some(0), None]);
     }
 }

@@ -13,7 +13,7 @@ mod narrow;
 mod query;
 mod solid;
 
-pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint};
+pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 pub use narrow::{Motion, Pair};
 
 use std::collections::HashSet;
@@ -37,6 +37,20 @@ pub enum Activity {
     Moving,
     /// Can be pushed.
     Awake,
+}
+
+/// One thing that a detection changed.
+pub(crate) enum Change<'a> {
+    /// A pair with a manifold in this slot came apart.
+    Ended(u32),
+    /// A pair is new or in another place, takes part or no longer takes part, or its manifolds were computed.
+    Pair {
+        /// Its world, and its place there.
+        place: [u32; 2],
+        pair: &'a mut Pair,
+        /// Whether its manifolds were computed.
+        computed: bool,
+    },
 }
 
 /// What one detection did.
@@ -67,9 +81,6 @@ pub struct Detector {
     arenas: Vec<Arena>,
     kinds: Vec<BodyKind>,
     moving: Vec<Moving>,
-    detections: u64,
-    computed_in: u64,
-    reshaped_in: u64,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
     /// First body of each world but the first.
@@ -108,9 +119,6 @@ impl Detector {
             arenas: world.parts().map(arena).collect(),
             kinds: world.bodies.iter().map(|b| b.kind).collect(),
             moving: Vec::new(),
-            detections: 0,
-            computed_in: 0,
-            reshaped_in: 0,
             jointed: jointed(world),
             begins: world.begins.clone(),
         }
@@ -156,9 +164,9 @@ impl Detector {
         self.arenas.iter().flat_map(|arena| &arena.pairs)
     }
 
-    /// The pairs of each world, to write impulses and colors into.
-    pub fn pairs_mut(&mut self) -> impl Iterator<Item = &mut [Pair]> {
-        self.arenas.iter_mut().map(|arena| &mut arena.pairs[..])
+    /// Tells what changed since the last call. The listener gives slots to manifolds that have none, and removes manifolds that ended.
+    pub(crate) fn take_changes(&mut self, tell: &mut dyn FnMut(Change)) {
+        (0..).zip(&mut self.arenas).for_each(|(world, arena)| arena.take_changes(world, tell));
     }
 
     /// A pair by its world and its place there.
@@ -166,17 +174,20 @@ impl Detector {
         &self.arenas[world as usize].pairs[pair as usize]
     }
 
+    /// The same, to give slots to its manifolds.
+    pub(crate) fn pair_mut(&mut self, world: u32, pair: u32) -> &mut Pair {
+        &mut self.arenas[world as usize].pairs[pair as usize]
+    }
+
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
-    /// their pairs know how the bodies moved since. A manifold that is computed anew inherits the impulses of the old one,
-    /// which `give_back` fetches from where the last step left them. Pairs of bodies that are still keep what they have, and take
-    /// no part in the step; without `activity` all take part.
+    /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
+    /// the step; without `activity` all take part.
     pub fn detect(
         &mut self,
         world: &World,
         config: &SolverConfig,
         dt: f32,
         activity: &[Activity],
-        give_back: &(dyn Fn(&mut Pair) + Sync),
     ) -> DetectStats {
         let moving = |b: &Body| Moving {
             position: b.position,
@@ -187,38 +198,14 @@ impl Detector {
             kinematic: b.kind == BodyKind::Kinematic,
         };
         world.bodies.par_iter().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        self.detections += 1;
         let margins = Margins {
             speculative: config.speculative_margin,
             recycle: config.recycle_distance,
             fall: world.gravity.length() * dt * dt,
             dt,
-            detection: self.detections,
         };
         let now = Now { margins, kinds: &self.kinds, moving: &self.moving, activity, jointed: &self.jointed };
-        let detected = self.arenas.par_iter_mut().map(|arena| arena.detect(&now, give_back));
-        let stats = detected.reduce(DetectStats::default, DetectStats::and);
-        if stats.computed > 0 {
-            self.computed_in = self.detections;
-        }
-        if stats.reshaped {
-            self.reshaped_in = self.detections;
-        }
-        stats
-    }
-
-    /// The last detection, counted from 1.
-    pub fn detections(&self) -> u64 {
-        self.detections
-    }
-
-    /// The last detection that computed any manifold.
-    pub fn computed_in(&self) -> u64 {
-        self.computed_in
-    }
-
-    /// The last detection after which another set of manifolds touched, or with other numbers of points.
-    pub fn reshaped_in(&self) -> u64 {
-        self.reshaped_in
+        let detected = self.arenas.par_iter_mut().map(|arena| arena.detect(&now));
+        detected.reduce(DetectStats::default, DetectStats::and)
     }
 }

@@ -7,7 +7,7 @@ use parry3d::query::TrackedContact;
 use parry3d::shape::{SharedShape, TypedShape};
 
 use super::facet::composite_contacts;
-use super::manifold::{Manifold, ManifoldPoint};
+use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{Found, convex_contact, flip};
 use super::solid::{Cutting, Search};
 use crate::math::{self, NormalMovement};
@@ -73,12 +73,8 @@ pub struct Pair {
     computed_at: Option<[Placed; 2]>,
     /// How they moved since.
     motion: Motion,
-    /// The detection, counted from 1, that computed the manifolds; 0 if none did.
-    pub(crate) computed_in: u64,
-    /// Whether it takes no part in steps, so that its manifolds have no rows.
-    pub(crate) rests: bool,
-    /// Where the first of the manifolds stands among the contacts that were last prepared. Written by `problem`.
-    pub(crate) contact: u32,
+    /// Whether a body of it is awake, so that its manifolds are swept.
+    pub takes_part: bool,
 }
 
 /// How two bodies moved relative to each other since their manifolds were computed.
@@ -149,8 +145,6 @@ pub(super) struct Margins {
     /// How far gravity moves a body in one step (m).
     pub fall: f32,
     pub dt: f32,
-    /// Number of this detection, from 1.
-    pub detection: u64,
 }
 
 /// Memory that one thread reuses from pair to pair.
@@ -195,18 +189,21 @@ impl Pair {
             looked: 0.0,
             computed_at: None,
             motion: Motion::default(),
-            computed_in: 0,
-            rests: false,
-            contact: 0,
+            takes_part: true,
         }
     }
 
-    /// A number that says nothing of where the pair is, and is the same in every copy of its world. Who colors pairs in the order
-    /// of the bodies colors rows of bricks alike: sweeps push a whole row the same way one after another, and a wall of 400 bricks
-    /// rattled at 23 mm/s that otherwise rests at 0.2.
-    pub fn rank(&self) -> u32 {
+    /// In which order pairs choose their colors; the lower half is left to the manifolds of the pair. It says nothing of where the pair
+    /// is, and is the same in every copy of its world. Pairs that are colored in the order of the bodies color rows of bricks alike: sweeps push a
+    /// whole row the same way one after another, and a wall of 400 bricks rattled at 23 mm/s that otherwise rests at 0.2.
+    pub fn rank(&self) -> u64 {
         let both = u64::from(self.collider_a) << 32 | u64::from(self.collider_b);
-        (mixed(both) >> 32) as u32
+        mixed(both) >> 32 << 32
+    }
+
+    /// Whether the bodies touch, or are about to.
+    pub fn is_touching(&self) -> bool {
+        self.manifolds.iter().any(|manifold| !manifold.has_ended())
     }
 
     /// How the bodies moved since the manifolds were computed.
@@ -214,8 +211,7 @@ impl Pair {
         &self.motion
     }
 
-    /// Notes how the bodies moved to the poses `a` and `b`; computes the manifolds anew if that was too far, after
-    /// `give_back` brought the impulses of the last step to the old ones.
+    /// Notes how the bodies moved to the poses `a` and `b`; computes the manifolds anew if that was too far.
     pub(super) fn update(
         &mut self,
         colliders: &[ColliderInfo],
@@ -223,13 +219,11 @@ impl Pair {
         b: &Moving,
         margins: Margins,
         scratch: &mut Scratch,
-        give_back: &(dyn Fn(&mut Self) + Sync),
     ) -> Update {
         // A body that left the range touches nothing, so that the trouble does not spread.
         if !(a.is_in_range() && b.is_in_range()) {
-            self.manifolds.clear();
-            self.invalidate();
-            self.computed_in = margins.detection;
+            self.manifolds.iter_mut().for_each(Manifold::end);
+            self.computed_at = None;
             return Update::Reshaped;
         }
         let size = self.size;
@@ -252,25 +246,15 @@ impl Pair {
                 return Update::Reused;
             }
         }
-        give_back(self);
         self.computed_at = Some([Placed::of(a), Placed::of(b)]);
         self.motion = Motion::default();
         self.looked = look;
-        self.computed_in = margins.detection;
         let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
+        let before = self.manifolds.len();
         self.compute(ca, cb, a, b, look, size, scratch);
-        let shape = self.manifolds.iter().map(|m| m.points().len());
-        if shape.eq(scratch.old.iter().map(|m| m.points().len())) { Update::Computed } else { Update::Reshaped }
-    }
-
-    /// Forgets where the rows of the manifolds were.
-    pub(crate) fn forget_rows(&mut self) {
-        self.manifolds.iter_mut().for_each(Manifold::forget_rows);
-    }
-
-    /// Forgets when the manifolds were computed, so that the next update computes them anew.
-    pub(super) fn invalidate(&mut self) {
-        self.computed_at = None;
+        let same = |(now, then): (&Manifold, &Manifold)| now.points().len() == then.points().len();
+        let all_same = self.manifolds.len() == before && self.manifolds.iter().zip(&scratch.old).all(same);
+        if all_same { Update::Computed } else { Update::Reshaped }
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -318,11 +302,19 @@ impl Pair {
             let mut manifold = Manifold::new(normal, (m.subshape1, m.subshape2), candidates);
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
             manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
-            if let Some(o) = old.iter().find(|o| o.parts == manifold.parts) {
-                manifold.inherit(o, 0.1 * size);
+            if let Some(o) = old.iter_mut().find(|o| o.parts == manifold.parts && !o.has_ended()) {
+                manifold.succeed(o, 0.1 * size);
+                o.slot = NO_SLOT;
             }
             self.manifolds.push(manifold);
         }
+        // A manifold without a successor stays until its slot is free.
+        let ended = old.iter().filter(|o| o.slot != NO_SLOT).cloned();
+        self.manifolds.extend(ended.map(|mut o| {
+            o.end();
+            o
+        }));
+
     }
 }
 
@@ -347,7 +339,6 @@ fn candidate(
         r_a: on_a + half_gap,
         r_b: on_b - half_gap,
         separation: p.dist,
-        computed_separation: p.dist,
         features: u64::from(p.fid1.0) << 32 | u64::from(p.fid2.0),
         ..ManifoldPoint::default()
     })

@@ -1,12 +1,12 @@
 //! What stands, or should.
 
 use super::{Check, DT, Setup};
-use crate::collide::Pair;
 use crate::config::Method;
 use crate::error::Result;
 use crate::load::Load;
 use crate::residuals::Measure;
 use crate::scenes::Scene;
+use crate::simulation::SolvedManifold;
 use crate::solver::{Order, Solver};
 use crate::stats::largest;
 use crate::world::{Body, Shape, World};
@@ -69,7 +69,7 @@ pub(super) fn redundancy(setup: &Setup) -> Result<Vec<Check>> {
         for _ in 0..300 {
             simulation.step(DT)?;
         }
-        let (points, asymmetry) = asymmetry(simulation.pairs(), side);
+        let (points, asymmetry) = asymmetry(simulation.manifolds(), side);
         checks.push(Check::at_most(format!("{points} points: asymmetry of the forces"), asymmetry, 0.05));
     }
     let planks = Scene::find("kapla", &["storeys=9".into()])?.world;
@@ -96,13 +96,12 @@ fn cube_on_pads(side: usize) -> World {
 }
 
 /// Contact points, and by what share the force on a pad is off the mean of the pads that are its mirror images.
-fn asymmetry<'a>(pairs: impl Iterator<Item = &'a Pair> + Clone, side: usize) -> (usize, f64) {
-    let force =
-        |p: &Pair| p.manifolds.iter().flat_map(|m| m.points()).map(|p| f64::from(p.normal_impulse)).sum::<f64>();
-    let points = pairs.clone().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
+fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usize) -> (usize, f64) {
+    let force = |m: &SolvedManifold| m.points().iter().map(|p| f64::from(p.normal_impulse)).sum::<f64>();
+    let points = manifolds.clone().map(|m| m.points().len()).sum();
     // Pads are the first bodies, in rows.
     let mut forces = vec![f64::NAN; side * side];
-    pairs.for_each(|p| forces[p.body_a.min(p.body_b) as usize] = force(p));
+    manifolds.for_each(|m| forces[m.body_a.min(m.body_b)] = force(&m));
     let image = |i: usize| {
         let fold = |k: usize| k.min(side - 1 - k);
         let (x, z) = (fold(i % side), fold(i / side));
@@ -184,12 +183,12 @@ mod tests {
             for _ in 0..60 {
                 simulation.step(DT).expect("a step");
             }
-            asymmetry(simulation.pairs(), 2)
+            asymmetry(simulation.manifolds(), 2)
         };
         let (points, even) = measure(world.clone());
         assert!(points == 16 && even < 0.05, "{points} points, {even}");
         world.bodies[4] = lopsided;
         assert!(measure(world).1 > 0.1);
-        assert!(asymmetry([].iter(), 1).1.is_nan());
+        assert!(asymmetry([].into_iter(), 1).1.is_nan());
     }
 }

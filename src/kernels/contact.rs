@@ -18,10 +18,10 @@ pub fn normal_movement<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<
     if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
 }
 
-/// Separation now: what it was when the step began, and what the bodies moved since.
+/// What the contact answers to: the separation when the step began, less the preload, and what the bodies moved since.
 #[inline(always)]
-pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, point: &Point<L>) -> L {
-    point.separation + movement.between(point.r_a, point.r_b)
+pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, contact: &Contact<L>, point: &Point<L>) -> L {
+    (point.separation - contact.preload) + movement.between(point.r_a, point.r_b)
 }
 
 #[inline(always)]
@@ -66,7 +66,7 @@ fn solve_normal<L: Lane>(
     impulse: &mut Impulse<L>,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let s = current_separation(movement, point);
+    let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s.gt(zero);
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, zero), -softness.push_limit);

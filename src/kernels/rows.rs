@@ -83,6 +83,8 @@ pub struct Contact<L> {
     pub radius_a: L,
     /// Radius of curvature of b's surface.
     pub radius_b: L,
+    /// How far its springs are compressed while the surfaces just touch.
+    pub preload: L,
 }
 
 /// Double of the WGSL struct `Point`; in the order of `PointRow`, as the lanes have it in memory.
@@ -257,18 +259,18 @@ impl<S: Scalar> Inertia<S> {
 impl<S: Scalar> Contact<S> {
     /// From storage.
     pub fn load(r: &ContactRow) -> Self {
-        let [friction, restitution, radius_a, radius_b] =
-            [r.friction, r.restitution, r.radius_a, r.radius_b].map(S::from_f32);
+        let [friction, restitution, radius_a, radius_b, preload] =
+            [r.friction, r.restitution, r.radius_a, r.radius_b, r.preload].map(S::from_f32);
         let (normal, tangent) = (Vec3::load(r.normal), Vec3::load(r.tangent));
-        Self { normal, tangent, friction, restitution, radius_a, radius_b }
+        Self { normal, tangent, friction, restitution, radius_a, radius_b, preload }
     }
 
     /// To storage, indices left out.
     pub fn store(&self) -> ContactRow {
-        let [friction, restitution, radius_a, radius_b] =
-            [self.friction, self.restitution, self.radius_a, self.radius_b].map(S::to_f32);
+        let [friction, restitution, radius_a, radius_b, preload] =
+            [self.friction, self.restitution, self.radius_a, self.radius_b, self.preload].map(S::to_f32);
         let (normal, tangent) = (self.normal.store(), self.tangent.store());
-        ContactRow { normal, friction, tangent, restitution, radius_a, radius_b, ..ContactRow::default() }
+        ContactRow { normal, friction, tangent, restitution, radius_a, radius_b, preload, ..ContactRow::default() }
     }
 }
 

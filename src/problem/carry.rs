@@ -1,8 +1,8 @@
 //! How the rows of contacts follow from those of the step before, for a backend that keeps them on a device.
 //!
-//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels: the
-//! device moves them to the places of the next step by a map. Only the rows of manifolds that were computed since are sent,
-//! with the places that their impulses had, and how far the surfaces of all others are apart now.
+//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels. Only the rows
+//! of manifolds that were computed since are sent, with the points that their impulses belonged to, and how far the surfaces of all
+//! others are apart now.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,29 +14,30 @@ pub struct Carry {
     /// Whether the device has the rows of the step before, and they alone have its impulses and preloads. Else the problem
     /// is complete, and nothing else here counts.
     pub on_device: bool,
-    /// Row in the step before of each contact, [`NO_ROW`] for one that was computed since; empty if every row is in its place.
-    pub rows_before: Vec<u32>,
-    /// Those that were computed since, ascending.
-    pub computed: Vec<Origin>,
+    /// The contacts whose rows were written again since, ascending.
+    pub written: Vec<Written>,
     /// Whether more than the separations of reused points follows the bodies: the velocity of an approach, the slip.
     pub approach: bool,
     /// What preloads follow from.
     pub preload: Preload,
 }
 
-/// No row at all.
-pub const NO_ROW: u32 = u32::MAX;
-
-/// Where the impulses of a contact that was computed anew were in the step before; [`NO_ROW`] for nowhere. 24 B.
+/// A contact whose rows were written again, 8 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct Origin {
-    /// Its row now.
+pub struct Written {
+    /// Its row.
     pub row: u32,
-    /// Its row then.
-    pub contact: u32,
-    /// Where each of its points was in `points` and `impulses`.
-    pub points: [u32; 4],
+    /// Which of the points that the row had each point is, [`NO_POINT`] for none; [`Written::NEW`] if the row begins without impulses.
+    pub points_before: [u8; 4],
+}
+
+/// A point that is new.
+pub const NO_POINT: u8 = 4;
+
+impl Written {
+    /// The points of a row that begins without impulses and preload.
+    pub const NEW: [u8; 4] = [u8::MAX; 4];
 }
 
 /// What the preloads of a step follow from, 16 B.

@@ -1,7 +1,6 @@
 //! Whether a problem from any source keeps what backends rely on.
 
 use std::fmt::Display;
-use std::ops::Range;
 
 use super::StepProblem;
 use crate::collide::MAX_POINTS;
@@ -19,6 +18,7 @@ impl StepProblem {
     /// One line that names the row and the field.
     pub fn check(&self) -> Result<()> {
         self.check_counts()?;
+        self.check_order()?;
         self.check_bodies()?;
         self.check_points()?;
         self.check_colors()
@@ -44,9 +44,15 @@ impl StepProblem {
 
     fn check_bodies(&self) -> Result<()> {
         let bodies = self.bodies.len();
-        let pairs = self.contacts.iter().map(|c| [c.body_a, c.body_b]).enumerate().map(|row| ("contacts", row));
-        let joined = self.joints.iter().map(|j| [j.body_a, j.body_b]).enumerate().map(|row| ("joints", row));
-        for (rows, (row, pair)) in pairs.chain(joined) {
+        let contacts = self.rows_of(&self.contact_colors()).iter().map(|&row| {
+            let contact = &self.contacts[row as usize];
+            ("contacts", row, [contact.body_a, contact.body_b])
+        });
+        let joints = self.rows_of(&self.joint_colors()).iter().map(|&row| {
+            let joint = &self.joints[row as usize];
+            ("joints", row, [joint.body_a, joint.body_b])
+        });
+        for (rows, row, pair) in contacts.chain(joints) {
             if pair.iter().any(|&body| body as usize >= bodies) {
                 return refuse(format_args!("{rows}[{row}]: bodies {pair:?}, but there are {bodies}"));
             }
@@ -62,51 +68,72 @@ impl StepProblem {
         Ok(())
     }
 
-    /// The points of the contacts follow one another, and after those of each, its patch if there are any.
+    /// The contacts that take part have points of their own, and each its patch after them if there are any.
     fn check_points(&self) -> Result<()> {
         let patch = usize::from(self.has_patches());
-        let mut next = 0;
-        for (row, contact) in self.contacts.iter().enumerate() {
+        let mut owner = vec![u32::MAX; self.points.len()];
+        for &row in self.rows_of(&self.contact_colors()) {
+            let contact = &self.contacts[row as usize];
             let (first, count) = (contact.first_point as usize, contact.point_count as usize);
             if !(1..=MAX_POINTS).contains(&count) {
                 return refuse(format_args!("contacts[{row}].point_count = {count}: must be 1 to {MAX_POINTS}"));
             }
-            if first != next {
+            let Some(own) = owner.get_mut(first..first + count + patch) else {
+                let points = self.points.len();
                 return refuse(format_args!(
-                    "contacts[{row}].first_point = {first}: must be {next}, after the row before"
+                    "contacts[{row}].first_point = {first}: {count} points from there, but there are {points}"
+                ));
+            };
+            if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
+                return refuse(format_args!(
+                    "contacts[{row}].first_point = {first}: points of contacts[{other}] are there"
                 ));
             }
-            next += count + patch;
+            own.fill(row);
         }
-        match self.points.len() == next {
-            true => Ok(()),
-            false => refuse(format_args!("points: {}, but the contacts have {next}", self.points.len())),
+        Ok(())
+    }
+
+    fn check_order(&self) -> Result<()> {
+        let (colors, order) = (&self.colors, self.order.len());
+        let first_joint = self.first_joint_color as usize;
+        if first_joint > colors.len().saturating_sub(1) {
+            return refuse(format_args!("first_joint_color = {first_joint}, but {} colors", colors.len().saturating_sub(1)));
         }
+        let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
+        if ends != [0, order] || !colors.is_sorted() {
+            return refuse(format_args!("colors: must ascend from 0 to {order}"));
+        }
+        for (name, rows, count) in [
+            ("contact", self.rows_of(&self.contact_colors()), self.contacts.len()),
+            ("joint", self.rows_of(&self.joint_colors()), self.joints.len()),
+        ] {
+            let mut seen = vec![false; count];
+            for &row in rows {
+                match seen.get_mut(row as usize) {
+                    Some(seen) if !*seen => *seen = true,
+                    Some(_) => return refuse(format_args!("order: {name} {row} occurs twice")),
+                    None => return refuse(format_args!("order: {name} {row}, but there are {count}")),
+                }
+            }
+        }
+        Ok(())
     }
 
     fn check_colors(&self) -> Result<()> {
-        let colors = self.colors.len();
-        if self.first_joint_color as usize > colors {
-            return refuse(format_args!("first_joint_color = {}, but {colors} colors", self.first_joint_color));
-        }
-        let (contacts, joints) = self.colors.split_at(self.first_joint_color as usize);
-        check_offsets("contacts", contacts, self.contacts.len())?;
-        check_offsets("joints", joints, self.joints.len())?;
         let mut seen = vec![0; self.bodies.len()];
         for color in self.contact_colors().chain(self.joint_colors()) {
-            let rows = self.rows_of(&(color..color + 1));
-            let of_joints = color >= self.first_joint_color;
-            self.check_color(color, rows, of_joints, &mut seen)?;
+            self.check_color(color, &mut seen)?;
         }
         Ok(())
     }
 
     /// `seen`: one more than the last color that each body that can move is in.
-    fn check_color(&self, color: u32, rows: Range<usize>, of_joints: bool, seen: &mut [u32]) -> Result<()> {
-        for row in rows {
-            let pair = match of_joints {
-                true => [self.joints[row].body_a, self.joints[row].body_b],
-                false => [self.contacts[row].body_a, self.contacts[row].body_b],
+    fn check_color(&self, color: u32, seen: &mut [u32]) -> Result<()> {
+        for &row in self.rows_of(&(color..color + 1)) {
+            let pair = match color < self.first_joint_color {
+                true => [self.contacts[row as usize].body_a, self.contacts[row as usize].body_b],
+                false => [self.joints[row as usize].body_a, self.joints[row as usize].body_b],
             };
             for body in pair.map(|body| body as usize).into_iter().filter(|&body| self.masses[body].inv_mass > 0.0) {
                 if std::mem::replace(&mut seen[body], color + 1) == color + 1 {
@@ -115,14 +142,5 @@ impl StepProblem {
             }
         }
         Ok(())
-    }
-}
-
-/// Refuses offsets of colors that do not go from 0 to the number of rows without a step back.
-fn check_offsets(rows: &str, offsets: &[u32], count: usize) -> Result<()> {
-    let ends = offsets.first().zip(offsets.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
-    match ends == [0, count] && offsets.is_sorted() {
-        true => Ok(()),
-        false => refuse(format_args!("colors of {rows}: must ascend from 0 to {count}")),
     }
 }

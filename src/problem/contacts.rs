@@ -1,93 +1,20 @@
-//! The rows of contacts: written once from a manifold, and carried from step to step while the manifold is reused.
+//! The rows of contacts: written from a manifold when it is computed, and kept from step to step while it is reused.
 //!
 //! Normal, tangents, arms and effective masses of a reused manifold stay, and so do its impulses; only the separations
 //! follow the bodies. The bodies of a reused manifold turned by 0.03 rad at most, and unequal moments of inertia turned with
 //! them: what that changes in the masses is left out, as it is in the arms.
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
-use super::StepProblem;
 use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
-use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
-use crate::collide::{Detector, Manifold, ManifoldPoint, Motion, Pair};
+use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow, points_a_slot};
+use super::slots::{Slot, Write};
+use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::math;
 use crate::world::World;
-
-/// Where a contact comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Source {
-    /// World of the pair.
-    pub world: u32,
-    /// Place of the pair among those of its world.
-    pub pair: u32,
-    /// Which manifold of the pair.
-    pub manifold: u32,
-    /// How many points it has.
-    pub points: u32,
-    /// Its row in the step before; none if the manifold was computed since.
-    pub row_before: Option<u32>,
-}
-
-/// The rows of contacts that belong together.
-#[derive(Clone, Debug, Default)]
-pub(super) struct ContactRows {
-    contacts: Vec<ContactRow>,
-    points: Vec<PointRow>,
-    impulses: Vec<ImpulseRow>,
-    computed: Vec<f32>,
-}
-
-impl ContactRows {
-    /// Takes the rows of a problem, and gives it memory that it can write new ones to.
-    pub fn exchange(&mut self, problem: &mut StepProblem, computed: &mut Vec<f32>) {
-        std::mem::swap(&mut self.contacts, &mut problem.contacts);
-        std::mem::swap(&mut self.points, &mut problem.points);
-        std::mem::swap(&mut self.impulses, &mut problem.impulses);
-        std::mem::swap(&mut self.computed, computed);
-    }
-}
-
-/// Some neighboring contacts with the rows that are theirs.
-pub(super) struct Chunk<'a> {
-    /// Which contact each row is of.
-    pub order: &'a [u32],
-    pub contacts: &'a mut [ContactRow],
-    pub points: &'a mut [PointRow],
-    pub impulses: &'a mut [ImpulseRow],
-    /// Separation of each point when its manifold was computed.
-    pub computed: &'a mut [f32],
-}
-
-impl Chunk<'_> {
-    /// The two halves.
-    fn split(&mut self) -> [Chunk<'_>; 2] {
-        let middle = self.order.len() / 2;
-        let points = (self.contacts[middle].first_point - self.contacts[0].first_point) as usize;
-        let (order, order_2) = self.order.split_at(middle);
-        let (contacts, contacts_2) = self.contacts.split_at_mut(middle);
-        let (points_1, points_2) = self.points.split_at_mut(points);
-        let (impulses, impulses_2) = self.impulses.split_at_mut(points);
-        let (computed, computed_2) = self.computed.split_at_mut(points);
-        let half = |order, contacts, points, impulses, computed| Chunk { order, contacts, points, impulses, computed };
-        [
-            half(order, contacts, points_1, impulses, computed),
-            half(order_2, contacts_2, points_2, impulses_2, computed_2),
-        ]
-    }
-}
-
-/// What the pair of a contact says to its rows.
-#[derive(Clone, Copy, Default)]
-struct Found {
-    /// Whether its manifolds were computed since the rows were written.
-    is_new: bool,
-    motion: Motion,
-}
-
-/// Contacts that one task writes at most.
-const CHUNK: usize = 256;
 
 /// What the rows of contacts are written from.
 pub(super) struct Writer<'a> {
@@ -98,69 +25,80 @@ pub(super) struct Writer<'a> {
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
-    /// What preloads follow from, and whether a device sees to them.
+    /// What preloads follow from, and whether a device sees to them and to the impulses.
     pub carry: &'a Carry,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
-    /// The detection whose manifolds have rows already.
-    pub seen: u64,
-    pub sources: &'a [Source],
-    /// The rows of the step before, if they do not stand in their places already.
-    pub before: Option<&'a ContactRows>,
 }
 
+/// The rows of one slot.
+struct SlotRows<'a> {
+    contact: &'a mut ContactRow,
+    points: &'a mut [PointRow],
+    impulses: &'a mut [ImpulseRow],
+    /// Separation of each point when its manifold was computed (m).
+    computed: &'a mut [f32],
+}
+
+/// Slots that one task writes.
+const CHUNK: usize = 256;
+
 impl Writer<'_> {
-    /// Writes all rows, on all threads.
-    pub fn write(&self, mut chunk: Chunk) {
-        if chunk.order.len() > CHUNK {
-            let [first, second] = chunk.split();
-            rayon::join(|| self.write(first), || self.write(second));
-            return;
-        }
-        // What is far away in memory first: these reads wait for nothing, and so for each other only.
-        let mut found = [Found::default(); CHUNK];
-        for (found, &contact) in found.iter_mut().zip(chunk.order) {
-            let source = &self.sources[contact as usize];
-            let pair = self.detector.pair(source.world, source.pair);
-            *found = Found { is_new: pair.computed_in > self.seen, motion: *pair.motion() };
-        }
-        let patch = usize::from(self.patches);
-        let mut next = 0;
-        for ((row, &contact), found) in chunk.contacts.iter_mut().zip(chunk.order).zip(&found) {
-            let source = &self.sources[contact as usize];
-            let own = next..next + source.points as usize + patch;
-            next = own.end;
-            let (points, impulses) = (&mut chunk.points[own.clone()], &mut chunk.impulses[own.clone()]);
-            let computed = &mut chunk.computed[own.clone()];
-            if found.is_new {
-                let pair = self.detector.pair(source.world, source.pair);
-                let manifold = &pair.manifolds[source.manifold as usize];
-                self.write_header(row, pair, manifold);
-                self.write_points(row, manifold, &found.motion, points, impulses, computed);
-            } else {
-                if let (Some(before), Some(from)) = (self.before, source.row_before) {
-                    let header = &before.contacts[from as usize];
-                    *row = ContactRow { first_point: row.first_point, ..*header };
-                    let from = header.first_point as usize..header.first_point as usize + own.len();
-                    points.copy_from_slice(&before.points[from.clone()]);
-                    impulses.copy_from_slice(&before.impulses[from.clone()]);
-                    computed.copy_from_slice(&before.computed[from]);
+    /// Writes the rows of all slots, on all threads.
+    pub fn write(
+        &self,
+        slots: &[Slot],
+        contacts: &mut [ContactRow],
+        points: &mut [PointRow],
+        impulses: &mut [ImpulseRow],
+        computed: &mut [f32],
+    ) {
+        let stride = points_a_slot(self.patches);
+        let points = points.par_chunks_mut(CHUNK * stride).zip(impulses.par_chunks_mut(CHUNK * stride));
+        let rows = contacts.par_chunks_mut(CHUNK).zip(points).zip(computed.par_chunks_mut(CHUNK * MAX_POINTS));
+        slots.par_chunks(CHUNK).zip(rows).enumerate().for_each(
+            |(chunk, (slots, ((contacts, (points, impulses)), computed)))| {
+                // Far away in memory: these reads come first, so that none waits for another.
+                let mut motions = [Motion::default(); CHUNK];
+                for (motion, slot) in motions.iter_mut().zip(slots).filter(|(_, slot)| slot.takes_part) {
+                    *motion = *self.detector.pair(slot.world, slot.pair).motion();
                 }
-                self.refresh_points(row, &found.motion, points, computed);
-            }
-            // Where they are on a device, the kernel begin_contacts does this.
+                let points = points.chunks_mut(stride).zip(impulses.chunks_mut(stride));
+                let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS));
+                for (i, ((slot, motion), ((contact, (points, impulses)), computed))) in
+                    slots.iter().zip(&motions).zip(rows).enumerate()
+                {
+                    contact.first_point = ((chunk * CHUNK + i) * stride) as u32;
+                    self.write_slot(slot, motion, SlotRows { contact, points, impulses, computed });
+                }
+            },
+        );
+    }
+
+    fn write_slot(&self, slot: &Slot, motion: &Motion, rows: SlotRows) {
+        let SlotRows { contact, points, impulses, computed } = rows;
+        if slot.write != Write::Separations {
+            let pair = self.detector.pair(slot.world, slot.pair);
+            let manifold = &pair.manifolds[slot.manifold as usize];
+            let before = *contact;
+            self.write_header(contact, slot.write, pair, manifold);
+            self.write_points(contact, manifold, motion, points, computed);
             if !self.carry.on_device {
-                row.preload = self.preload(row, points, impulses);
-                points[..row.point_count as usize].iter_mut().for_each(|point| point.separation -= row.preload);
-                let warm_start = self.carry.preload.warm_start != 0;
-                impulses
-                    .iter_mut()
-                    .for_each(|i| *i = if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() });
+                self.bring_impulses(slot.write, &before, contact, manifold, impulses);
             }
+        } else if slot.takes_part {
+            self.refresh_points(contact, motion, points, computed);
+        }
+        // Where the rows are on a device, the kernel begin_contacts does this.
+        if slot.takes_part && !self.carry.on_device {
+            contact.preload = self.preload(contact, points, impulses);
+            let warm_start = self.carry.preload.warm_start != 0;
+            let begun = |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
+            impulses.iter_mut().for_each(|i| *i = begun(i));
         }
     }
 
-    fn write_header(&self, row: &mut ContactRow, pair: &Pair, manifold: &Manifold) {
+    fn write_header(&self, row: &mut ContactRow, write: Write, pair: &Pair, manifold: &Manifold) {
         let [a, b] = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
         let material = a.material.combine(b.material);
         *row = ContactRow {
@@ -169,33 +107,30 @@ impl Writer<'_> {
             body_a: pair.body_a,
             body_b: pair.body_b,
             first_point: row.first_point,
-            point_count: row.point_count,
+            point_count: manifold.points().len() as u32,
             radius_a: manifold.radius_a,
             radius_b: manifold.radius_b,
-            preload: manifold.preload,
+            preload: if write == Write::New { 0.0 } else { row.preload },
             ..ContactRow::framed(manifold.normal)
         };
     }
 
-    /// Writes the rows of a manifold that was computed anew.
     fn write_points(
         &self,
         row: &ContactRow,
         manifold: &Manifold,
         motion: &Motion,
         points: &mut [PointRow],
-        impulses: &mut [ImpulseRow],
         computed: &mut [f32],
     ) {
         let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
         let effective = EffectiveMass { inverse: &inverse, row };
-        let from = manifold.points();
-        for (((p, point), impulse), computed) in from.iter().zip(&mut *points).zip(&mut *impulses).zip(&mut *computed) {
+        for ((p, point), computed) in manifold.points().iter().zip(&mut *points).zip(&mut *computed) {
             let tangent_mass = match self.config.friction {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
                 FrictionRule::None | FrictionRule::Slip => 0.0,
             };
-            *computed = p.computed_separation;
+            *computed = p.separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
                 r_b: p.r_b.to_array(),
@@ -203,13 +138,36 @@ impl Writer<'_> {
                 tangent_mass,
                 ..PointRow::default()
             };
-            *impulse = carried_over(row, p);
         }
         self.refresh_points(row, motion, points, computed);
         if self.patches {
-            let (points, patch) = points.split_at_mut(from.len());
+            let (points, patch) = points.split_at_mut(manifold.points().len());
             patch[0] = patch_of(&effective, points);
-            impulses[from.len()] = carried_over_patch(row, manifold);
+        }
+    }
+
+    /// Brings the impulses of a slot to the points that its manifold has now, and to its tangents. Double of the function of the same
+    /// name in `shaders/carry/write_contacts.wgsl`.
+    fn bring_impulses(
+        &self,
+        write: Write,
+        before: &ContactRow,
+        now: &ContactRow,
+        manifold: &Manifold,
+        impulses: &mut [ImpulseRow],
+    ) {
+        let mut old = [ImpulseRow::default(); MAX_POINTS + 1];
+        if write != Write::New {
+            old[..impulses.len()].copy_from_slice(impulses);
+        }
+        impulses.fill(ImpulseRow::default());
+        for ((k, point), impulse) in manifold.points().iter().enumerate().zip(&mut *impulses) {
+            if let Some(from) = point_before(write, k, point) {
+                *impulse = turned(before, now, &old[from as usize]);
+            }
+        }
+        if self.patches {
+            impulses[manifold.points().len()] = turned(before, now, &old[before.point_count as usize]);
         }
     }
 
@@ -260,26 +218,23 @@ impl Writer<'_> {
     }
 }
 
-fn carried_over(row: &ContactRow, p: &ManifoldPoint) -> ImpulseRow {
-    let (tangent_1, tangent_2) = row.tangents();
-    // Friction that a rule no longer allows is not carried over.
-    let friction = if row.friction > 0.0 { p.friction_impulse } else { Vec3::ZERO };
-    ImpulseRow {
-        normal: p.normal_impulse,
-        tangent_1: friction.dot(tangent_1),
-        tangent_2: friction.dot(tangent_2),
-        peak: 0.0,
+/// Which of the points that a slot had is this one, the point `k` of its manifold.
+pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Option<u8> {
+    match write {
+        Write::Separations | Write::Rows => Some(k as u8),
+        Write::Computed => point.before,
+        Write::New => None,
     }
 }
 
-fn carried_over_patch(row: &ContactRow, manifold: &Manifold) -> ImpulseRow {
-    let (tangent_1, tangent_2) = row.tangents();
-    ImpulseRow {
-        normal: manifold.twist_impulse,
-        tangent_1: manifold.friction_impulse.dot(tangent_1),
-        tangent_2: manifold.friction_impulse.dot(tangent_2),
-        peak: 0.0,
-    }
+/// An impulse along the tangents that a manifold has now. Friction that a rule no longer allows is not brought along.
+fn turned(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> ImpulseRow {
+    let (tangent_1, tangent_2) = before.tangents();
+    let friction = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+    let friction = if now.friction > 0.0 { friction } else { Vec3::ZERO };
+    let (tangent_1, tangent_2) = now.tangents();
+    let [tangent_1, tangent_2] = [tangent_1, tangent_2].map(|tangent| friction.dot(tangent));
+    ImpulseRow { normal: impulse.normal, tangent_1, tangent_2, peak: 0.0 }
 }
 
 /// Normal velocity whose opposite, times the restitution `e`, gives back the energy of the approach.

@@ -2,11 +2,8 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use glam::Vec3;
-
 use super::StepProblem;
 use super::prepare::{Prepared, contact_softness};
-use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::graph::{Edge, IMMOVABLE};
 use crate::world::{BallJoint, BodyKind, World};
@@ -47,46 +44,29 @@ impl Prepared {
 
     /// Rescales impulses and preloads, so that all contacts and joints bear the same forces in a step of `dt` seconds as in the step
     /// before. A pile that came to rest with 32 substeps rattled at 0.8 m/s without this when it went on with 8.
-    pub fn change_step(
-        &mut self,
-        world: &World,
-        config: &SolverConfig,
-        dt: f32,
-        problem: &mut StepProblem,
-        detector: &mut Detector,
-    ) {
+    pub fn change_step(&mut self, world: &World, config: &SolverConfig, dt: f32, problem: &mut StepProblem) {
         let now = StepScale::new(config, dt);
         let Some(before) = self.scale.replace(now) else { return };
         let forces = ratio(now.substep, before.substep);
         let movable = forces * ratio(now.movable_compliance, before.movable_compliance);
         let fixed = forces * ratio(now.fixed_compliance, before.fixed_compliance);
         let is_dynamic = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
-        let of_preload = |a: u32, b: u32| if is_dynamic(a) && is_dynamic(b) { movable } else { fixed };
         for contact in &mut problem.contacts {
-            contact.preload *= of_preload(contact.body_a, contact.body_b);
+            contact.preload *= if is_dynamic(contact.body_a) && is_dynamic(contact.body_b) { movable } else { fixed };
         }
         for impulse in &mut problem.impulses {
             impulse.normal *= forces;
             impulse.tangent_1 *= forces;
             impulse.tangent_2 *= forces;
         }
-        for impulse in &mut self.joint_impulses {
-            *impulse *= forces;
-        }
-        // The manifolds without rows have impulses of their own.
-        for pair in detector.pairs_mut().flatten().filter(|pair| pair.rests || pair.computed_in > self.seen) {
-            let of_preload = of_preload(pair.body_a, pair.body_b);
-            pair.manifolds.iter_mut().for_each(|manifold| manifold.rescale(forces, of_preload));
+        for impulse in &mut problem.joint_impulses {
+            impulse.linear = impulse.linear.map(|x| x * forces);
         }
     }
 
-    /// Brings impulses, preloads and colors of all rows to their manifolds: the next step writes all rows anew.
-    pub fn give_all_back(&mut self, problem: &StepProblem, detector: &mut Detector) {
-        for pair in detector.pairs_mut().flatten() {
-            self.give_back(problem, pair);
-            pair.forget_rows();
-        }
-        self.seen = 0;
+    /// Lets the next step write all rows again.
+    pub fn write_again(&mut self) {
+        self.slots.write_again();
     }
 
     /// The joints that the rows are of.
@@ -104,7 +84,7 @@ impl Prepared {
     ///
     /// A joint keeps impulse and color wherever it stands in the list: it is the one with the same bodies and anchors, else one
     /// with the same bodies, whose anchors moved.
-    pub fn follow_joints(&mut self, world: &World) -> Vec<BallJoint> {
+    pub fn follow_joints(&mut self, world: &World, problem: &mut StepProblem) -> Vec<BallJoint> {
         let (before, now) = (std::mem::take(&mut self.joints), &world.joints);
         let from = matched(&before, now);
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
@@ -117,7 +97,8 @@ impl Prepared {
         let edges: Vec<Edge> = now.iter().zip(&from).map(edge).collect();
         self.are_joints_colored &= edges == self.joint_edges;
         self.joint_edges = edges;
-        self.joint_impulses = from.iter().map(|from| from.map_or(Vec3::ZERO, |i| self.joint_impulses[i])).collect();
+        let impulse = |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
+        problem.joint_impulses = from.iter().map(impulse).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);
         let changed = now.iter().zip(&from).filter(|(joint, from)| from.is_none_or(|i| before[i] != **joint));
@@ -152,6 +133,7 @@ fn matched(before: &[BallJoint], now: &[BallJoint]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     fn joint(body: usize, anchor: f32) -> BallJoint {
         BallJoint::to_world(body, Vec3::X * anchor, Vec3::ZERO)

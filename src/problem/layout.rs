@@ -6,6 +6,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use crate::collide::MAX_POINTS;
+
 /// State of one body that a step changes, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -107,7 +109,8 @@ pub struct ContactRow {
     pub radius_a: f32,
     /// Radius of curvature of b's surface (m).
     pub radius_b: f32,
-    /// How far the springs of a soft contact are compressed while the surfaces just touch: separations are that much less (m).
+    /// How far the springs of a soft contact are compressed while the surfaces just touch (m). What they answer to is the separation
+    /// less this.
     pub preload: f32,
     #[doc(hidden)]
     pub pad: f32,
@@ -275,8 +278,15 @@ pub struct Params {
     pub tolerance: f32,
     /// Number of joints.
     pub joint_count: u32,
+    /// 1 if a patch follows the points of every contact.
+    pub patches: u32,
     #[doc(hidden)]
-    pub pad: [u32; 2],
+    pub pad: u32,
+}
+
+/// Rows in `points` and `impulses` that a slot of a simulation has.
+pub(super) fn points_a_slot(patches: bool) -> usize {
+    MAX_POINTS + usize::from(patches)
 }
 
 /// The colors that one dispatch sweeps, one after another.

@@ -1,4 +1,4 @@
-//! One step as a value: plain rows in color order, whose names are the names of the WGSL bindings.
+//! One step as a value: plain rows, whose names are the names of the WGSL bindings.
 
 pub mod carry;
 mod check;
@@ -7,6 +7,7 @@ pub mod effective;
 mod follow;
 mod layout;
 mod prepare;
+mod slots;
 pub mod softness;
 mod store;
 
@@ -15,6 +16,7 @@ pub use layout::{
     MomentumRow, Params, PassColors, PointRow, Softness,
 };
 pub use prepare::Prepared;
+pub use store::store;
 
 use std::ops::Range;
 
@@ -30,20 +32,22 @@ pub struct StepProblem {
     pub masses: Vec<MassRow>,
     /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
     pub inertias: Vec<InertiaRow>,
-    /// Manifolds in color order.
+    /// Manifolds, in slots that they keep as long as they last. Only those in `order` take part.
     pub contacts: Vec<ContactRow>,
-    /// Points of the manifolds, one manifold after another.
+    /// Points of the manifolds.
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
-    /// Where each color begins in `contacts`, and where the last ends; then the same for `joints`.
-    pub colors: Vec<u32>,
-    /// Which of `colors` is the first of the joints.
-    pub first_joint_color: u32,
-    /// Ball joints in color order.
+    /// Ball joints. Only those in `order` take part.
     pub joints: Vec<JointRow>,
     /// Impulses of the joints.
     pub joint_impulses: Vec<JointImpulseRow>,
+    /// The contacts that take part, color by color, and after them the joints.
+    pub order: Vec<u32>,
+    /// Where each color begins in `order`, and where the last ends.
+    pub colors: Vec<u32>,
+    /// Which of `colors` is the first of the joints.
+    pub first_joint_color: u32,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
@@ -53,7 +57,7 @@ pub struct StepProblem {
 impl StepProblem {
     /// Colors of the contacts.
     pub fn contact_colors(&self) -> Range<u32> {
-        0..self.first_joint_color.saturating_sub(1)
+        0..self.first_joint_color
     }
 
     /// Colors of the joints.
@@ -61,24 +65,33 @@ impl StepProblem {
         self.first_joint_color..(self.colors.len() as u32).saturating_sub(1).max(self.first_joint_color)
     }
 
-    /// The contacts, or joints, of some neighboring colors.
-    pub fn rows_of(&self, colors: &Range<u32>) -> Range<usize> {
+    /// The contacts, or joints, of some neighboring colors, by their rows.
+    pub fn rows_of(&self, colors: &Range<u32>) -> &[u32] {
         if colors.is_empty() {
-            return 0..0;
+            return &[];
         }
-        self.colors[colors.start as usize] as usize..self.colors[colors.end as usize] as usize
+        &self.order[self.colors[colors.start as usize] as usize..self.colors[colors.end as usize] as usize]
+    }
+
+    /// The contacts that take part, in the order of the sweeps.
+    pub fn swept_contacts(&self) -> impl Iterator<Item = &ContactRow> + Clone {
+        self.rows_of(&self.contact_colors()).iter().map(|&row| &self.contacts[row as usize])
+    }
+
+    /// Lets all rows take part that are there, contacts and joints each in one color.
+    pub fn sweep_in_order_of_rows(&mut self) {
+        let (contacts, joints) = (self.contacts.len() as u32, self.joints.len() as u32);
+        self.order = (0..contacts).chain(0..joints).collect();
+        self.colors = vec![0, contacts];
+        self.first_joint_color = 1;
+        if joints > 0 {
+            self.colors.push(contacts + joints);
+        }
     }
 
     /// Whether a patch follows the points of every contact.
     pub fn has_patches(&self) -> bool {
-        self.contacts.last().is_some_and(|c| ((c.first_point + c.point_count) as usize) < self.points.len())
-    }
-
-    /// Number of points of some neighboring contacts, patches left out.
-    pub fn point_count(&self, contacts: Range<usize>) -> usize {
-        let begins = |contact: usize| self.contacts.get(contact).map_or(self.points.len(), |c| c.first_point as usize);
-        let patches = if self.has_patches() { contacts.len() } else { 0 };
-        begins(contacts.end) - begins(contacts.start) - patches
+        self.params.patches != 0
     }
 
     /// Number of impulses, those of patches and joints included.
@@ -86,45 +99,29 @@ impl StepProblem {
         self.impulses.len() + self.joint_impulses.len()
     }
 
-    /// Begins without impulses and preloads.
+    /// Lets the contacts that take part begin without impulses and preloads.
     pub fn forget_impulses(&mut self) {
-        self.impulses.fill(ImpulseRow::default());
-        self.contacts.iter_mut().for_each(|contact| contact.preload = 0.0);
+        let patch = usize::from(self.has_patches());
+        for &row in &self.order[..self.colors.get(self.first_joint_color as usize).map_or(0, |&end| end as usize)] {
+            let contact = &mut self.contacts[row as usize];
+            contact.preload = 0.0;
+            let first = contact.first_point as usize;
+            self.impulses[first..first + contact.point_count as usize + patch].fill(ImpulseRow::default());
+        }
     }
 
     /// Whether any contact has friction.
     pub fn has_friction(&self) -> bool {
-        self.contacts.iter().any(|c| c.friction > 0.0)
+        self.swept_contacts().any(|c| c.friction > 0.0)
     }
 
     /// Whether any contact can bounce.
     pub fn has_restitution(&self) -> bool {
-        self.contacts.iter().any(|c| c.restitution > 0.0)
+        self.swept_contacts().any(|c| c.restitution > 0.0)
     }
 
     /// Whether any contact is made by a round surface, whose radius its rows carry.
     pub fn has_round_shapes(&self) -> bool {
-        self.contacts.iter().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_are_counted_without_patches() {
-        for patch in [0, 1] {
-            let counts = [3, 1, 4, 2];
-            let mut problem = StepProblem::default();
-            let mut next = 0;
-            for point_count in counts {
-                problem.contacts.push(ContactRow { first_point: next, point_count, ..ContactRow::default() });
-                next += point_count + patch;
-            }
-            problem.points.resize(next as usize, PointRow::default());
-            assert_eq!(problem.has_patches(), patch == 1);
-            assert_eq!([0..4, 1..3, 2..4, 4..4].map(|rows| problem.point_count(rows)), [10, 5, 6, 0]);
-        }
+        self.swept_contacts().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
     }
 }

@@ -4,41 +4,32 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::StepProblem;
-use super::carry::{Carry, NO_ROW, Origin, Preload};
-use super::contacts::{Chunk, ContactRows, Source, Writer};
+use super::carry::{Carry, NO_POINT, Preload, Written};
+use super::contacts::{Writer, point_before};
 use super::follow::StepScale;
 use super::layout::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, MomentumRow,
-    Params, PointRow, Softness,
+    Params, PointRow, Softness, points_a_slot,
 };
+use super::slots::{Slots, Write};
 use super::softness::softness;
-use crate::collide::Detector;
+use crate::collide::{Detector, MAX_POINTS};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig, Stabilization};
-use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use crate::graph::{Coloring, ConstraintGraph, Edge};
 use crate::math::Lane;
 use crate::world::{BallJoint, Body, BodyKind, World};
 
-/// Where each row came from: what carries rows over from step to step, and gives impulses back to manifolds.
+/// Which manifold and which joint has which rows of a problem, and what follows from it.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
-    /// The contacts in the order of the pairs.
-    pub(super) sources: Vec<Source>,
-    /// Where each contact's row is.
-    pub(super) row_of: Vec<u32>,
-    /// The contacts for the graph, in the order of the pairs.
-    pub(super) edges: Vec<Edge>,
+    pub(super) slots: Slots,
+    graph: ConstraintGraph,
     /// The coloring of this step's contacts.
     pub coloring: Coloring,
     /// Whether every manifold has a row for friction of its own.
-    pub(super) patches: bool,
-    /// The detection whose manifolds the rows are of.
-    pub(super) seen: u64,
-    /// Separation of each point when its manifold was computed, in the order of the rows (m).
-    pub(super) computed: Vec<f32>,
-    /// The rows of the step before, where they have to move.
-    before: ContactRows,
-    sources_before: Vec<Source>,
-    edges_before: Vec<Edge>,
+    patches: bool,
+    /// Separation of each point when its manifold was computed, [`MAX_POINTS`] a slot (m).
+    computed: Vec<f32>,
     /// The joints that the rows are of, in the order of the world, and as edges of their graph.
     pub(super) joints: Vec<BallJoint>,
     pub(super) joint_edges: Vec<Edge>,
@@ -48,68 +39,59 @@ pub struct Prepared {
     pub(super) scale: Option<StepScale>,
     /// How the rows of contacts follow from those of the step before.
     pub carry: Carry,
-    /// Which joint each row is of: those of bodies that are awake.
-    pub(super) joint_rows: Vec<u32>,
-    /// Impulse of each joint at the end of the step before.
-    pub(super) joint_impulses: Vec<Vec3>,
 }
 
 /// Bodies that one task prepares at least.
 const CHUNK: usize = 256;
 
 impl Prepared {
-    /// Gives every manifold a color. A manifold that is reused keeps its own; where nothing else touches than in the step
-    /// before, all stay as they are.
-    pub fn color(&mut self, world: &World, detector: &mut Detector, graph: &mut ConstraintGraph, max_colors: u32) {
-        if detector.reshaped_in() <= self.seen {
+    /// Gives rows to manifolds that began since, and takes those of manifolds that ended.
+    pub fn follow(&mut self, world: &World, detector: &mut Detector) {
+        self.slots.follow(world, detector);
+    }
+
+    /// Gives every manifold that takes part a color; one that has a color keeps it.
+    pub fn color(&mut self, world: &World, max_colors: u32) {
+        let members: Vec<u32> = self.slots.taking_part().collect();
+        self.coloring = self.graph.color_members(world.bodies.len(), &mut self.slots.edges, &members, max_colors);
+    }
+
+    /// Whether so many rows are new that [`Self::sort_slots`] would move them. A device that has the rows does not take part in that.
+    pub fn are_slots_unsorted(&self) -> bool {
+        self.slots.are_unsorted()
+    }
+
+    /// Puts the rows of contacts into the order of the sweeps, if many are new.
+    pub fn sort_slots(&mut self, detector: &mut Detector, problem: &mut StepProblem) {
+        if !self.slots.are_unsorted() {
             return;
         }
-        std::mem::swap(&mut self.sources, &mut self.sources_before);
-        std::mem::swap(&mut self.edges, &mut self.edges_before);
-        self.sources.clear();
-        self.edges.clear();
-        let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
-        for (part, pairs) in detector.pairs_mut().enumerate() {
-            for (i, pair) in pairs.iter_mut().enumerate().filter(|(_, pair)| !pair.rests) {
-                let before = pair.contact as usize;
-                pair.contact = self.sources.len() as u32;
-                for k in 0..pair.manifolds.len() {
-                    let (source, edge) = if pair.computed_in > self.seen {
-                        let manifold = &pair.manifolds[k];
-                        let points = manifold.points().len() as u32;
-                        let source = Source { world: 0, pair: 0, manifold: k as u32, points, row_before: None };
-                        let [a, b] = [pair.body_a, pair.body_b].map(movable);
-                        (source, Edge { a, b, color: manifold.color, rank: pair.rank() })
-                    } else {
-                        let row_before = Some(self.row_of[before + k]);
-                        (Source { row_before, ..self.sources_before[before + k] }, self.edges_before[before + k])
-                    };
-                    self.sources.push(Source { world: part as u32, pair: i as u32, ..source });
-                    self.edges.push(edge);
-                }
-            }
-        }
-        self.coloring = graph.color(world.bodies.len(), &mut self.edges, max_colors);
-        self.row_of.resize(self.sources.len(), 0);
-        for (row, &contact) in self.coloring.order.iter().enumerate() {
-            self.row_of[contact as usize] = row as u32;
+        let from = self.slots.sort(&self.coloring.order, detector);
+        self.coloring.order = (0..self.coloring.order.len() as u32).collect();
+        let stride = points_a_slot(self.patches);
+        if !problem.contacts.is_empty() {
+            problem.contacts = moved(&problem.contacts, &from, 1);
+            (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
+            problem.points = moved(&problem.points, &from, stride);
+            problem.impulses = moved(&problem.impulses, &from, stride);
+            self.computed = moved(&self.computed, &from, MAX_POINTS);
         }
     }
 
-    /// Impulse of each joint on its body b at the end of the last step, world axes (N s).
-    pub fn joint_impulses(&self) -> &[Vec3] {
-        &self.joint_impulses
+    /// The color of the contact in a row.
+    pub fn color_of(&self, row: u32) -> Option<u8> {
+        self.slots.edges[row as usize].color
     }
 
-    /// Gives every joint a color; joints and contacts share none.
-    pub fn color_joints(&mut self, world: &World, graph: &mut ConstraintGraph, max_colors: u32) {
+    /// Gives every joint a color, unless all have theirs; joints and contacts share none.
+    pub fn color_joints(&mut self, world: &World, max_colors: u32) {
         if !self.are_joints_colored {
-            self.joint_coloring = graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
+            self.joint_coloring = self.graph.color(world.bodies.len(), &mut self.joint_edges, max_colors);
             self.are_joints_colored = true;
         }
     }
 
-    /// Writes the rows of a step of `dt` seconds into `problem`. Who is `asleep` stands in them as one that nothing moves.
+    /// Writes the rows of a step of `dt` seconds into `problem`. Bodies that are `asleep` stand in them as bodies that nothing moves.
     pub fn prepare(
         &mut self,
         world: &World,
@@ -121,6 +103,8 @@ impl Prepared {
     ) {
         prepare_bodies(world, asleep, config, problem);
         self.scale = Some(StepScale::new(config, dt));
+        let patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
+        self.lay_out(patches, problem);
         let h = dt / config.substeps as f32;
         problem.params = Params {
             substep: h,
@@ -131,26 +115,51 @@ impl Prepared {
             fixed: contact_softness(config, h, config.fixed_contact_frequency_ratio),
             joint: joint_softness(config, h),
             body_count: problem.bodies.len() as u32,
+            point_count: problem.points.len() as u32,
             slop: if config.stabilization == Stabilization::Baumgarte { config.slop } else { 0.0 },
             relaxation: config.relaxation,
             tolerance: config.tolerance,
+            patches: patches.into(),
             ..Params::default()
         };
         problem.convergence = ConvergenceRow::default();
         problem.momentum = MomentumRow::default();
+        problem.order.clone_from(&self.coloring.order);
         problem.colors.clone_from(&self.coloring.offsets);
-        problem.first_joint_color = problem.colors.len() as u32;
-        self.patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
+        problem.first_joint_color = self.coloring.color_count() as u32;
         self.prepare_joints(world, asleep, problem);
         self.prepare_contacts(world, detector, config, dt, problem);
-        problem.params.point_count = problem.points.len() as u32;
-        problem.params.joint_count = problem.joints.len() as u32;
+    }
+
+    /// Makes room for the rows of all slots. Where friction acts at other places than before, it begins without impulses.
+    fn lay_out(&mut self, patches: bool, problem: &mut StepProblem) {
+        let (count, stride) = (self.slots.all.len(), points_a_slot(patches));
+        if patches != self.patches {
+            let before = std::mem::take(&mut problem.impulses);
+            problem.impulses.resize(problem.contacts.len() * stride, ImpulseRow::default());
+            for (now, before) in problem.impulses.chunks_mut(stride).zip(before.chunks(points_a_slot(self.patches))) {
+                for (now, before) in now.iter_mut().zip(&before[..MAX_POINTS]) {
+                    now.normal = before.normal;
+                }
+            }
+            for (now, contact) in problem.impulses.chunks_mut(stride).zip(&problem.contacts) {
+                now[contact.point_count as usize..].fill(ImpulseRow::default());
+            }
+            self.patches = patches;
+        }
+        problem.contacts.resize(count, ContactRow::default());
+        problem.points.resize(count * stride, PointRow::default());
+        problem.impulses.resize(count * stride, ImpulseRow::default());
+        self.computed.resize(count * MAX_POINTS, 0.0);
     }
 
     fn prepare_joints(&mut self, world: &World, asleep: &[bool], problem: &mut StepProblem) {
         problem.joints.clear();
-        problem.joint_impulses.clear();
-        self.joint_rows.clear();
+        problem.joint_impulses.resize(world.joints.len(), JointImpulseRow::default());
+        problem.params.joint_count = world.joints.len() as u32;
+        if world.joints.is_empty() {
+            return;
+        }
         // A joint holds bodies of one island, which are asleep together.
         let rests = |body: usize| asleep.get(body) == Some(&true);
         let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
@@ -160,32 +169,28 @@ impl Prepared {
             (moves(joint.body_a) || joint.body_b.is_some_and(moves))
                 && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
         };
+        let contacts = problem.order.len();
         for color in self.joint_coloring.offsets.windows(2) {
-            problem.colors.push(self.joint_rows.len() as u32);
             let own = &self.joint_coloring.order[color[0] as usize..color[1] as usize];
-            self.joint_rows.extend(own.iter().filter(|&&i| is_awake(i)));
+            problem.order.extend(own.iter().filter(|&&i| is_awake(i)));
+            problem.colors.push(problem.order.len() as u32);
         }
-        if self.joint_rows.is_empty() {
-            problem.colors.truncate(problem.first_joint_color as usize);
-            return;
+        if problem.order.len() == contacts {
+            problem.colors.truncate(problem.first_joint_color as usize + 1);
         }
-        problem.colors.push(self.joint_rows.len() as u32);
         let world_row = world.bodies.len() as u32;
-        for &i in &self.joint_rows {
-            let joint = &world.joints[i as usize];
+        problem.joints.extend(world.joints.iter().map(|joint| {
             let [anchor_a, anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
-            problem.joints.push(JointRow {
+            JointRow {
                 r_a: arm(joint.body_a, anchor_a),
                 body_a: joint.body_a as u32,
                 r_b: joint.body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
                 body_b: joint.body_b.map_or(world_row, |b| b as u32),
                 gap: (anchor_b - anchor_a).to_array(),
                 ..JointRow::default()
-            });
-            let linear = self.joint_impulses[i as usize].to_array();
-            problem.joint_impulses.push(JointImpulseRow { linear, ..JointImpulseRow::default() });
-        }
+            }
+        }));
         // The world, as a body that nothing moves.
         if world.joints.iter().any(|j| j.body_b.is_none()) {
             problem.bodies.push(BodyRow::AT_REST);
@@ -193,6 +198,7 @@ impl Prepared {
             problem.params.body_count += 1;
         }
     }
+
     fn prepare_contacts(
         &mut self,
         world: &World,
@@ -201,14 +207,6 @@ impl Prepared {
         dt: f32,
         problem: &mut StepProblem,
     ) {
-        let reshaped = detector.reshaped_in() > self.seen;
-        if reshaped {
-            self.before.exchange(problem, &mut self.computed);
-            let total = self.lay_out(problem);
-            problem.points.resize(total, PointRow::default());
-            problem.impulses.resize(total, ImpulseRow::default());
-            self.computed.resize(total, 0.0);
-        }
         self.carry.approach =
             config.friction == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
         self.carry.preload = Preload {
@@ -217,74 +215,42 @@ impl Prepared {
             share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
             warm_start: config.warm_start.into(),
         };
-        if self.carry.on_device {
-            self.note_rows_before(detector);
-        }
-        let writer = Writer {
-            world,
-            detector,
-            config,
-            substep: problem.params.substep,
-            bodies: &problem.bodies,
-            masses: &problem.masses,
-            carry: &self.carry,
-            patches: self.patches,
-            seen: self.seen,
-            sources: &self.sources,
-            before: reshaped.then_some(&self.before),
-        };
-        writer.write(Chunk {
-            order: &self.coloring.order,
-            contacts: &mut problem.contacts,
-            points: &mut problem.points,
-            impulses: &mut problem.impulses,
-            computed: &mut self.computed,
-        });
-        self.seen = detector.detections();
+        self.note_written(detector);
+        let StepProblem { bodies, masses, contacts, points, impulses, params, .. } = problem;
+        let Self { slots, carry, patches, computed, .. } = self;
+        let (substep, patches) = (params.substep, *patches);
+        let writer = Writer { world, detector, config, substep, bodies, masses, carry, patches };
+        writer.write(&slots.all, contacts, points, impulses, computed);
+        slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
     }
 
-    /// Notes where the rows of each contact were in the step before.
-    fn note_rows_before(&mut self, detector: &Detector) {
-        let Carry { rows_before, computed, .. } = &mut self.carry;
-        rows_before.clear();
-        computed.clear();
-        let reshaped = detector.reshaped_in() > self.seen;
-        if !reshaped && detector.computed_in() <= self.seen {
+    /// Notes which rows are written again, for a device that has the others.
+    fn note_written(&mut self, detector: &Detector) {
+        self.carry.written.clear();
+        if !self.carry.on_device {
             return;
         }
-        for (row, &contact) in (0..).zip(&self.coloring.order) {
-            let source = &self.sources[contact as usize];
-            let pair = detector.pair(source.world, source.pair);
-            if pair.computed_in > self.seen {
-                let manifold = &pair.manifolds[source.manifold as usize];
-                let mut origin = Origin { row, contact: manifold.row_before.unwrap_or(NO_ROW), points: [NO_ROW; 4] };
-                for (before, point) in origin.points.iter_mut().zip(manifold.points()) {
-                    *before = point.row_before.unwrap_or(NO_ROW);
-                }
-                computed.push(origin);
-                rows_before.push(NO_ROW);
-            } else {
-                rows_before.push(if reshaped { source.row_before.unwrap_or(NO_ROW) } else { row });
+        let again = (0..).zip(&self.slots.all).filter(|(_, slot)| slot.write != Write::Separations);
+        self.carry.written.extend(again.map(|(row, slot)| {
+            let manifold = &detector.pair(slot.world, slot.pair).manifolds[slot.manifold as usize];
+            let mut points_before = if slot.write == Write::New { Written::NEW } else { [NO_POINT; MAX_POINTS] };
+            for ((k, point), before) in manifold.points().iter().enumerate().zip(&mut points_before) {
+                *before = point_before(slot.write, k, point).unwrap_or(*before);
             }
-        }
-        // What was computed touches nothing.
-        if !reshaped && computed.is_empty() {
-            rows_before.clear();
-        }
+            Written { row, points_before }
+        }));
     }
+}
 
-    /// Where the points of each contact begin; returns how many rows they are.
-    fn lay_out(&self, problem: &mut StepProblem) -> usize {
-        let order = &self.coloring.order;
-        problem.contacts.resize(order.len(), ContactRow::default());
-        let mut total = 0;
-        for (row, &contact) in problem.contacts.iter_mut().zip(order) {
-            row.first_point = total;
-            row.point_count = self.sources[contact as usize].points;
-            total += row.point_count + u32::from(self.patches);
+/// The rows of slots, `stride` each, that were at these places; those of slots without rows are left as they come.
+fn moved<T: Copy + Default>(rows: &[T], from: &[u32], stride: usize) -> Vec<T> {
+    let mut moved = vec![T::default(); from.len() * stride];
+    for (to, &from) in moved.chunks_mut(stride).zip(from) {
+        if let Some(rows) = rows.chunks(stride).nth(from as usize) {
+            to.copy_from_slice(rows);
         }
-        total as usize
     }
+    moved
 }
 
 /// How overlap is removed, for contacts of `ratio` times the frequency.

@@ -7,7 +7,7 @@ use crate::backend::cpu::Reference;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::metrics::{Penetration, drift, in_place, in_place_count, rms_speed};
+use crate::metrics::{drift, in_place, in_place_count, rms_speed};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::world::{Body, Shape, World};
@@ -158,7 +158,7 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
             let now = energy(&simulation.world);
             lowest = lowest.min(now);
             added = added.max(now - lowest);
-            let deepest = Penetration::of(simulation.pairs()).max;
+            let deepest = simulation.solved_penetration().max;
             points.push((f64::from(step) * f64::from(DT), deepest * 1e3));
         }
         let exit = exit_speed(text)?;

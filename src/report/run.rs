@@ -428,9 +428,8 @@ fn energy(world: &World) -> f64 {
 
 /// Manifolds of bodies that can be pushed, and their points, whether they sleep or not.
 fn contacts(simulation: &mut Simulation) -> (usize, usize) {
-    let (world, pairs) = simulation.world_and_pairs();
-    let moves = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
-    let of_bodies = pairs.filter(|p| moves(p.body_a) || moves(p.body_b)).flat_map(|p| &p.manifolds);
+    let moves: Vec<bool> = simulation.world.bodies.iter().map(|body| body.kind == BodyKind::Dynamic).collect();
+    let of_bodies = simulation.manifolds().filter(|m| moves[m.body_a] || moves[m.body_b]);
     of_bodies.fold((0, 0), |(manifolds, points), m| (manifolds + 1, points + m.points().len()))
 }
 

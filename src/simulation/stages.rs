@@ -3,9 +3,8 @@
 use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::error::Result;
-use crate::graph::ConstraintGraph;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{Prepared, StepProblem};
+use crate::problem::{Prepared, StepProblem, store};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::{MassProperties, Material, World};
@@ -15,41 +14,56 @@ use crate::world::{MassProperties, Material, World};
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
-    /// What the rows of contacts were written for, body by body.
-    surfaces: Vec<(MassProperties, Material)>,
-    graph: ConstraintGraph,
-    joint_graph: ConstraintGraph,
+    key: Key,
     pub prepared: Prepared,
     pub problem: StepProblem,
     pub plan: StepPlan,
-    /// What the plan was made for.
-    plan_key: PlanKey,
+    /// What the plan was made for; none if a plan has to be made anew.
+    plan_key: Option<PlanKey>,
+    /// Points of the contacts that take part, and bytes that the plan moves.
+    points: usize,
+    bytes_moved: u64,
+}
+
+/// What all rows are laid out for. Where the caller changed it, and only there, all that lasts is brought along.
+#[derive(Clone)]
+struct Key {
+    config: SolverConfig,
+    /// Body by body.
+    surfaces: Vec<(MassProperties, Material)>,
 }
 
 /// What the caller changed since the last step, as far as something that lasts between steps follows from it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Changes {
+    settings: bool,
     /// Masses or materials.
     surfaces: bool,
     joints: bool,
     /// The length of a substep or the stiffness of contacts.
     step: bool,
-    /// Whether the rows of contacts change with it, so that a device cannot go on from those that it has.
-    pub rows: bool,
+}
+
+impl Changes {
+    /// Whether all rows of contacts change with it, so that a device cannot go on from those that it has.
+    pub fn all_rows(self) -> bool {
+        self.settings || self.surfaces || self.step
+    }
 }
 
 impl Stages {
     pub fn new(world: &World, config: &SolverConfig) -> Self {
+        let surfaces = world.bodies.iter().map(|b| (b.mass, b.material)).collect();
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
-            surfaces: world.bodies.iter().map(|b| (b.mass, b.material)).collect(),
-            graph: ConstraintGraph::default(),
-            joint_graph: ConstraintGraph::default(),
+            key: Key { config: config.clone(), surfaces },
             prepared: Prepared::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
-            plan_key: PlanKey::default(),
+            plan_key: None,
+            points: 0,
+            bytes_moved: 0,
         }
     }
 
@@ -59,7 +73,7 @@ impl Stages {
     /// Bodies came, went, or changed kind or shape; a joint or a mass is not fit to be simulated.
     pub fn changes(&self, world: &World, config: &SolverConfig, dt: f32) -> Result<Changes> {
         self.detector.check_bodies(world)?;
-        let surfaces = world.bodies.iter().zip(&self.surfaces).any(|(b, known)| (b.mass, b.material) != *known);
+        let surfaces = world.bodies.iter().zip(&self.key.surfaces).any(|(b, known)| (b.mass, b.material) != *known);
         let joints = self.prepared.joints() != world.joints;
         world.check_gravity()?;
         if surfaces {
@@ -69,47 +83,38 @@ impl Stages {
             world.check_joints()?;
         }
         let step = self.prepared.is_step_new(config, dt);
-        Ok(Changes { surfaces, joints, step, rows: surfaces || step })
+        Ok(Changes { settings: self.key.config != *config, surfaces, joints, step })
     }
 
     /// Brings all that lasts to what the caller changed.
     pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: Changes) {
+        if changes.settings {
+            self.prepared.forget_joint_colors();
+            self.sleep.change_settings(world, &self.key.config, config);
+            self.key.config = config.clone();
+        }
         if changes.surfaces {
-            for (i, (known, body)) in self.surfaces.iter_mut().zip(&world.bodies).enumerate() {
+            for (i, (known, body)) in self.key.surfaces.iter_mut().zip(&world.bodies).enumerate() {
                 if *known != (body.mass, body.material) {
                     *known = (body.mass, body.material);
                     self.sleep.disturb(i);
                 }
             }
-            self.forget_layout();
         }
         if changes.joints {
-            for joint in self.prepared.follow_joints(world) {
+            for joint in self.prepared.follow_joints(world, &mut self.problem) {
                 self.sleep.disturb(joint.body_a);
                 joint.body_b.iter().for_each(|&b| self.sleep.disturb(b));
             }
             self.detector.follow_joints(world);
         }
         if changes.step {
-            self.prepared.change_step(world, config, dt, &mut self.problem, &mut self.detector);
+            self.prepared.change_step(world, config, dt, &mut self.problem);
         }
-    }
-
-    /// Takes over other settings.
-    pub fn change_settings(&mut self, world: &World, before: &SolverConfig, now: &SolverConfig) {
-        self.forget_layout();
-        if before.friction_at != now.friction_at {
-            // The other kind of friction begins without impulses.
-            self.detector.pairs_mut().flatten().flat_map(|p| &mut p.manifolds).for_each(|m| m.forget_friction());
+        if changes.settings || changes.surfaces {
+            self.prepared.write_again();
+            self.plan_key = None;
         }
-        self.prepared.forget_joint_colors();
-        self.sleep.change_settings(world, before, now);
-    }
-
-    /// Brings impulses, preloads and colors back to the manifolds, so that the next step writes all rows anew.
-    fn forget_layout(&mut self) {
-        self.prepared.give_all_back(&self.problem, &mut self.detector);
-        self.plan_key = PlanKey::default();
     }
 
     /// Wakes what was changed; whether there is nothing to do in this step.
@@ -124,42 +129,52 @@ impl Stages {
         let Self { detector, sleep, prepared, problem, .. } = self;
         let times = &mut stats.times;
         let found = timed(&mut times.detect, || {
-            let give_back = |pair: &mut _| prepared.give_back(problem, pair);
-            let mut found = detector.detect(world, config, dt, sleep.activity(), &give_back);
+            let mut found = detector.detect(world, config, dt, sleep.activity());
+            prepared.follow(world, detector);
             // A body that wakes takes part in this step already.
             while sleep.wake_touched(detector) {
-                let reshaped = found.reshaped;
-                found = detector.detect(world, config, dt, sleep.activity(), &give_back);
-                found.reshaped |= reshaped;
+                let before = found;
+                found = detector.detect(world, config, dt, sleep.activity());
+                prepared.follow(world, detector);
+                found.computed += before.computed;
+                found.reshaped |= before.reshaped;
             }
             found
         });
         timed(&mut times.color, || {
-            prepared.color(world, detector, &mut self.graph, config.max_colors);
-            prepared.color_joints(world, &mut self.joint_graph, config.max_colors);
+            if found.reshaped || self.plan_key.is_none() {
+                prepared.color(world, config.max_colors);
+                if !on_device {
+                    prepared.sort_slots(detector, problem);
+                }
+            }
+            prepared.color_joints(world, config.max_colors);
         });
         timed(&mut times.prepare, || {
             prepared.carry.on_device = on_device;
             prepared.prepare(world, sleep.asleep(), detector, config, dt, problem);
-            let contacts_changed = found.computed > 0 || found.reshaped;
-            if self.plan_key.update(problem, contacts_changed) {
+            let key = Some(PlanKey::of(problem));
+            if found.computed > 0 || found.reshaped || self.plan_key != key {
                 self.plan = StepPlan::new(config, problem);
+                self.points = problem.swept_contacts().map(|contact| contact.point_count as usize).sum();
+                self.bytes_moved = self.plan.bytes_moved(problem);
+                self.plan_key = key;
             }
         });
         stats.pairs = found.pairs;
         stats.computed = found.computed;
-        stats.manifolds = problem.contacts.len();
-        stats.points = problem.point_count(0..stats.manifolds);
-        stats.joints = problem.joints.len();
+        stats.manifolds = prepared.coloring.order.len();
+        stats.points = self.points;
+        stats.joints = problem.rows_of(&problem.joint_colors()).len();
         stats.colors = prepared.coloring.color_count();
         stats.overflow = prepared.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();
-        stats.bytes_moved = self.plan.bytes_moved(problem);
+        stats.bytes_moved = self.bytes_moved;
     }
 
-    /// Brings poses and velocities to the world; whether any body fell asleep.
-    pub fn store(&mut self, world: &mut World, dt: f32) -> bool {
-        self.prepared.store(&self.problem, self.sleep.asleep(), world);
-        self.sleep.after_step(world, &self.detector, dt)
+    /// Brings poses and velocities to the world.
+    pub fn store(&mut self, world: &mut World, dt: f32) {
+        store(&self.problem, self.sleep.asleep(), world);
+        self.sleep.after_step(world, &self.detector, dt);
     }
 }

@@ -80,7 +80,8 @@ impl Assembled {
         problem.masses = rows.masses.iter().map(Mass::store).collect();
         problem.points = rows.points.iter().map(Point::store).collect();
         problem.impulses = vec![ImpulseRow::default(); points.len()];
-        problem.first_joint_color = sequence.offsets.len() as u32;
+        problem.sweep_in_order_of_rows();
+        problem.first_joint_color = sequence.offsets.len() as u32 - 1;
         problem.colors = sequence.offsets;
         Ok(Self { problem, rows, points, hands })
     }

@@ -1,7 +1,6 @@
 //! What the color of a body says.
 
-use crate::collide::Pair;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, SolvedManifold};
 use crate::world::{BodyKind, World};
 
 /// What bodies are colored by.
@@ -56,17 +55,12 @@ impl ColorBy {
     /// 0 if not; NaN for bodies about which there is nothing to say.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
         let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();
-        let (world, pairs) = simulation.world_and_pairs();
-        self.values_of(world, pairs, &asleep)
+        let manifolds: Vec<SolvedManifold> = simulation.manifolds().collect();
+        self.values_of(&simulation.world, &manifolds, &asleep)
     }
 
-    /// The same, for bodies that make the contacts `pairs`, and of which some are `asleep`.
-    pub(super) fn values_of<'a>(
-        self,
-        world: &World,
-        pairs: impl IntoIterator<Item = &'a Pair>,
-        asleep: &[bool],
-    ) -> Vec<f32> {
+    /// The same, for bodies that touch by `manifolds`, and of which some are `asleep`.
+    pub(super) fn values_of(self, world: &World, manifolds: &[SolvedManifold], asleep: &[bool]) -> Vec<f32> {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
@@ -74,11 +68,11 @@ impl ColorBy {
             Self::Batch => {
                 // Impulse and color of the contact that bears most.
                 let mut most = vec![(-1.0, f32::NAN); world.bodies.len()];
-                for (pair, manifold) in contacts(pairs) {
-                    let impulse = manifold.points().iter().map(|p| p.normal_impulse).sum::<f32>();
+                for manifold in manifolds {
+                    let impulse = manifold.normal_impulse();
                     let Some(color) = manifold.color else { continue };
-                    for body in [pair.body_a, pair.body_b] {
-                        let best = &mut most[body as usize];
+                    for body in [manifold.body_a, manifold.body_b] {
+                        let best = &mut most[body];
                         *best = if impulse > best.0 { (impulse, f32::from(color)) } else { *best };
                     }
                 }
@@ -86,10 +80,9 @@ impl ColorBy {
             }
             Self::Impulse => {
                 let mut sums = vec![0.0; world.bodies.len()];
-                for (pair, manifold) in contacts(pairs) {
-                    let impulse = manifold.points().iter().map(|p| p.normal_impulse).sum::<f32>();
-                    sums[pair.body_a as usize] += impulse;
-                    sums[pair.body_b as usize] += impulse;
+                for manifold in manifolds {
+                    sums[manifold.body_a] += manifold.normal_impulse();
+                    sums[manifold.body_b] += manifold.normal_impulse();
                 }
                 sums
             }
@@ -117,12 +110,6 @@ impl ColorBy {
         };
         world.bodies.iter().zip(values).enumerate().map(color).collect()
     }
-}
-
-fn contacts<'a>(
-    pairs: impl IntoIterator<Item = &'a Pair>,
-) -> impl Iterator<Item = (&'a Pair, &'a crate::collide::Manifold)> {
-    pairs.into_iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
 }
 
 /// Number of each dynamic body's material, in the order in which they first occur.

@@ -60,7 +60,7 @@ impl Film {
 
     /// Adds a world of which no more is known.
     fn add_world(&mut self, time: f64, world: &World) {
-        self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, [], &[]) });
+        self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, &[], &[]) });
     }
 
     /// The frames.

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, SolvedManifold};
 use crate::world::{BallJoint, BodyKind, World};
 
 /// One end of a line, as the shader takes it.
@@ -44,24 +44,21 @@ pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
 
 /// Pairs of line ends, `size` long where a length has no other measure (m).
 pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
-    let (world, pairs) = simulation.world_and_pairs();
+    let manifolds: Vec<SolvedManifold> = if overlay.contacts { simulation.manifolds().collect() } else { Vec::new() };
+    let world = &simulation.world;
     let mut ends = Vec::new();
     let mut line = |from: Vec3, to: Vec3, color: Rgba| {
         ends.extend([from, to].map(|p| LineEnd { position: p.to_array(), color }));
     };
-    if overlay.contacts {
-        for pair in pairs {
-            let center = world.bodies[pair.body_a as usize].center_of_mass();
-            for manifold in &pair.manifolds {
-                let color = manifold.color.map_or(GAP, |c| batch_color(c.into()));
-                for point in manifold.points() {
-                    let at = center + point.r_a;
-                    line(at, at + size * manifold.normal, color);
-                    let (u, v) = manifold.normal.any_orthonormal_pair();
-                    line(at - 0.25 * size * u, at + 0.25 * size * u, color);
-                    line(at - 0.25 * size * v, at + 0.25 * size * v, color);
-                }
-            }
+    for manifold in &manifolds {
+        let center = world.bodies[manifold.body_a].center_of_mass();
+        let color = manifold.color.map_or(GAP, |c| batch_color(c.into()));
+        for point in manifold.points() {
+            let at = center + point.r_a;
+            line(at, at + size * manifold.normal, color);
+            let (u, v) = manifold.normal.any_orthonormal_pair();
+            line(at - 0.25 * size * u, at + 0.25 * size * u, color);
+            line(at - 0.25 * size * v, at + 0.25 * size * v, color);
         }
     }
     if overlay.joints {
@@ -101,7 +98,7 @@ mod tests {
         let reference = Box::new(Reference::<f32>::new());
         let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
         simulation.step(scene.dt).expect("a step");
-        let points: usize = simulation.pairs().flat_map(|p| &p.manifolds).map(|m| m.points().len()).sum();
+        let points: usize = simulation.manifolds().map(|m| m.points().len()).sum();
         assert!(points > 0);
         let world = simulation.world.clone();
         let mut count = |overlay: Overlay| lines(&mut simulation, overlay, 0.1).len() / 2;

@@ -5,7 +5,6 @@ use clap::ValueEnum;
 use super::colors::ColorBy;
 use super::live::Live;
 use crate::config::FrictionRule;
-use crate::metrics::Penetration;
 
 /// Fills `ui`.
 pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
@@ -29,11 +28,10 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
 
 fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let asleep = live.stats.asleep;
-    let pairs = live.simulation.pairs();
-    let depth = Penetration::of(pairs.clone());
+    let depth = live.simulation.solved_penetration();
     // With those of sleepers, which the last step does not count.
     let (manifolds, points, colors) =
-        pairs.flat_map(|p| &p.manifolds).fold((0, 0, 0), |(manifolds, points, colors), m| {
+        live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
             (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
         });
     let world = &live.simulation.world;

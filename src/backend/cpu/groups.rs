@@ -21,7 +21,7 @@ pub(super) struct Group {
     pub b: Bodies,
     /// Rows of the problem that the lanes hold; `NO_ROW` where there is none.
     rows: [u32; WIDTH],
-    pub contact: [Wide; 10],
+    pub contact: [Wide; 11],
     /// Where its points begin, in `points` and `impulses`.
     pub first_point: u32,
     /// Points, the patch included.
@@ -221,7 +221,7 @@ impl Group {
             self.a.set(lane, c.body_a as usize, problem, slots);
             self.b.set(lane, c.body_b as usize, problem, slots);
             let ([nx, ny, nz], [tx, ty, tz]) = (c.normal, c.tangent);
-            let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b];
+            let header = [nx, ny, nz, tx, ty, tz, c.friction, c.restitution, c.radius_a, c.radius_b, c.preload];
             set_lane(&mut self.contact, lane, &header);
             for (k, (point, impulse)) in points.iter_mut().zip(impulses.iter_mut()).enumerate() {
                 let from = c.first_point as usize + k;

@@ -145,6 +145,8 @@ impl Cpu {
                 }
             }
             Kernel::MeasureStep => {
+                // Rows that take no part do not move.
+                self.lengths.clear();
                 self.lengths.resize(problem.impulse_count(), StepLength::default());
                 self.groups.measure_step(problem, &self.impulses, &mut self.lengths, crew);
                 let joints = self.joint_impulses.iter().zip(&self.joint_steps);
@@ -290,7 +292,7 @@ impl Backend for Cpu {
 
     fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
         let (problem, passes) = step.into_parts();
-        let widest = problem.bodies.len().max(problem.contacts.len()).max(problem.joints.len()).div_ceil(WIDTH);
+        let widest = problem.bodies.len().max(problem.order.len()).div_ceil(WIDTH);
         Crew::lead(widest, |crew| {
             self.load(problem, crew);
             for passes in passes.chunk_by(|p, q| stays_on_islands(p.kernel) && stays_on_islands(q.kernel)) {

@@ -41,7 +41,7 @@ impl Parts {
         self.of_body.clear();
         self.of_body.resize(bodies, u32::MAX);
         self.count = 1;
-        if problem.contacts.len() + problem.joints.len() + bodies > undivided {
+        if problem.order.len() + bodies > undivided {
             self.find_islands(problem);
             self.pack_islands(problem);
         }
@@ -126,8 +126,9 @@ impl Parts {
 }
 
 fn ends_of_constraints(problem: &StepProblem) -> impl Iterator<Item = [u32; 2]> + Clone {
-    let contacts = problem.contacts.iter().map(|c| [c.body_a, c.body_b]);
-    contacts.chain(problem.joints.iter().map(|j| [j.body_a, j.body_b]))
+    let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
+    let joints = problem.rows_of(&problem.joint_colors()).iter().map(|&row| &problem.joints[row as usize]);
+    contacts.chain(joints.map(|j| [j.body_a, j.body_b]))
 }
 
 /// Whether any pass can change a body.
@@ -178,18 +179,21 @@ pub(super) struct Dealt {
 impl Dealt {
     /// Deals out the rows of some colors; `part_of` says to which part.
     pub fn update(&mut self, problem: &StepProblem, colors: Range<u32>, parts: usize, part_of: impl Fn(usize) -> u32) {
-        let rows =
-            || colors.clone().flat_map(|color| problem.rows_of(&(color..color + 1)).map(move |row| (color, row)));
+        let rows = || {
+            colors.clone().flat_map(|color| problem.rows_of(&(color..color + 1)).iter().map(move |&row| (color, row)))
+        };
         if parts == 1 {
-            let first = problem.rows_of(&colors).start as u32;
             self.rows.clear();
-            self.rows.extend(problem.rows_of(&colors).map(|row| row as u32));
+            self.rows.extend_from_slice(problem.rows_of(&colors));
             self.begins.clear();
+            let first = problem.colors.get(colors.start as usize).copied().unwrap_or(0);
             self.begins.extend(colors.clone().map(|color| problem.colors[color as usize] - first));
             self.begins.push(self.rows.len() as u32);
             return;
         }
-        let cell = |(color, row)| part_of(row) as usize * colors.len() + (color - colors.start) as usize;
+        let cell = |(color, row): (u32, u32)| {
+            part_of(row as usize) as usize * colors.len() + (color - colors.start) as usize
+        };
         self.begins.clear();
         self.begins.resize(parts * colors.len() + 1, 0);
         rows().for_each(|row| self.begins[cell(row) + 1] += 1);
@@ -200,7 +204,7 @@ impl Dealt {
         self.rows.resize(problem.rows_of(&colors).len(), 0);
         for row in rows() {
             let place = &mut self.next[cell(row)];
-            self.rows[*place as usize] = row.1 as u32;
+            self.rows[*place as usize] = row.1;
             *place += 1;
         }
     }
@@ -223,12 +227,14 @@ mod tests {
 
     /// Movable bodies, touching as said.
     fn problem(bodies: usize, touching: impl Iterator<Item = (u32, u32)>) -> StepProblem {
-        StepProblem {
+        let mut problem = StepProblem {
             bodies: vec![BodyRow::AT_REST; bodies],
             masses: vec![MassRow { inv_mass: 1.0, ..MassRow::default() }; bodies],
             contacts: touching.map(|(body_a, body_b)| ContactRow { body_a, body_b, ..ContactRow::default() }).collect(),
             ..StepProblem::default()
-        }
+        };
+        problem.sweep_in_order_of_rows();
+        problem
     }
 
     fn parts(problem: &StepProblem) -> Parts {

@@ -76,7 +76,15 @@ impl<S: Scalar> Reference<S> {
                     integrate_positions(params, body);
                 }
             }
-            Kernel::ClearImpulses => self.rows.impulses.iter_mut().for_each(clear_impulse),
+            Kernel::ClearImpulses => {
+                let patch = usize::from(problem.has_patches());
+                for &i in problem.rows_of(&pass.colors) {
+                    let row = &problem.contacts[i as usize];
+                    let first = row.first_point as usize;
+                    let own = &mut self.rows.impulses[first..first + row.point_count as usize + patch];
+                    own.iter_mut().for_each(clear_impulse);
+                }
+            }
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::Extrapolate { first, measured } => {
                 if !(measured && self.convergence.done != 0) {
@@ -151,7 +159,7 @@ impl<S: Scalar> Reference<S> {
         pass: &Pass,
         kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Contact<S>, &[Point<S>], &mut [Impulse<S>]),
     ) {
-        for i in problem.rows_of(&pass.colors) {
+        for i in problem.rows_of(&pass.colors).iter().map(|&row| row as usize) {
             let row = &problem.contacts[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);
@@ -170,7 +178,7 @@ impl<S: Scalar> Reference<S> {
         pass: &Pass,
         kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Joint<S>, &mut Vec3<S>),
     ) {
-        for i in problem.rows_of(&pass.colors) {
+        for i in problem.rows_of(&pass.colors).iter().map(|&row| row as usize) {
             let row = &problem.joints[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);

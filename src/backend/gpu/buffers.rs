@@ -70,19 +70,15 @@ impl Buffers {
         self.generation += 1;
     }
 
-    /// Makes room for `bytes` after the first `kept` bytes of a buffer, and sends them there.
-    pub fn append(&mut self, binding: u32, kept: usize, bytes: &[u8]) {
-        if bytes.is_empty() {
-            return;
-        }
+    /// Makes room for `size` bytes; the first `kept` bytes stay.
+    pub fn grow(&mut self, binding: u32, kept: usize, size: usize) {
         let before = self.slots[binding as usize].buffer.clone();
-        self.reserve(binding, kept + bytes.len());
+        self.reserve(binding, size);
         if let Some(before) = before.filter(|b| b != self.get(binding)) {
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.copy_buffer_to_buffer(&before, 0, self.get(binding), 0, kept as u64);
             self.queue.submit([encoder.finish()]);
         }
-        self.write(binding, kept, bytes);
     }
 
     /// Sends rows that begin at the byte `at`.
@@ -138,11 +134,6 @@ impl Buffers {
         known.extend_from_slice(bytes);
     }
 
-    /// Exchanges the buffers of two bindings.
-    pub fn swap(&mut self, a: u32, b: u32) {
-        self.slots.swap(a as usize, b as usize);
-        self.generation += 1;
-    }
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at

@@ -29,7 +29,7 @@ use std::sync::{Arc, Mutex};
 use super::{Backend, CheckedStep};
 use crate::error::{Error, Result};
 use crate::kernels::momentum::{CHUNK, StepLength};
-use crate::plan::{Kernel, Pass};
+use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::carry::Carry;
 use crate::problem::{BodyRow, PassColors, StepProblem};
 use crate::stats::{KernelTime, Traffic};
@@ -70,6 +70,7 @@ pub struct Gpu {
     rows: Option<Rows>,
     /// Memory that is used again.
     separations: Vec<f32>,
+    colors: Vec<u32>,
     states: Vec<BodyRow>,
     /// First error that the device reported outside a call.
     device_error: Arc<Mutex<Option<String>>>,
@@ -120,6 +121,7 @@ impl Gpu {
             traffic: Traffic::default(),
             rows: None,
             separations: Vec::new(),
+            colors: Vec::new(),
             states: Vec::new(),
             device_error,
         })
@@ -138,19 +140,31 @@ impl Gpu {
     /// Sends every row, whatever the device has.
     fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         self.check(problem, passes)?;
-        for (binding, bytes) in small_rows_of(problem) {
+        for (binding, _) in small_rows_of(problem, &[]) {
             self.buffers.note(binding, &[]);
-            self.buffers.update(binding, bytes);
         }
+        self.update_small_rows(problem);
         for (binding, bytes) in contact_rows_of(problem) {
             self.buffers.send(binding, bytes);
         }
         Ok(())
     }
 
+    /// Sends those of the small rows that the device does not have yet.
+    fn update_small_rows(&mut self, problem: &StepProblem) {
+        // Colors begin in the same buffer, after themselves.
+        let shift = problem.colors.len() as u32;
+        self.colors.clear();
+        self.colors.extend(problem.colors.iter().map(|begin| begin + shift));
+        self.colors.extend_from_slice(&problem.order);
+        for (binding, bytes) in small_rows_of(problem, &self.colors) {
+            self.buffers.update(binding, bytes);
+        }
+    }
+
     /// Refuses a problem that is too large, before anything of it is sent.
     fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
-        for (binding, bytes) in small_rows_of(problem).into_iter().chain(contact_rows_of(problem)) {
+        for (binding, bytes) in small_rows_of(problem, &problem.order).into_iter().chain(contact_rows_of(problem)) {
             self.buffers.check(binding, bytes.len())?;
         }
         let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
@@ -195,9 +209,14 @@ impl Gpu {
 
     /// Adds to the times of the kernels what they moved.
     fn count_bytes(&mut self, problem: &StepProblem, passes: &[Pass]) {
+        if self.times.is_empty() {
+            return;
+        }
+        let plan = StepPlan { passes: passes.to_vec() };
+        let bytes: Vec<u64> = plan.bytes_of_passes(problem).collect();
         for time in &mut self.times {
-            let own = passes.iter().filter(|pass| pass.kernel.name() == time.kernel);
-            time.bytes = own.map(|pass| pass.bytes_moved(problem)).sum();
+            let own = passes.iter().zip(&bytes).filter(|(pass, _)| pass.kernel.name() == time.kernel);
+            time.bytes = own.map(|(_, bytes)| bytes).sum();
         }
     }
 
@@ -286,7 +305,7 @@ impl Gpu {
         self.states.clear();
         self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
         self.buffers.note(shader::BODIES, bytemuck::cast_slice(&self.states));
-        self.rows = Some(Rows::of(problem, carry));
+        self.rows = Some(Rows::of(problem));
         Ok(())
     }
 }
@@ -345,13 +364,13 @@ impl Backend for Gpu {
 }
 
 /// Rows of which a step changes little.
-fn small_rows_of(problem: &StepProblem) -> [(u32, &[u8]); 9] {
+fn small_rows_of<'a>(problem: &'a StepProblem, colors: &'a [u32]) -> [(u32, &'a [u8]); 9] {
     [
         (shader::PARAMS, bytemuck::bytes_of(&problem.params)),
         (shader::BODIES, bytemuck::cast_slice(&problem.bodies)),
         (shader::MASSES, bytemuck::cast_slice(&problem.masses)),
         (shader::INERTIAS, bytemuck::cast_slice(&problem.inertias)),
-        (shader::COLORS, bytemuck::cast_slice(&problem.colors)),
+        (shader::COLORS, bytemuck::cast_slice(colors)),
         (shader::JOINTS, bytemuck::cast_slice(&problem.joints)),
         (shader::JOINT_IMPULSES, bytemuck::cast_slice(&problem.joint_impulses)),
         (shader::CONVERGENCE, bytemuck::bytes_of(&problem.convergence)),
@@ -408,7 +427,7 @@ fn dispatch_of(problem: &StepProblem, pass: &Pass) -> Dispatch {
     let rows = match pass.kernel {
         Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
         Kernel::IntegrateGyroscopic => problem.inertias.len(),
-        Kernel::ClearImpulses => problem.impulses.len(),
+        Kernel::ClearImpulses => problem.rows_of(&pass.colors).len(),
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
         // A workgroup a chunk.
         Kernel::MeasureStep => problem.impulse_count().div_ceil(CHUNK) * WORKGROUP as usize,

@@ -32,9 +32,9 @@ pub const BINDINGS: [&str; 17] = [
     "impulse_steps",
     "lengths",
 ];
-/// The bindings that carry rows from step to step, and that of a plan that one workgroup follows; their numbers follow on.
-pub const CARRY_BINDINGS: [&str; 8] =
-    ["carry", "places", "origins", "contacts_before", "points_before", "impulses_before", "separations", "passes"];
+/// The bindings that begin a step from the rows of the step before, and that of a plan that one workgroup follows; their numbers follow on.
+pub const CARRY_BINDINGS: [&str; 6] =
+    ["carry", "written", "written_contacts", "written_points", "separations", "passes"];
 /// How many of them, the last, stay on the device: velocities without the impulses of the substep, and what accelerated
 /// sweeps leave for each other.
 pub const SCRATCH: usize = 4;
@@ -58,7 +58,7 @@ pub const CONTACTS: u32 = 5;
 pub const POINTS: u32 = 6;
 /// Impulses of the points, read back when somebody asks.
 pub const IMPULSES: u32 = 7;
-/// Where colors begin.
+/// Where colors begin, and the rows that are in them.
 pub const COLORS: u32 = 8;
 /// Joints.
 pub const JOINTS: u32 = 9;
@@ -70,20 +70,16 @@ pub const CONVERGENCE: u32 = 11;
 pub const MOMENTUM: u32 = 12;
 /// What [`CARRY_BINDINGS`] is about, the same for all.
 pub const CARRY: u32 = 17;
-/// Where each contact was.
-pub const PLACES: u32 = 18;
-/// Where the impulses were of those that were computed since.
-pub const ORIGINS: u32 = 19;
-/// Rows of the step before.
-pub const CONTACTS_BEFORE: u32 = 20;
-/// Rows of the step before.
-pub const POINTS_BEFORE: u32 = 21;
-/// Rows of the step before.
-pub const IMPULSES_BEFORE: u32 = 22;
+/// Which contacts were written again.
+pub const WRITTEN: u32 = 18;
+/// Their rows.
+pub const WRITTEN_CONTACTS: u32 = 19;
+/// Their points.
+pub const WRITTEN_POINTS: u32 = 20;
 /// How far the points are apart when the step begins.
-pub const SEPARATIONS: u32 = 23;
+pub const SEPARATIONS: u32 = 21;
 /// The passes of a plan that one workgroup follows.
-pub const PASSES: u32 = 24;
+pub const PASSES: u32 = 22;
 /// Threads of a workgroup, the constant of the same name in `bindings.wgsl`.
 pub const WORKGROUP: u32 = 64;
 
@@ -103,15 +99,15 @@ pub enum Program {
     Whole(Arc<[Kernel]>, u32),
     /// Bodies begin a step; before the plan, as the others.
     BeginBodies,
-    /// Rows of contacts are brought to their places.
-    CarryContacts,
+    /// Rows of contacts are written again.
+    WriteContacts,
     /// Contacts begin a step.
     BeginContacts,
 }
 
 impl Program {
     /// Those that are not kernels of plans.
-    pub const CARRY: [Self; 3] = [Self::BeginBodies, Self::CarryContacts, Self::BeginContacts];
+    pub const CARRY: [Self; 3] = [Self::BeginBodies, Self::WriteContacts, Self::BeginContacts];
 
     /// Name of the shader file and of its entry point.
     pub fn name(&self) -> &'static str {
@@ -119,7 +115,7 @@ impl Program {
             Self::Pass(kernel) => kernel.name(),
             Self::Whole(..) => "whole_step",
             Self::BeginBodies => "begin_bodies",
-            Self::CarryContacts => "carry_contacts",
+            Self::WriteContacts => "write_contacts",
             Self::BeginContacts => "begin_contacts",
         }
     }
@@ -130,7 +126,7 @@ impl Program {
             Self::Pass(kernel) => return source(*kernel),
             Self::Whole(kernels, threads) => return whole::source(kernels, *threads),
             Self::BeginBodies => part!("carry/begin_bodies"),
-            Self::CarryContacts => part!("carry/carry_contacts"),
+            Self::WriteContacts => part!("carry/write_contacts"),
             Self::BeginContacts => part!("carry/begin_contacts"),
         };
         [part!("lib/types"), part!("lib/math"), part!("carry/bindings"), own].join("\n")

@@ -85,7 +85,7 @@ pub(super) fn source(kernels: &[Kernel], threads: u32) -> String {
     }
     text + &format!(
         "
-@group(0) @binding(24) var<uniform> passes: array<vec4u, {}>;
+@group(0) @binding(22) var<uniform> passes: array<vec4u, {}>;
 
 @compute @workgroup_size(WORKGROUP)
 fn whole_step(@builtin(local_invocation_id) thread: vec3u, @builtin(num_workgroups) groups: vec3u) {{

@@ -73,8 +73,8 @@ pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dy
     let pools = pools?;
     let row = |&threads: &usize| LimitRow {
         threads,
-        manifolds: problem.contacts.len(),
-        points: problem.point_count(0..problem.contacts.len()),
+        manifolds: problem.swept_contacts().count(),
+        points: problem.swept_contacts().map(|contact| contact.point_count as usize).sum(),
         sweeps: 0.0,
         operations: operations(),
         peak: 0.0,

@@ -284,7 +284,7 @@ fn residual(simulation: &mut Simulation, dt: f32) -> Option<f64> {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         problem.impulses[own].iter().map(|i| glam::Vec3::new(i.normal, i.tangent_1, i.tangent_2).as_dvec3())
     };
-    let impulses: Vec<_> = problem.contacts.iter().flat_map(of_contact).collect();
+    let impulses: Vec<_> = problem.swept_contacts().flat_map(of_contact).collect();
     let (contacts, _) = simulation.step_with_contacts("bench", dt).ok()?;
     Some(Residuals::of(&contacts, &impulses).e_vel)
 }

@@ -1,0 +1,134 @@
+//! Which manifold has which rows: a slot, from its first step until it ends.
+//!
+//! Rows stay where they are. What a step changes is which slots take part, and in which order they are swept. Backends are fastest where
+//! slots stand in that order: where many are new, all are sorted ([`super::Prepared::sort_slots`]). A step of a pyramid of 125,000
+//! boxes takes 1.12 of the time if slots stay in the order of the pairs.
+
+use crate::collide::{Change, Detector, NO_SLOT, Pair};
+use crate::graph::{Edge, IMMOVABLE};
+use crate::world::{BodyKind, World};
+
+/// What the next step writes to the rows of a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Write {
+    /// How far apart its points are now.
+    Separations,
+    /// Everything but the impulses: the manifold is the same, and masses, materials or settings are others.
+    Rows,
+    /// Everything: the manifold was computed anew, and its points bring their impulses along.
+    Computed,
+    /// Everything: the slot has another manifold, which begins without impulses.
+    New,
+}
+
+/// One slot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slot {
+    /// World of the pair.
+    pub world: u32,
+    /// Place of the pair among those of its world.
+    pub pair: u32,
+    /// Which manifold of the pair.
+    pub manifold: u32,
+    pub write: Write,
+    /// Whether its manifold is swept; not if it rests, and not if the slot is free.
+    pub takes_part: bool,
+}
+
+const FREE: Slot = Slot { world: 0, pair: 0, manifold: 0, write: Write::Separations, takes_part: false };
+
+/// All slots, those that are free included.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Slots {
+    pub all: Vec<Slot>,
+    /// What the graph colors, one edge a slot.
+    pub edges: Vec<Edge>,
+    free: Vec<u32>,
+    /// How many were taken since all were sorted.
+    taken: usize,
+}
+
+impl Slots {
+    /// Follows the detection: manifolds that began take a slot, those that ended leave theirs.
+    pub fn follow(&mut self, world: &World, detector: &mut Detector) {
+        detector.take_changes(&mut |change| match change {
+            Change::Ended(slot) => self.release(slot),
+            Change::Pair { place, pair, computed } => self.follow_pair(world, place, pair, computed),
+        });
+    }
+
+    fn follow_pair(&mut self, world: &World, [part, i]: [u32; 2], pair: &mut Pair, computed: bool) {
+        pair.manifolds.retain(|manifold| {
+            if manifold.has_ended() {
+                self.release(manifold.slot);
+            }
+            !manifold.has_ended()
+        });
+        let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
+        let (a, b, takes_part) = (movable(pair.body_a), movable(pair.body_b), pair.takes_part);
+        let rank = pair.rank();
+        for (k, manifold) in (0..).zip(&mut pair.manifolds) {
+            let is_new = manifold.slot == NO_SLOT;
+            if is_new {
+                manifold.slot = self.take();
+            }
+            let slot = &mut self.all[manifold.slot as usize];
+            let wakes = takes_part && !slot.takes_part;
+            let write = match (is_new, computed, wakes) {
+                (true, ..) => Write::New,
+                (_, true, _) => Write::Computed,
+                (.., true) => Write::Rows,
+                _ => Write::Separations,
+            };
+            *slot = Slot { world: part, pair: i, manifold: k, write: slot.write.max(write), takes_part };
+            let edge = &mut self.edges[manifold.slot as usize];
+            *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
+        }
+    }
+
+    fn take(&mut self) -> u32 {
+        self.taken += 1;
+        if let Some(slot) = self.free.pop() {
+            return slot;
+        }
+        self.all.push(FREE);
+        self.edges.push(Edge { a: IMMOVABLE, b: IMMOVABLE, color: None, rank: 0 });
+        self.all.len() as u32 - 1
+    }
+
+    fn release(&mut self, slot: u32) {
+        self.all[slot as usize] = FREE;
+        self.edges[slot as usize].color = None;
+        self.free.push(slot);
+    }
+
+    /// Lets the next step write all rows again.
+    pub fn write_again(&mut self) {
+        self.all.iter_mut().for_each(|slot| slot.write = slot.write.max(Write::Rows));
+    }
+
+    /// Whether so many are new that it pays to sort all: more than half as many as there are.
+    pub fn are_unsorted(&self) -> bool {
+        2 * self.taken > self.all.len() - self.free.len()
+    }
+
+    /// Puts slots into an `order` that begins with those that take part; returns where each was. Free slots vanish.
+    pub fn sort(&mut self, order: &[u32], detector: &mut Detector) -> Vec<u32> {
+        let mut is_free = vec![false; self.all.len()];
+        self.free.drain(..).for_each(|slot| is_free[slot as usize] = true);
+        let resting = (0..).zip(&self.all).filter(|&(i, slot)| !slot.takes_part && !is_free[i]).map(|(i, _)| i as u32);
+        let from: Vec<u32> = order.iter().copied().chain(resting).collect();
+        self.all = from.iter().map(|&slot| self.all[slot as usize]).collect();
+        self.edges = from.iter().map(|&slot| self.edges[slot as usize]).collect();
+        for (i, slot) in (0..).zip(&self.all) {
+            detector.pair_mut(slot.world, slot.pair).manifolds[slot.manifold as usize].slot = i;
+        }
+        self.taken = 0;
+        from
+    }
+
+    /// Those that take part, ascending.
+    pub fn taking_part(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.all).filter(|(_, slot)| slot.takes_part).map(|(i, _)| i)
+    }
+}

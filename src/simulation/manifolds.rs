@@ -1,0 +1,102 @@
+//! What touches, for people and programs to read.
+
+use glam::Vec3;
+
+use crate::collide::{Detector, MAX_POINTS, Manifold, NO_SLOT, Pair};
+use crate::problem::{ImpulseRow, Prepared, StepProblem};
+
+/// The contact of two bodies over one pair of convex parts, as the last step left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolvedManifold {
+    /// The body that the normal points away from.
+    pub body_a: usize,
+    /// The body that the normal points to.
+    pub body_b: usize,
+    /// Unit normal from a to b, world axes.
+    pub normal: Vec3,
+    /// Its color among those of its kind; none if it found none and is swept alone.
+    pub color: Option<u8>,
+    /// How far the springs of the contact are compressed while the surfaces just touch (m).
+    pub preload: f32,
+    /// Impulse of the twist about the normal, with friction per manifold (N m s).
+    pub twist_impulse: f32,
+    /// Friction impulse on b in the last substep, with friction per manifold, world axes (N s).
+    pub friction_impulse: Vec3,
+    points: [SolvedPoint; MAX_POINTS],
+    count: usize,
+}
+
+/// One contact point, as the last step left it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SolvedPoint {
+    /// On the surface of a, in a's frame (m).
+    pub anchor_a: Vec3,
+    /// On the surface of b, in b's frame (m).
+    pub anchor_b: Vec3,
+    /// From the center of mass of a to the point midway between the surfaces, world axes (m).
+    pub r_a: Vec3,
+    /// From the center of mass of b to that point (m).
+    pub r_b: Vec3,
+    /// Distance along the normal when the step began, negative when overlapping (m).
+    pub separation: f32,
+    /// Normal impulse on b in the last substep (N s).
+    pub normal_impulse: f32,
+    /// Friction impulse on b in the last substep, world axes (N s).
+    pub friction_impulse: Vec3,
+}
+
+impl SolvedManifold {
+    /// Its points, 1 to 4.
+    pub fn points(&self) -> &[SolvedPoint] {
+        &self.points[..self.count]
+    }
+
+    /// Sum of the normal impulses of its points (N s).
+    pub fn normal_impulse(&self) -> f32 {
+        self.points().iter().map(|point| point.normal_impulse).sum()
+    }
+}
+
+/// All manifolds that have rows, in the order of their pairs.
+pub(super) fn of(
+    detector: &Detector,
+    prepared: &Prepared,
+    problem: &StepProblem,
+) -> impl Iterator<Item = SolvedManifold> + Clone {
+    let all = detector.pairs().flat_map(|pair| pair.manifolds.iter().map(move |manifold| (pair, manifold)));
+    let written = all.filter(|(_, manifold)| manifold.slot != NO_SLOT && !manifold.has_ended());
+    written.map(|(pair, manifold)| solved(pair, manifold, prepared, problem))
+}
+
+fn solved(pair: &Pair, manifold: &Manifold, prepared: &Prepared, problem: &StepProblem) -> SolvedManifold {
+    let contact = &problem.contacts[manifold.slot as usize];
+    let (tangent_1, tangent_2) = contact.tangents();
+    let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+    let (first, count) = (contact.first_point as usize, contact.point_count as usize);
+    let mut points = [SolvedPoint::default(); MAX_POINTS];
+    let rows = problem.points[first..first + count].iter().zip(&problem.impulses[first..]);
+    for ((point, from), (row, impulse)) in points.iter_mut().zip(manifold.points()).zip(rows) {
+        *point = SolvedPoint {
+            anchor_a: from.anchor_a,
+            anchor_b: from.anchor_b,
+            r_a: from.r_a,
+            r_b: from.r_b,
+            separation: row.separation,
+            normal_impulse: impulse.normal,
+            friction_impulse: friction(impulse),
+        };
+    }
+    // With friction per manifold the row after the points is the patch's.
+    let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
+    SolvedManifold {
+        body_a: pair.body_a as usize,
+        body_b: pair.body_b as usize,
+        normal: manifold.normal,
+        color: prepared.color_of(manifold.slot),
+        preload: contact.preload,
+        twist_impulse: patch.normal,
+        friction_impulse: friction(&patch),
+        points,
+        count,
+    }
+}
