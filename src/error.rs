@@ -34,7 +34,7 @@ impl Error {
     }
 
     /// Says where an [`Error::Input`] is: `place: message`.
-    pub(crate) fn within(self, place: impl std::fmt::Display) -> Self {
+    pub fn within(self, place: impl std::fmt::Display) -> Self {
         match self {
             Self::Input(message) => Self::Input(format!("{place}: {message}")),
             other => other,

@@ -23,35 +23,28 @@
 #![warn(missing_docs)]
 
 pub mod backend;
-pub mod cli;
 pub mod collide;
 pub mod compare;
 pub mod config;
 pub mod contacts;
 pub mod error;
-pub mod files;
 pub mod graph;
-pub mod hard;
 pub mod kernels;
 pub mod load;
 pub mod math;
-pub mod maze;
-mod memory;
+pub mod memory;
 pub mod metrics;
 pub mod plan;
 pub mod preset;
 pub mod problem;
 mod random;
-pub mod report;
 pub mod residuals;
 pub mod scenes;
 pub mod simulation;
 pub mod sleep;
 pub mod solver;
 pub mod stats;
-mod suggest;
-#[cfg(feature = "view")]
-pub mod view;
+pub mod suggest;
 pub mod world;
 
 pub use backend::Backend;

@@ -103,8 +103,7 @@ fn usable(instance: &wgpu::Instance, backends: wgpu::Backends, wanted: &str) -> 
 ///
 /// # Errors
 /// There is none, or it cannot be opened.
-#[cfg(feature = "view")]
-pub(crate) fn open_for_surface(
+pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
 ) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {

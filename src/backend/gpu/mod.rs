@@ -20,7 +20,7 @@ pub mod shader;
 mod timer;
 mod whole;
 
-pub use adapter::{AdapterChoice, AdapterSummary, adapters};
+pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_for_surface};
 pub use carry::CarryParams;
 
 use std::collections::HashMap;
@@ -44,15 +44,11 @@ use timer::Timer;
 ///
 /// # Errors
 /// No such adapter, or it cannot be opened.
-#[cfg(feature = "view")]
-pub(crate) fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
     let (adapter, summary) = adapter::find(choice)?;
     let (device, queue) = adapter::open(&adapter, false)?;
     Ok((device, queue, summary))
 }
-
-#[cfg(feature = "view")]
-pub(crate) use adapter::open_for_surface;
 
 /// Follows plans on a device through wgpu.
 pub struct Gpu {

@@ -1,0 +1,12 @@
+//! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and a game.
+
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod commands;
+pub mod files;
+pub mod hard;
+pub mod maze;
+pub mod report;
+#[cfg(feature = "view")]
+pub mod view;
