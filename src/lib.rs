@@ -34,6 +34,7 @@ pub mod load;
 pub mod math;
 pub mod memory;
 pub mod metrics;
+mod names;
 pub mod plan;
 pub mod preset;
 pub mod problem;
@@ -49,6 +50,7 @@ pub mod world;
 
 pub use backend::Backend;
 pub use backend::cpu::{Cpu, Reference};
+#[cfg(feature = "gpu")]
 pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
 pub use contacts::ContactProblem;

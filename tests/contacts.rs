@@ -1,6 +1,8 @@
 //! Contact problems as text: what is written is read back, and what is wrong is named.
 
-mod common;
+mod common {
+    pub mod contacts;
+}
 
 use common::contacts::tower;
 use drystone::ContactProblem;

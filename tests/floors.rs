@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules of the library on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
-    &["math", "random", "error", "memory", "stats", "suggest"],
+    &["math", "random", "error", "memory", "names", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
     &["problem", "contacts"],
@@ -16,7 +16,7 @@ const LIBRARY: &[&[&str]] = &[
 ];
 
 /// The modules of the command, above the library.
-const COMMAND: &[&[&str]] = &[&["files"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
+const COMMAND: &[&[&str]] = &[&["files", "settings"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
 
 const LIB: &str = include_str!("../src/lib.rs");
 const CLI: &str = include_str!("../cli/src/lib.rs");

@@ -8,5 +8,6 @@ pub mod files;
 pub mod hard;
 pub mod maze;
 pub mod report;
+pub mod settings;
 #[cfg(feature = "view")]
 pub mod view;

@@ -1,9 +1,10 @@
-//! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
+//! Backends follow a plan over a problem, in place. Only the module `gpu` of the feature `gpu` knows wgpu.
 
 mod calibrate;
 mod checked;
 mod choose;
 pub mod cpu;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 
 pub use calibrate::crossover;

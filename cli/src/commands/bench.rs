@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 
+use super::words;
 use super::{print, print_json, progress};
 use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
+use crate::settings;
 use drystone::backend::{Backend, BackendChoice, choose};
 use drystone::config::SolverConfig;
 use drystone::error::{Error, Result};
@@ -28,7 +30,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
     /// What runs the sweeps.
-    #[arg(long, value_enum, value_delimiter = ',', default_values = ["cpu"])]
+    #[arg(long, value_parser = words::backend(), value_delimiter = ',', default_values = ["cpu"])]
     backend: Vec<BackendChoice>,
     /// Numbers of threads; 0 is one a core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
@@ -58,7 +60,7 @@ impl BenchArgs {
             return self.print_limits(&threads);
         }
         let mut config = SolverConfig::default().without_sleep();
-        self.set.iter().try_for_each(|assignment| config.set(assignment))?;
+        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
         config.check()?;
         // Read before minutes are spent.
         let baseline = self.baseline.as_deref().map(Bench::read).transpose()?;

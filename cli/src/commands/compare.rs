@@ -2,6 +2,7 @@
 
 use clap::Args;
 
+use super::words;
 use super::{SceneArgs, print, print_json, progress};
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
@@ -14,7 +15,7 @@ pub struct CompareArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// The two backends, the one to trust first.
-    #[arg(long, value_enum, value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
+    #[arg(long, value_parser = words::backend(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
     /// Exact shaders: on where the adapter can, unless --plain.
     #[arg(long, conflicts_with = "plain")]

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::words;
 use super::{print, print_json};
 use crate::hard::{Case, Check, Limit, Setup};
 use crate::report::hard_cases;
+use crate::settings;
 use drystone::backend::Numbers;
 use drystone::error::Result;
 use drystone::preset::Preset;
@@ -20,13 +22,13 @@ pub struct HardArgs {
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
     /// Settings by name.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = words::preset(), default_value_t)]
     preset: Preset,
     /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// What runs the sweeps.
-    #[arg(long, value_enum, default_value = "cpu")]
+    #[arg(long, value_parser = words::numbers(), default_value = "cpu")]
     backend: Numbers,
     /// Leave out what takes minutes.
     #[arg(long)]
@@ -67,7 +69,7 @@ impl HardArgs {
             return print(path.display());
         }
         let mut config = self.preset.config().without_sleep();
-        self.set.iter().try_for_each(|assignment| config.set(assignment))?;
+        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
         config.check()?;
         let setup = Setup { config, open: &|| self.backend.open(false) };
         let mut all = Vec::new();

@@ -4,6 +4,7 @@ use clap::Args;
 use comfy_table::{Table, presets};
 use serde_json::Value;
 
+use super::words;
 use super::{print, print_json};
 use drystone::backend::gpu::adapters;
 use drystone::config::SolverConfig;
@@ -50,7 +51,7 @@ impl ScenesArgs {
 #[derive(Args)]
 pub struct SettingsArgs {
     /// Print those of this preset.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = words::preset(), default_value_t)]
     preset: Preset,
 }
 

@@ -15,6 +15,7 @@ mod run;
 mod solve;
 #[cfg(feature = "view")]
 mod view;
+mod words;
 
 pub use report::SurveyArgs;
 
@@ -27,6 +28,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::progress::Progress;
 use crate::files;
+use crate::settings;
 use drystone::backend::BackendChoice;
 use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP, SolverConfig};
 use drystone::contacts::ContactProblem;
@@ -127,7 +129,7 @@ struct SceneArgs {
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
     dt: Option<f32>,
     /// Settings by name, before --set and the others.
-    #[arg(long, value_enum, conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
+    #[arg(long, value_parser = words::preset(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
     preset: Preset,
     /// Choose the substeps by the overlap of what stands, as 1mm.
     ///
@@ -151,7 +153,7 @@ struct SceneArgs {
     #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     relax: Option<u32>,
     /// What the sweeps do.
-    #[arg(long, value_enum, help_heading = SETTINGS)]
+    #[arg(long, value_parser = words::method(), help_heading = SETTINGS)]
     method: Option<Method>,
     /// Any setting; may be given several times.
     ///
@@ -179,7 +181,7 @@ struct SceneArgs {
 #[derive(Args)]
 struct BackendArgs {
     /// What runs the sweeps.
-    #[arg(long = "backend", value_name = "BACKEND", value_enum, default_value_t, help_heading = MACHINE)]
+    #[arg(long = "backend", value_name = "BACKEND", value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
     choice: BackendChoice,
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long, help_heading = MACHINE)]
@@ -217,16 +219,16 @@ impl SceneArgs {
 
     /// The settings that the others change.
     fn base(&self) -> Result<SolverConfig> {
-        self.config.as_deref().map_or_else(|| Ok(self.preset.config()), SolverConfig::from_toml_file)
+        self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
     }
 
     fn load_from(&self, mut config: SolverConfig, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
         for assignment in &self.set {
-            config.set(assignment)?;
+            settings::set(&mut config, assignment)?;
         }
         for (name, value) in [("substeps", self.substeps), ("iterations", self.iterations), ("relax", self.relax)] {
             if let Some(value) = value {
-                config.set(&format!("{name}={value}"))?;
+                settings::set(&mut config, &format!("{name}={value}"))?;
             }
         }
         config.method = self.method.unwrap_or(config.method);

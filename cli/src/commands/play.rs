@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use super::{BackendArgs, print, print_json, replacing};
 use crate::files;
 use crate::maze::{Game, Map, Outcome, Script, pilot, play};
+use crate::settings;
 use drystone::backend::choose;
 use drystone::config::SolverConfig;
 use drystone::error::{Error, Result};
@@ -65,7 +66,7 @@ impl MazeArgs {
     fn run(&self) -> Result<()> {
         let map = Map::find(&self.board)?;
         let mut config = SolverConfig::default().without_sleep();
-        self.set.iter().try_for_each(|assignment| config.set(assignment))?;
+        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
         let begin = |map, config| Game::new(map, config, choose(self.backend.choice, 1, self.backend.exact)?.0);
         if let Some(path) = &self.script {
             let text = std::fs::read_to_string(path).map_err(Error::file(path))?;

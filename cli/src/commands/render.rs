@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::words;
 use super::{MACHINE, SceneArgs, SleepArgs, print, progress, replacing, say};
 use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
@@ -26,7 +27,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     scene: Option<SceneArgs>,
     /// What runs the sweeps.
-    #[arg(long, value_enum, default_value_t, help_heading = MACHINE)]
+    #[arg(long, value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
     backend: BackendChoice,
     #[command(flatten)]
     sleep: SleepArgs,

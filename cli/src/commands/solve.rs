@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::words;
 use super::{print, print_json};
 use crate::report::{CurveRow, SolveReport, SolveSettings};
 use drystone::backend::Numbers;
@@ -29,10 +30,10 @@ pub struct SolveArgs {
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true, conflicts_with = "sweeps")]
     tolerance: Option<f64>,
     /// What is done with the sweeps.
-    #[arg(long, value_enum, default_value = "accelerated")]
+    #[arg(long, value_parser = words::method(), default_value = "accelerated")]
     method: Method,
     /// In which order they go over the contacts.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = words::order(), default_value_t)]
     order: Order,
     /// How often they go over a manifold before the next one.
     ///
@@ -40,7 +41,7 @@ pub struct SolveArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
     /// What runs them; errors are always measured in f64.
-    #[arg(long, value_enum, default_value = "f64")]
+    #[arg(long, value_parser = words::numbers(), default_value = "f64")]
     backend: Numbers,
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::files;
+use crate::settings;
 use drystone::backend::cpu::Reference;
 use drystone::config::SolverConfig;
 use drystone::error::{Error, Result};
@@ -62,7 +63,7 @@ const SHEET: &str = "substeps=1 iterations=20 relax=0 stabilization=baumgarte";
 
 fn settings(text: &str) -> Result<SolverConfig> {
     let mut config = SolverConfig::default().without_sleep();
-    text.split_whitespace().try_for_each(|assignment| config.set(assignment))?;
+    text.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
     config.check()?;
     Ok(config)
 }

@@ -4,6 +4,7 @@ use clap::ValueEnum;
 
 use super::colors::ColorBy;
 use super::live::Live;
+use drystone::backend::BackendChoice;
 use drystone::config::FrictionRule;
 use drystone::metrics::Penetration;
 
@@ -110,7 +111,7 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
         live.set_config(config);
     }
     let mut backend = live.choice;
-    choice(ui, "backend", &mut backend);
+    choice(ui, "backend", &BackendChoice::ALL, &mut backend);
     if backend != live.choice {
         live.set_backend(backend);
     }
@@ -120,12 +121,11 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
 }
 
 /// One of the values that the command line knows too.
-fn choice<T: ValueEnum + PartialEq + Copy>(ui: &mut egui::Ui, what: &str, value: &mut T) {
-    let name = |v: &T| v.to_possible_value().map(|p| p.get_name().to_owned()).unwrap_or_default();
+fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str, all: &[T], value: &mut T) {
     ui.horizontal(|ui| {
         ui.label(what);
-        for option in T::value_variants() {
-            ui.selectable_value(value, *option, name(option));
+        for option in all {
+            ui.selectable_value(value, *option, option.to_string());
         }
     });
 }

@@ -14,6 +14,7 @@ pub use machine::Machine;
 
 use serde::{Deserialize, Serialize};
 
+use crate::settings;
 use drystone::backend::Backend;
 use drystone::backend::cpu::Reference;
 use drystone::config::SolverConfig;
@@ -238,7 +239,7 @@ impl Course {
                 backend: name,
                 adapter: way.pool.install(move || backend.adapter()),
                 threads: way.pool.current_num_threads(),
-                settings: config.unusual(&["sleep_after"]).join(" "),
+                settings: settings::unusual(config, &["sleep_after"]).join(" "),
                 worlds: world.parts().len(),
                 bodies: world.dynamic_count(),
                 manifolds: stats.manifolds,

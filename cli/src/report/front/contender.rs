@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::settings;
 use drystone::backend::Numbers;
 use drystone::config::{FrictionRule, Method, SolverConfig};
 use drystone::error::{Error, Result};
@@ -85,7 +86,7 @@ impl Setting {
 /// What a setting has no place for. As many relax sweeps as biased ones are what is expected.
 fn unusual(config: &SolverConfig) -> Vec<String> {
     let said = ["substeps", "iterations", "method", "friction", "sleep_after"];
-    let mut more = config.unusual(&said);
+    let mut more = settings::unusual(config, &said);
     more.retain(|text| !text.starts_with("relax="));
     if config.relax != config.iterations {
         more.push(format!("relax={}", config.relax));
@@ -140,10 +141,10 @@ mod tests {
         let mut config =
             SolverConfig { substeps: 4, friction: FrictionRule::Box, ..SolverConfig::default().without_sleep() };
         assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x1 box");
-        config.set("contact_frequency=0.25").unwrap();
-        config.set("relax=2").unwrap();
+        settings::set(&mut config, "contact_frequency=0.25").unwrap();
+        settings::set(&mut config, "relax=2").unwrap();
         assert_eq!(Setting::drystone("cpu", &config).more, "contact_frequency=0.25 relax=2");
-        config.set("iterations=2").unwrap();
+        settings::set(&mut config, "iterations=2").unwrap();
         assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x2 box contact_frequency=0.25");
     }
 }

@@ -1,6 +1,7 @@
 //! The scenes of the report, and the settings with which drystone runs them.
 
 use super::contender::{Contender, Drystone, Extent};
+use crate::settings;
 use drystone::backend::gpu::adapters;
 use drystone::config::SolverConfig;
 use drystone::error::Result;
@@ -112,6 +113,6 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
 
 fn contender(scene: &Scene, backend: &str, settings: &str) -> Result<Box<dyn Contender>> {
     let mut config = SolverConfig::default().without_sleep();
-    settings.split_whitespace().try_for_each(|assignment| config.set(assignment))?;
+    settings.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
     Ok(Box::new(Drystone::new(scene, backend, &config)?))
 }
