@@ -20,6 +20,12 @@ pub enum ColorBy {
     Sleeping,
 }
 
+impl std::fmt::Display for ColorBy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
+    }
+}
+
 /// A color as sRGB with an unused fourth byte.
 pub type Rgba = [u8; 4];
 

@@ -76,7 +76,7 @@ fn controls(live: &mut Live, ui: &mut egui::Ui) {
     }
     ui.add(egui::Slider::new(&mut live.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
     let mut color = live.color;
-    choice(ui, "color", &mut color);
+    choice(ui, "color", ColorBy::value_variants(), &mut color);
     live.color = color;
     ui.horizontal(|ui| {
         ui.checkbox(&mut live.overlay.contacts, "contacts");
