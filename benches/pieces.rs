@@ -2,11 +2,11 @@
 //! Whole steps are what `drystone bench` measures.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use drystone::collide::Detector;
 use drystone::config::FrictionAt;
-use drystone::graph::{ConstraintGraph, Edge, IMMOVABLE};
-use drystone::plan::{Kernel, Pass};
-use drystone::problem::Prepared;
+use drystone::stages::collide::Detector;
+use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::Prepared;
 use drystone::{Backend, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.

@@ -13,45 +13,62 @@
 //! ```
 //!
 //! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
-//! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
+//! function of a shader has a Rust double of the same name ([`stages::kernels`]), so that every number of the GPU has something
 //! to be compared with.
 //!
-//! One solve by itself, without bodies' poses: a [`ContactProblem`] from a file, swept by a [`solver::Solver`], and what is
-//! left of its error in [`residuals::Residuals`].
+//! | To | call |
+//! |---|---|
+//! | build a world | [`World`], [`Body`], [`Shape`], [`BallJoint`]; or find a [`Scene`] of the catalogue or a file |
+//! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
+//! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
+//! | step | [`Simulation::step`], which gives [`StepStats`] |
+//! | read contacts and impulses | [`Simulation::pairs`]: [`Pair`], [`Manifold`], [`ManifoldPoint`] |
+//! | measure overlap, speed, drift | [`metrics`] |
+//! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
+//!
+//! The stages one by one, which tests and measurements need, are in [`stages`].
+//!
+//! # Features
+//!
+//! - `gpu`, the default: the backend on compute shaders. Without it no crate of wgpu is built.
+//! - `serde`: scene files, their JSON Schema; settings serialize and deserialize, results serialize.
+//! - `fclib`: contact problems in FCLIB's HDF5 files.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod backend;
-pub mod collide;
-pub mod compare;
+mod collide;
+mod compare;
 pub mod config;
 pub mod contacts;
-pub mod error;
-pub mod graph;
-pub mod kernels;
+mod error;
+mod graph;
+mod kernels;
 pub mod load;
-pub mod math;
-pub mod memory;
+mod math;
+mod memory;
 pub mod metrics;
 mod names;
-pub mod plan;
+mod plan;
 pub mod preset;
-pub mod problem;
+mod problem;
 mod random;
 pub mod residuals;
 pub mod scenes;
-pub mod simulation;
-pub mod sleep;
+mod simulation;
+mod sleep;
 pub mod solver;
+pub mod stages;
 pub mod stats;
-pub mod suggest;
+mod suggest;
 pub mod world;
 
 pub use backend::Backend;
 pub use backend::cpu::{Cpu, Reference};
 #[cfg(feature = "gpu")]
 pub use backend::gpu::Gpu;
+pub use collide::{Manifold, ManifoldPoint, Pair};
 pub use config::SolverConfig;
 pub use contacts::ContactProblem;
 pub use error::{Error, Result};

@@ -3,9 +3,9 @@
 #[path = "common/settings.rs"]
 mod settings;
 
-use drystone::backend::CheckedStep;
-use drystone::plan::{Kernel, Pass};
-use drystone::problem::InertiaRow;
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::InertiaRow;
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 use settings::set;
 

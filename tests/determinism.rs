@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use drystone::config::FrictionAt;
-use drystone::problem::effective::{EffectiveMass, InverseMass};
+use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
 
 /// FNV-1a over every bit of every pose and velocity.
@@ -153,7 +153,7 @@ fn arms(r_a: [f32; 3], r_b: [f32; 3]) -> [u32; 6] {
 
 /// Separation of the surfaces, preload and normal impulse of each point of every row.
 fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
-    let of = |row: &drystone::problem::ContactRow| {
+    let of = |row: &drystone::stages::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         let points = &problem.points[own.clone()];
         let values = points

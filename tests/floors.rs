@@ -12,7 +12,7 @@ const LIBRARY: &[&[&str]] = &[
     &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
-    &["compare"],
+    &["compare", "stages"],
 ];
 
 /// The modules of the command, above the library.

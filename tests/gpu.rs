@@ -8,11 +8,11 @@ mod settings;
 use common::difference::of_velocities;
 use common::gpu;
 use common::tolerance;
-use drystone::backend::{CheckedStep, crossover};
-use drystone::compare::{Difference, compare};
 use drystone::glam::Vec3;
-use drystone::plan::Kernel;
-use drystone::problem::carry::Carry;
+use drystone::stages::backend::{CheckedStep, crossover};
+use drystone::stages::compare::{Difference, compare};
+use drystone::stages::plan::Kernel;
+use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
     Backend, BallJoint, Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,

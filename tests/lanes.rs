@@ -3,7 +3,7 @@
 #[path = "common/settings.rs"]
 mod settings;
 
-use drystone::compare::{Comparison, compare};
+use drystone::stages::compare::{Comparison, compare};
 use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
 use settings::set;
 
@@ -163,7 +163,7 @@ impl Backend for Lazy {
     fn adapter(&self) -> String {
         String::new()
     }
-    fn run_checked(&mut self, step: drystone::backend::CheckedStep) -> drystone::Result<()> {
+    fn run_checked(&mut self, step: drystone::stages::backend::CheckedStep) -> drystone::Result<()> {
         let (problem, passes) = step.into_parts();
         self.0.run(problem, &passes[..passes.len() - 1])
     }

@@ -5,12 +5,12 @@
 mod common;
 
 use common::gpu;
-use drystone::backend::CheckedStep;
-use drystone::compare::Difference;
 use drystone::config::{FrictionAt, FrictionRule};
 use drystone::glam::{Quat, Vec3};
-use drystone::problem::carry::{Carry, NO_ROW};
-use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::Difference;
+use drystone::stages::problem::carry::{Carry, NO_ROW};
+use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 

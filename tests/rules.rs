@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 use drystone::config::{FrictionAt, FrictionRule};
-use drystone::problem::{ContactRow, PointRow};
+use drystone::stages::problem::{ContactRow, PointRow};
 use drystone::{
     BallJoint, Body, Material, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, StepStats, World,
 };

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Hidden places of all drafts that there are.
 static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
-use drystone::suggest::shorten;
+use drystone::stages::suggest::shorten;
+use drystone::{Error, Result};
 
 /// Reads settings from a TOML file; what it leaves out takes its default.
 ///

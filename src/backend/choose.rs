@@ -94,7 +94,7 @@ fn fastest(dynamic_bodies: usize, exact: bool) -> Result<(Option<Box<dyn Backend
         return Ok((None, "no hardware GPU found (drystone adapters lists what there is)".into()));
     };
     let adapter = gpu.adapter();
-    let crossover = super::crossover(&mut Cpu::new(), &mut gpu)?;
+    let crossover = super::calibrate::crossover(&mut Cpu::new(), &mut gpu)?;
     let pays = crossover.map_or("never pays".into(), |n| format!("pays from about {n} on"));
     Ok(if crossover.is_some_and(|n| dynamic_bodies >= n) {
         (Some(Box::new(gpu)), format!("{dynamic_bodies} dynamic bodies, and as measured it {pays}; {adapter}"))

@@ -11,7 +11,7 @@ use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, be
 use crate::settings;
 use drystone::backend::{Backend, BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]

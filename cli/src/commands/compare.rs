@@ -6,8 +6,8 @@ use super::words;
 use super::{SceneArgs, print, print_json, progress};
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
-use drystone::compare::{Difference, compare};
-use drystone::error::{Error, Result};
+use drystone::stages::compare::{Difference, compare};
+use drystone::{Error, Result};
 
 /// Arguments of `drystone compare`.
 #[derive(Args)]

@@ -6,12 +6,12 @@ use clap::Args;
 
 use super::{print, replacing, step_with_contacts};
 use crate::files;
+use drystone::Simulation;
 use drystone::backend::cpu::Cpu;
 use drystone::config::SolverConfig;
 use drystone::contacts::ContactProblem;
-use drystone::error::{Error, Result};
 use drystone::scenes::{CATALOGUE, Scene};
-use drystone::simulation::Simulation;
+use drystone::{Error, Result};
 
 /// Arguments of `drystone export`.
 #[derive(Args)]

@@ -9,8 +9,8 @@ use super::{print, print_json};
 use crate::hard::{Case, Check, Limit, Setup};
 use crate::report::hard_cases;
 use crate::settings;
+use drystone::Result;
 use drystone::backend::Numbers;
-use drystone::error::Result;
 use drystone::preset::Preset;
 
 /// Arguments of `drystone hard`.

@@ -6,9 +6,9 @@ use serde_json::Value;
 
 use super::words;
 use super::{print, print_json};
+use drystone::Result;
 use drystone::backend::gpu::adapters;
 use drystone::config::SolverConfig;
-use drystone::error::Result;
 use drystone::preset::Preset;
 use drystone::scenes::{CATALOGUE, schema};
 

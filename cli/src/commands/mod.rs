@@ -29,17 +29,17 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use self::progress::Progress;
 use crate::files;
 use crate::settings;
+use drystone::Simulation;
 use drystone::backend::BackendChoice;
 use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP, SolverConfig};
 use drystone::contacts::ContactProblem;
-use drystone::error::{Error, Result};
 use drystone::load::Load;
-use drystone::memory;
 use drystone::preset::Preset;
 use drystone::scenes::{CATALOGUE, Scene};
-use drystone::simulation::Simulation;
+use drystone::stages::memory;
+use drystone::stages::suggest::nearest;
 use drystone::stats::StepStats;
-use drystone::suggest::nearest;
+use drystone::{Error, Result};
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]

@@ -10,7 +10,7 @@ use crate::maze::{Game, Map, Outcome, Script, pilot, play};
 use crate::settings;
 use drystone::backend::choose;
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Arguments of `drystone play`.
 #[derive(Args)]

@@ -8,12 +8,12 @@ use super::words;
 use super::{MACHINE, SceneArgs, SleepArgs, print, progress, replacing, say};
 use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
+use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
-use drystone::memory;
 use drystone::scenes::{CATALOGUE, Scene};
-use drystone::simulation::Simulation;
+use drystone::stages::memory;
+use drystone::{Error, Result};
 
 /// Bytes that a body takes in a frame: pose and color.
 const FRAME: f64 = 32.0;

@@ -9,7 +9,7 @@ use crate::files;
 use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone, scene};
 use crate::report::{RUNS, convergence, problems, rules};
 use drystone::backend::gpu::adapters;
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Arguments of `drystone report`.
 #[derive(Args)]

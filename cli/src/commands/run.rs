@@ -10,10 +10,10 @@ use super::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs};
 use super::{print, print_json, progress, replacing, say, step_with_contacts};
 use crate::files;
 use crate::report::{RunReport, Trajectory};
+use drystone::Simulation;
 use drystone::backend::choose;
-use drystone::error::{Error, Result};
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
+use drystone::{Error, Result};
 
 /// Arguments of `drystone run`.
 #[derive(Args)]

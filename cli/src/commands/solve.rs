@@ -10,8 +10,8 @@ use crate::report::{CurveRow, SolveReport, SolveSettings};
 use drystone::backend::Numbers;
 use drystone::config::Method;
 use drystone::contacts::ContactProblem;
-use drystone::error::{Error, Result};
 use drystone::solver::Order;
+use drystone::{Error, Result};
 
 /// Most sweeps where a tolerance says when to end.
 const MOST_SWEEPS: u32 = 40_000;

@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::{BackendArgs, SceneArgs, SleepArgs};
 use crate::view::{ColorBy, Live, window};
-use drystone::error::Result;
+use drystone::Result;
 
 /// Arguments of `drystone view`.
 #[derive(Args)]

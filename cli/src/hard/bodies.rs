@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 use glam::{DVec3, Quat, Vec3};
 
 use super::{Check, DT, Setup, is_broken};
+use drystone::Result;
+use drystone::Simulation;
 use drystone::config::{FrictionRule, SolverConfig};
-use drystone::error::Result;
 use drystone::metrics;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::stats::largest;
 use drystone::world::{BallJoint, Body, MassProperties, Shape, World};
 

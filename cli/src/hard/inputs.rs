@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 
 use super::{Check, DT, Setup, is_broken};
-use drystone::error::Result;
+use drystone::Result;
 use drystone::scenes::Scene;
 use drystone::stats::largest;
 use drystone::world::{Body, Shape, World};

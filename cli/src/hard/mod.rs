@@ -4,15 +4,15 @@ mod bodies;
 mod inputs;
 mod stacks;
 
+use drystone::Simulation;
 use drystone::backend::Backend;
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
 use drystone::metrics;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
+use drystone::stages::suggest::hint;
 use drystone::stats::largest;
-use drystone::suggest::hint;
 use drystone::world::World;
+use drystone::{Error, Result};
 
 pub use bodies::{Tumble, flip_time, rolling_error};
 

@@ -1,13 +1,13 @@
 //! What stands, or should.
 
 use super::{Check, DT, Setup};
-use drystone::collide::Pair;
+use drystone::Result;
 use drystone::config::Method;
-use drystone::error::Result;
 use drystone::load::Load;
 use drystone::residuals::Measure;
 use drystone::scenes::Scene;
 use drystone::solver::{Order, Solver};
+use drystone::stages::collide::Pair;
 use drystone::stats::largest;
 use drystone::world::{Body, Shape, World};
 

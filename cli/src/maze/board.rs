@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use glam::{Quat, Vec2, Vec3};
 
 use super::map::{Cell, Map};
-use drystone::error::Result;
+use drystone::Result;
 use drystone::scenes::Scene;
 use drystone::world::{Body, Shape, World};
 

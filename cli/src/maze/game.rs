@@ -6,11 +6,11 @@ use serde::Serialize;
 use super::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
 use super::map::Map;
 use super::script::{Script, TILT_LIMIT};
+use drystone::Result;
+use drystone::Simulation;
 use drystone::backend::Backend;
 use drystone::config::SolverConfig;
-use drystone::error::Result;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::world::World;
 
 /// How fast the board tilts (degrees/s).

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use drystone::error::{Error, Result};
-use drystone::suggest::hint;
+use drystone::stages::suggest::hint;
+use drystone::{Error, Result};
 
 /// What is at one place of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

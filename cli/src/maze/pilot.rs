@@ -9,7 +9,7 @@ use super::board::center_of;
 use super::game::{Game, Outcome};
 use super::map::{Cell, Map};
 use super::script::{Script, TILT_LIMIT};
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Steps from one point of the script to the next: 0.05 s.
 const HOLD: u32 = 6;

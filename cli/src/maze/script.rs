@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Furthest that the board tilts about either axis (degrees).
 pub const TILT_LIMIT: f32 = 8.0;

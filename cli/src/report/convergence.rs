@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use drystone::Simulation;
 use drystone::backend::cpu::Cpu;
 use drystone::config::{Method, SolverConfig};
 use drystone::contacts::ContactProblem;
-use drystone::error::{Error, Result};
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::solver::Order;
 use drystone::stats::median;
+use drystone::{Error, Result};
 
 use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use crate::hard::{Case, Check, Limit, Setup};
+use drystone::Result;
 use drystone::backend::Numbers;
-use drystone::error::Result;
 use drystone::preset::Preset;
 
 /// What is behind the failures.

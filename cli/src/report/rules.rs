@@ -5,13 +5,13 @@ use std::path::Path;
 
 use crate::files;
 use crate::settings;
+use drystone::Simulation;
 use drystone::backend::cpu::Reference;
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
 use drystone::metrics::{Penetration, drift, in_place, in_place_count, rms_speed};
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::world::{Body, Shape, World};
+use drystone::{Error, Result};
 
 use super::plot::{Axes, Line, svg};
 use glam::{Quat, Vec3};

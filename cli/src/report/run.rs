@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use serde::Serialize;
 
+use drystone::Simulation;
 use drystone::config::SolverConfig;
 use drystone::metrics::{fastest, in_place, rms_speed};
 use drystone::scenes::{Group, Scene};
-use drystone::simulation::Simulation;
 use drystone::stats::{KernelTime, StepStats, median};
 use drystone::world::{BodyKind, World};
 

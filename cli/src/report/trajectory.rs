@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::files;
-use drystone::error::{Error, Result};
 use drystone::world::{BodyKind, World};
+use drystone::{Error, Result};
 
 /// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes. The file is
 /// there when it is finished.

@@ -2,8 +2,8 @@
 
 use super::renderer::{Quality, Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
-use drystone::error::{Error, Result};
 use drystone::world::World;
+use drystone::{Error, Result};
 
 /// Rows of pixels from the top, four bytes a pixel, sRGB.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! What the color of a body says.
 
-use drystone::collide::Pair;
-use drystone::simulation::Simulation;
+use drystone::Simulation;
+use drystone::stages::collide::Pair;
 use drystone::world::{BodyKind, World};
 
 /// What bodies are colored by.
@@ -127,7 +127,7 @@ impl ColorBy {
 
 fn contacts<'a>(
     pairs: impl IntoIterator<Item = &'a Pair>,
-) -> impl Iterator<Item = (&'a Pair, &'a drystone::collide::Manifold)> {
+) -> impl Iterator<Item = (&'a Pair, &'a drystone::stages::collide::Manifold)> {
     pairs.into_iter().flat_map(|pair| pair.manifolds.iter().map(move |m| (pair, m)))
 }
 
@@ -181,10 +181,10 @@ fn on_scale(x: f32) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drystone::Simulation;
     use drystone::backend::cpu::Reference;
     use drystone::config::SolverConfig;
     use drystone::scenes::Scene;
-    use drystone::simulation::Simulation;
 
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");

@@ -10,10 +10,10 @@ use super::colors::ColorBy;
 use super::mesh::{Poses, poses};
 use super::overlay::ropes;
 use super::renderer::Shot;
-use drystone::error::{Error, Result};
+use drystone::Simulation;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::world::{BodyKind, World};
+use drystone::{Error, Result};
 
 /// A world at one time.
 #[derive(Clone, Debug)]

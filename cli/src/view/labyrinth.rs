@@ -9,9 +9,9 @@ use super::colors::Rgba;
 use super::renderer::Shot;
 use super::window::{Pointer, Show};
 use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
+use drystone::Result;
 use drystone::backend::{BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::error::Result;
 use drystone::world::World;
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];

@@ -11,11 +11,11 @@ use super::film::bounds;
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::window::{Pointer, Show};
+use drystone::Result;
+use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::error::Result;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::stats::StepStats;
 use drystone::world::{BallJoint, BodyKind, World};
 

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 
 use super::canvas::Picture;
 use crate::files::Draft;
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// A place for pictures that is known to be writable; nothing is under its name until [`Output::finish`].
 pub struct Output {

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::simulation::Simulation;
+use drystone::Simulation;
 use drystone::world::{BallJoint, BodyKind, World};
 
 /// One end of a line, as the shader takes it.

@@ -18,8 +18,8 @@ use super::mesh::poses;
 use super::overlay::LineEnd;
 use super::renderer::{Quality, Renderer, Shot};
 use drystone::backend::gpu::open_for_surface;
-use drystone::error::{Error, Result};
 use drystone::world::World;
+use drystone::{Error, Result};
 
 /// Where the mouse is.
 #[derive(Clone, Copy, Debug)]

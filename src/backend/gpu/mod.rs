@@ -12,16 +12,15 @@
 
 mod adapter;
 mod buffers;
-mod carry;
+pub(crate) mod carry;
 mod exact;
 mod programs;
 mod read_back;
-pub mod shader;
+pub(crate) mod shader;
 mod timer;
 mod whole;
 
 pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_for_surface};
-pub use carry::CarryParams;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};

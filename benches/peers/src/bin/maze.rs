@@ -9,8 +9,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use drystone::backend::{BackendChoice, choose};
-use drystone::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
-use drystone::{Error, Result, SolverConfig, files};
+use drystone::{Error, Result, SolverConfig};
+use drystone_cli::files;
+use drystone_cli::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
 use drystone_peers::rapier_game;
 use plotters::prelude::*;
 

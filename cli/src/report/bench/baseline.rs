@@ -1,7 +1,7 @@
 //! A bench beside an earlier one.
 
 use super::{Bench, BenchRow};
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// What became of one row.
 #[derive(Clone, Copy, Debug, PartialEq)]

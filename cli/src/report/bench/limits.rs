@@ -9,14 +9,15 @@ use std::time::Instant;
 use serde::Serialize;
 
 use drystone::backend::Backend;
-use drystone::backend::cpu::{Cpu, multiply_and_add};
+use drystone::backend::cpu::Cpu;
 use drystone::config::{FrictionRule, SolverConfig};
-use drystone::error::{Error, Result};
-use drystone::kernels::contact::solve_contact;
-use drystone::kernels::{Impulse, Pair, Point, Rules};
-use drystone::math::Lane;
-use drystone::plan::StepPlan;
-use drystone::problem::StepProblem;
+use drystone::stages::backend::multiply_and_add;
+use drystone::stages::kernels::contact::solve_contact;
+use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
+use drystone::stages::math::Lane;
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
+use drystone::{Error, Result};
 
 use super::settled;
 

@@ -15,16 +15,16 @@ pub use machine::Machine;
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
+use drystone::Simulation;
 use drystone::backend::Backend;
 use drystone::backend::cpu::Reference;
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
 use drystone::metrics::rms_speed;
-use drystone::plan::Kernel;
 use drystone::residuals::Residuals;
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
+use drystone::stages::plan::Kernel;
 use drystone::stats::{StageTimes, quantile};
+use drystone::{Error, Result};
 
 /// The scenes of a whole bench: `name:key=value,...`, see [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [
@@ -278,10 +278,10 @@ fn middle(values: impl Iterator<Item = f64>, q: f64) -> f64 {
 /// How far the impulses of the next step are from solving its first substep when that ends; takes that step.
 fn residual(simulation: &mut Simulation, dt: f32) -> Option<f64> {
     let (mut problem, plan) = simulation.next_problem(dt).ok()?;
-    let begins = |p: &drystone::plan::Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
+    let begins = |p: &drystone::stages::plan::Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
     let end = plan.passes.iter().skip(1).position(begins).map_or(plan.passes.len(), |i| i + 1);
     Reference::<f32>::new().run(&mut problem, &plan.passes[..end]).ok()?;
-    let of_contact = |row: &drystone::problem::ContactRow| {
+    let of_contact = |row: &drystone::stages::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         problem.impulses[own].iter().map(|i| glam::Vec3::new(i.normal, i.tangent_1, i.tangent_2).as_dvec3())
     };

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
+use drystone::Simulation;
 use drystone::backend::Numbers;
 use drystone::config::{FrictionRule, Method, SolverConfig};
-use drystone::error::{Error, Result};
 use drystone::scenes::Scene;
-use drystone::simulation::Simulation;
 use drystone::world::World;
+use drystone::{Error, Result};
 
 /// An engine with its settings, stepping one scene.
 pub trait Contender {

@@ -2,9 +2,9 @@
 
 use super::contender::{Contender, Drystone, Extent};
 use crate::settings;
+use drystone::Result;
 use drystone::backend::gpu::adapters;
 use drystone::config::SolverConfig;
-use drystone::error::Result;
 use drystone::scenes::Scene;
 
 /// Scenes of the whole report.

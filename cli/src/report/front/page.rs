@@ -7,7 +7,7 @@ use super::pareto::{Duel, FLOOR, Fault, fastest, front, least, profile};
 use super::picture::{Frame, Series, svg};
 use super::race::Row;
 use super::solves::SolveRow;
-use drystone::error::Result;
+use drystone::Result;
 
 /// The HTML, and the picture that stands for all of it.
 pub struct Page {

@@ -1,7 +1,7 @@
 //! What the rows of one race say: who is fastest at an error, and who errs least in a time.
 
 use super::race::Row;
-use drystone::error::Result;
+use drystone::Result;
 
 /// Errors below this are taken as this (m), (m/s): poses in f32 some ten meters from the origin say no more.
 pub const FLOOR: f64 = 1e-6;

@@ -7,11 +7,11 @@ use super::contender::{Contender, Setting};
 use super::origin::Origin;
 use crate::report::clock::Clock;
 use drystone::config::SolverConfig;
-use drystone::error::{Error, Result};
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
 use drystone::scenes::Scene;
 use drystone::stats::quantile;
 use drystone::world::World;
+use drystone::{Error, Result};
 
 /// Steps of one contender before it is the next one's turn.
 const BLOCK: u32 = 10;

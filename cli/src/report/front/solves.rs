@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::origin::Origin;
 use crate::report::solve::{SolveReport, SolveSettings};
+use drystone::Result;
 use drystone::backend::Backend;
 use drystone::backend::cpu::Cpu;
 use drystone::config::Method;
 use drystone::contacts::ContactProblem;
-use drystone::error::Result;
 use drystone::solver::Order;
 use drystone::stats::quantile;
 

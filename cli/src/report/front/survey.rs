@@ -10,8 +10,8 @@ use super::solves::{self, SolveRow, solves};
 use super::table::Table;
 use crate::files;
 use drystone::contacts::ContactProblem;
-use drystone::error::{Error, Result};
 use drystone::scenes::Scene;
+use drystone::{Error, Result};
 
 /// What is run, and where it is written.
 pub struct Survey<'a> {

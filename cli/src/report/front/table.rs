@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::files;
-use drystone::error::{Error, Result};
+use drystone::{Error, Result};
 
 /// Rows and the file that they are in.
 pub struct Table<R> {
