@@ -11,6 +11,7 @@ use crate::names::named;
 /// How friction is modelled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionRule {
     /// No tangential impulse. Taken by itself where every contact of a scene has mu = 0.
     None,
@@ -26,6 +27,7 @@ pub enum FrictionRule {
 /// Where friction acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionAt {
     /// At every contact point, limited by that point's normal impulse.
     #[default]
@@ -40,6 +42,7 @@ pub enum FrictionAt {
 /// a little less (zigzag of 20: 33 against 38 mm in 10 s), in walls friction first does (3.4 against 5.7 mm).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionOrder {
     /// Normals, then friction within the cone that they span: the order of the course sheet.
     #[default]
@@ -51,6 +54,7 @@ pub enum FrictionOrder {
 /// What is kept non-negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Clamping {
     /// Every single correction; impulses start at zero in each substep. A correction that pushed too far can never be
     /// taken back: misaligned stacks fall.
@@ -63,6 +67,7 @@ pub enum Clamping {
 /// How overlap that is there already is removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Stabilization {
     /// Not at all: it drifts.
     None,
@@ -78,6 +83,7 @@ named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", })
 /// Which sweeps of a substep solve friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionSweeps {
     /// The biased sweeps and the relax sweeps.
     All,
@@ -89,6 +95,7 @@ pub enum FrictionSweeps {
 /// What is done with the sweeps of a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Method {
     /// One after another: projected Gauss-Seidel.
     #[default]
@@ -105,12 +112,13 @@ named!(Method { Plain = "plain", Accelerated = "accelerated", });
 /// ```
 /// use drystone::SolverConfig;
 ///
-/// let config = SolverConfig { substeps: 32, ..SolverConfig::default() };
+/// let config = SolverConfig::default().with(|c| c.substeps = 32);
 /// config.check()?;
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct SolverConfig {
     /// Substeps of one step, 1 or more. Errors fall with their square, time grows with them.
     pub substeps: u32,
@@ -246,6 +254,17 @@ impl Default for SolverConfig {
 }
 
 impl SolverConfig {
+    /// These settings with some changed. Settings grow with versions, so that a program changes them instead of listing them.
+    ///
+    /// ```
+    /// let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
+    /// assert_eq!(config.substeps, 32);
+    /// ```
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
     /// The same settings, but nothing falls asleep: for whatever is measured or compared.
     ///
     /// ```

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// One line that names what is wrong and where.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The caller's input cannot be used: a scene file, a setting, a parameter.
     #[error("{0}")]

@@ -7,6 +7,7 @@ use crate::names::named;
 /// a sweep (docs/speed-vs-error.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Preset {
     /// 4 substeps: for games and previews.
     Fast,
@@ -23,6 +24,7 @@ named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Ref
 
 /// What a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Promise {
     /// Cubes of a tower that stands for 20 s.
     pub tower: u32,

@@ -11,6 +11,7 @@ use crate::contacts::{ContactProblem, Operator, Velocity};
 /// What impulses leave unsolved. All numbers are NaN if any of them is not finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Residuals {
     /// The natural map in velocities: the norm of F/rho over all contacts with rho = 3/trace(W_ii), over the norm of
     /// the free relative velocities. Independent of units; the number to steer by.

@@ -49,7 +49,7 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
     for name in ["pile:n=60", "drop", "bridge", "joint-grid", "drum", "slide:mu=0", "chain:worlds=3", "rolling"] {
         for rule in rules {
             let scene = Scene::find_spec(name).expect("the scene");
-            let mut config = SolverConfig { sleep_after: 0.2, ..SolverConfig::default() };
+            let mut config = SolverConfig::default().with(|c| c.sleep_after = 0.2);
             rule.iter().for_each(|s| set(&mut config, s));
             let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
             for step in 0..60 {

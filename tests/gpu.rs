@@ -129,7 +129,7 @@ fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
 
 fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
     let config =
-        SolverConfig { friction_at: drystone::config::FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+        SolverConfig::default().without_sleep().with(|c| c.friction_at = drystone::config::FrictionAt::Manifold);
     let scene = Scene::find("slide", &["mu=0".into()]).expect("a scene of the catalogue");
     assert_same(&scene, &config, 20, "slide without friction");
 }

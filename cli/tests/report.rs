@@ -11,7 +11,7 @@ use drystone_cli::report::front::{Contender, Drystone, Extent, Origin, Report, S
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
     let of = |substeps| {
-        let config = SolverConfig { substeps, ..SolverConfig::default() };
+        let config = SolverConfig::default().with(|c| c.substeps = substeps);
         Ok(Box::new(Drystone::new(scene, "cpu", &config)?) as Box<dyn Contender>)
     };
     [1, 2, 4].into_iter().map(of).collect()
@@ -91,7 +91,7 @@ fn rows_of_another_scene_program_or_setting_are_not_gone_on_with() {
     let longer = first().into_iter().map(|scene| Scene { steps: 40, ..scene }).collect();
     assert_eq!(run(longer, &three, "a"), 4, "more steps");
     let more = |scene: &Scene, extent: Extent| {
-        let config = SolverConfig { substeps: 3, ..SolverConfig::default() };
+        let config = SolverConfig::default().with(|c| c.substeps = 3);
         let mut all = three(scene, extent)?;
         all.push(Box::new(Drystone::new(scene, "cpu", &config)?));
         Ok(all)

@@ -20,7 +20,7 @@ fn the_disc_is_right_in_every_direction() {
 
 #[test]
 fn in_box_mode_a_plate_that_is_pushed_across_its_tangents_does_not_move() {
-    let config = || SolverConfig { friction: FrictionRule::Box, ..SolverConfig::default().without_sleep() };
+    let config = || SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Box);
     let across = error(60.0, config(), Box::new(Reference::<f32>::new()));
     println!("60 degrees, box: {across:.4}");
     assert!((across - 3.145).abs() < 0.005, "{across}");

@@ -29,7 +29,10 @@ fn the_report_names_the_largest_tower_that_stands() {
 #[test]
 fn the_report_counts_joints_and_the_sweeps_that_a_tolerance_saved() {
     let scene = Scene::find("pendulum", &[]).expect("a pendulum");
-    let config = SolverConfig { tolerance: 1e-3, iterations: 8, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| {
+        c.tolerance = 1e-3;
+        c.iterations = 8;
+    });
     let reference = Box::new(Reference::<f32>::new());
     let mut simulation = Simulation::new(scene.world.clone(), config, reference).expect("a simulation");
     let mut report = RunReport::new(&scene, &simulation);

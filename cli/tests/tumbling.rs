@@ -21,7 +21,7 @@ tests! {
 
 /// At 240 substeps a second.
 fn tumble(backend: Box<dyn Backend>, first: f32) -> Tumble {
-    let config = SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.substeps = 4);
     Tumble::new(first, |world| Simulation::new(world, config, backend)).expect("a tumble")
 }
 

@@ -9,6 +9,7 @@ use crate::names::named;
 
 /// What a person asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BackendChoice {
     /// A hardware GPU where there is one and the scene is large enough that it pays, as measured by some steps of a small pile on
     /// both; else the CPU.
@@ -27,6 +28,7 @@ named!(BackendChoice { Auto = "auto", Gpu = "gpu", Cpu = "cpu", Reference = "ref
 /// What runs sweeps, by the numbers that it computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Numbers {
     /// The reference in double precision.
     F64,

@@ -41,6 +41,7 @@ pub enum Activity {
 
 /// What one detection did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DetectStats {
     /// Pairs whose boxes overlap.
     pub pairs: usize,

@@ -139,6 +139,7 @@ pub struct ShapeFile {
 /// A shape in its own frame. All lengths are in m and more than 0.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Geometry {
     /// A ball.
     Ball {

@@ -9,6 +9,7 @@ use crate::names::named;
 /// In which order a sweep goes over contacts. It is a part of the method: another order takes other numbers of sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Order {
     /// Every contact by itself: in the order of the file each takes the first color that is free on both of its bodies.
     Contacts,

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 /// Who decides how a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum BodyKind {
     /// Never moves.
     Fixed,

@@ -61,7 +61,7 @@ impl Entrant {
         let hertz = self.hertz(scene.dt);
         Ok(match self.engine {
             Engine::Drystone => {
-                let mut config = SolverConfig { substeps: self.substeps, ..SolverConfig::default().without_sleep() };
+                let mut config = SolverConfig::default().without_sleep().with(|c| c.substeps = self.substeps);
                 config.contact_frequency = self.frequency.unwrap_or(config.contact_frequency);
                 self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
                 Box::new(Drystone::new(scene, "cpu", &config)?)

@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Check, DT, Setup, is_broken};
 use drystone::Result;
 use drystone::Simulation;
-use drystone::config::{FrictionRule, SolverConfig};
+use drystone::config::FrictionRule;
 use drystone::metrics;
 use drystone::scenes::Scene;
 use drystone::stats::largest;
@@ -349,7 +349,7 @@ pub fn rolling_error(angle: f32, simulation: impl FnOnce(World) -> Result<Simula
 
 pub(super) fn rolling(setup: &Setup) -> Result<Vec<Check>> {
     let error = |angle: f32, friction: FrictionRule| {
-        let config = SolverConfig { friction, ..setup.config.clone() };
+        let config = setup.config.clone().with(|c| c.friction = friction);
         rolling_error(angle, |world| Simulation::new(world, config, (setup.open)()?))
     };
     let across = error(60.0, FrictionRule::Box)?;

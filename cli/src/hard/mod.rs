@@ -281,7 +281,7 @@ mod tests {
             world.add(drystone::Body::dynamic().shape(drystone::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 0.0, 0.0));
         }
         let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn Backend>);
-        let setup = Setup { config: SolverConfig { push_limit: 0.1, ..SolverConfig::default() }, open: &open };
+        let setup = Setup { config: SolverConfig::default().with(|c| c.push_limit = 0.1), open: &open };
         let outcome = setup.outcome(world, 300).expect("a run");
         assert!(outcome.at_rest < 1e-3 && (0.15..0.2).contains(&outcome.deepest), "{outcome:?}");
     }

@@ -178,7 +178,7 @@ mod tests {
         let measure = |world: World| {
             let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn drystone::Backend>);
             // With 8 substeps the order of the pads in a sweep shows: 0.07.
-            let config = drystone::SolverConfig { substeps: 32, ..Default::default() };
+            let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
             let setup = Setup { config, open: &open };
             let mut simulation = setup.simulation(world).expect("a simulation");
             for _ in 0..60 {

@@ -108,13 +108,12 @@ fn runs(page: &mut String) -> Result<()> {
             // Momentum begins with the third sweep.
             let methods = if sweeps < 3 { &[Method::Plain][..] } else { &[Method::Plain, Method::Accelerated] };
             for &method in methods {
-                let config = SolverConfig {
-                    substeps,
-                    iterations: sweeps,
-                    relax: sweeps,
-                    method,
-                    ..SolverConfig::default().without_sleep()
-                };
+                let config = SolverConfig::default().without_sleep().with(|c| {
+                    c.substeps = substeps;
+                    c.iterations = sweeps;
+                    c.relax = sweeps;
+                    c.method = method;
+                });
                 let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new()))?;
                 let mut report = RunReport::new(&scene, &simulation);
                 for _ in 0..steps {

@@ -189,7 +189,7 @@ mod tests {
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");
         let reference = Box::new(Reference::<f32>::new());
-        let config = SolverConfig { sleep_after: 0.1, ..SolverConfig::default() };
+        let config = SolverConfig::default().with(|c| c.sleep_after = 0.1);
         let mut simulation = Simulation::new(scene.world, config, reference).expect("a simulation");
         for _ in 0..20 {
             simulation.step(scene.dt).expect("a step");

@@ -340,11 +340,11 @@ mod tests {
     fn settings_and_backend_change_while_it_runs_and_what_contradicts_is_refused() {
         let mut live = live("tower");
         live.step().expect("a step");
-        live.set_config(SolverConfig { substeps: 3, ..SolverConfig::default() });
+        live.set_config(SolverConfig::default().with(|c| c.substeps = 3));
         live.set_backend(BackendChoice::Cpu);
         live.step().expect("a step");
         assert_eq!((live.simulation.config().substeps, live.simulation.backend().name()), (3, "cpu"));
-        live.set_config(SolverConfig { substeps: 0, ..SolverConfig::default() });
+        live.set_config(SolverConfig::default().with(|c| c.substeps = 0));
         assert!(live.refused.as_ref().is_some_and(|e| e.contains("substeps")));
         assert_eq!(live.simulation.config().substeps, 3);
     }

@@ -33,6 +33,7 @@ impl fmt::Display for AdapterSummary {
 
 /// Which adapter to open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AdapterChoice {
     /// The one with the most hardware: discrete, integrated, virtual, then software.
     Best,

@@ -55,7 +55,7 @@ const DRYSTONE: usize = 0;
 const RAPIER: usize = 5;
 
 fn drystone(map: Map, substeps: u32) -> Result<Game> {
-    let config = SolverConfig { substeps, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.substeps = substeps);
     Game::new(map, config, choose(BackendChoice::Cpu, 1, false)?.0)
 }
 

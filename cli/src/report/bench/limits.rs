@@ -108,7 +108,11 @@ const MANY: u32 = 24;
 
 /// Time of so many sweeps (s).
 fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
-    let config = SolverConfig { substeps: 1, iterations: sweeps, relax: 0, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| {
+        c.substeps = 1;
+        c.iterations = sweeps;
+        c.relax = 0;
+    });
     let plan = StepPlan::new(&config, problem);
     let mut problem = problem.clone();
     let begin = Instant::now();

@@ -172,7 +172,7 @@ pub fn bench(
 fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32)> {
     let scene = Scene::find_spec(spec)?;
     let (hash, dt, falls) = (scene.content_hash(), scene.dt, scene.container.is_some());
-    let coarse = SolverConfig { substeps: 1, ..config.clone() };
+    let coarse = config.clone().with(|c| c.substeps = 1);
     let mut simulation = Simulation::new(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
     for _ in 0..if falls { COARSE } else { 0 } {
         simulation.step(dt)?;

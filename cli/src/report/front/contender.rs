@@ -138,8 +138,10 @@ mod tests {
 
     #[test]
     fn a_label_says_what_is_not_at_its_default() {
-        let mut config =
-            SolverConfig { substeps: 4, friction: FrictionRule::Box, ..SolverConfig::default().without_sleep() };
+        let mut config = SolverConfig::default().without_sleep().with(|c| {
+            c.substeps = 4;
+            c.friction = FrictionRule::Box;
+        });
         assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x1 box");
         settings::set(&mut config, "contact_frequency=0.25").unwrap();
         settings::set(&mut config, "relax=2").unwrap();
