@@ -2,11 +2,11 @@
 //! Whole steps are what `drystone bench` measures.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use drystone::collide::Detector;
 use drystone::config::FrictionAt;
-use drystone::graph::{ConstraintGraph, Edge, IMMOVABLE};
-use drystone::plan::{Kernel, Pass};
-use drystone::problem::Prepared;
+use drystone::stages::collide::Detector;
+use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::Prepared;
 use drystone::{Backend, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.
@@ -24,7 +24,7 @@ fn settled(scene: &str, config: SolverConfig) -> (Simulation, f32) {
 fn stages(c: &mut Criterion) {
     let (mut simulation, dt) = settled("pile:n=1000", SolverConfig::default().without_sleep());
     let (world, config) = (simulation.world.clone(), SolverConfig::default().without_sleep());
-    let anew = SolverConfig { recycle_distance: 0.0, ..config.clone() };
+    let anew = config.clone().with(|c| c.recycle_distance = 0.0);
     let mut group = c.benchmark_group("a manifold");
     group.throughput(Throughput::Elements(simulation.next_problem(dt).expect("a step").0.contacts.len() as u64));
 
@@ -70,7 +70,7 @@ fn stages(c: &mut Criterion) {
 }
 
 fn kernels(c: &mut Criterion) {
-    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+    let at_manifold = SolverConfig::default().without_sleep().with(|c| c.friction_at = FrictionAt::Manifold);
     for (title, scene, config) in [
         ("pile:n=1000", "pile:n=1000", SolverConfig::default().without_sleep()),
         ("pile:n=1000, friction a manifold", "pile:n=1000", at_manifold),

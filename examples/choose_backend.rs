@@ -2,13 +2,12 @@
 //!
 //!     cargo run --release --example choose_backend -- gpu
 
-use clap::ValueEnum;
 use drystone::backend::{BackendChoice, choose};
-use drystone::{Error, Result, Scene, Simulation, SolverConfig};
+use drystone::{Result, Scene, Simulation, SolverConfig};
 
 fn main() -> Result<()> {
     let name = std::env::args().nth(1).unwrap_or_else(|| "auto".into());
-    let choice = BackendChoice::from_str(&name, true).map_err(Error::input)?;
+    let choice: BackendChoice = name.parse()?;
 
     let scene = Scene::find("pile", &["n=200".into()])?;
     let (backend, why) = choose(choice, scene.world.dynamic_count(), false)?;

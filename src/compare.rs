@@ -10,7 +10,8 @@ use crate::simulation::Simulation;
 use crate::world::World;
 
 /// How far two worlds are apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Difference {
     /// Bodies of which any number differs in any bit.
     pub bodies: usize,
@@ -58,18 +59,19 @@ fn distance(x: f32, y: f32) -> f64 {
 }
 
 /// Where two backends first disagree.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FirstDifference {
     /// Step, from 1.
     pub step: u32,
     /// Where in that step.
-    #[serde(flatten)]
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub stage: Stage,
 }
 
 /// The first stage of a step whose results are not the same.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(untagged))]
 pub enum Stage {
     /// Before the first pass: the backends were given different rows.
     Rows {
@@ -106,7 +108,8 @@ impl std::fmt::Display for FirstDifference {
 }
 
 /// What a comparison found.
-#[derive(Clone, Debug, Default, serde::Serialize)]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Comparison {
     /// After each step.
     pub steps: Vec<Difference>,

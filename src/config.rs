@@ -1,15 +1,17 @@
-//! Every choice of the solver, in one plain struct: what `--set`, `--config` and the library all speak.
+//! Every choice of the solver, in one plain struct. Feature `serde` reads and writes it.
 
-use std::path::Path;
-
+#[cfg(feature = "serde")]
 use schemars::JsonSchema;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::names::named;
 
 /// How friction is modelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionRule {
     /// No tangential impulse. Taken by itself where every contact of a scene has mu = 0.
     None,
@@ -23,8 +25,9 @@ pub enum FrictionRule {
 }
 
 /// Where friction acts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionAt {
     /// At every contact point, limited by that point's normal impulse.
     #[default]
@@ -37,8 +40,9 @@ pub enum FrictionAt {
 ///
 /// It hardly matters: over the standing scenes overlap and speed at rest agree to a few percent. In towers normals first drift
 /// a little less (zigzag of 20: 33 against 38 mm in 10 s), in walls friction first does (3.4 against 5.7 mm).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionOrder {
     /// Normals, then friction within the cone that they span: the order of the course sheet.
     #[default]
@@ -48,8 +52,9 @@ pub enum FrictionOrder {
 }
 
 /// What is kept non-negative.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Clamping {
     /// Every single correction; impulses start at zero in each substep. A correction that pushed too far can never be
     /// taken back: misaligned stacks fall.
@@ -60,8 +65,9 @@ pub enum Clamping {
 }
 
 /// How overlap that is there already is removed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Stabilization {
     /// Not at all: it drifts.
     None,
@@ -72,9 +78,12 @@ pub enum Stabilization {
     Soft,
 }
 
+named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
+
 /// Which sweeps of a substep solve friction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum FrictionSweeps {
     /// The biased sweeps and the relax sweeps.
     All,
@@ -84,8 +93,9 @@ pub enum FrictionSweeps {
 }
 
 /// What is done with the sweeps of a substep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Method {
     /// One after another: projected Gauss-Seidel.
     #[default]
@@ -95,16 +105,20 @@ pub enum Method {
     Accelerated,
 }
 
+named!(Method { Plain = "plain", Accelerated = "accelerated", });
+
 /// Settings of one step of the solver. The defaults hold every standing scene of the catalogue.
 ///
 /// ```
-/// let mut config = drystone::SolverConfig::default();
-/// config.set("substeps=8")?;
-/// assert_eq!(config.substeps, 8);
+/// use drystone::SolverConfig;
+///
+/// let config = SolverConfig::default().with(|c| c.substeps = 32);
+/// config.check()?;
 /// # Ok::<(), drystone::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct SolverConfig {
     /// Substeps of one step, 1 or more. Errors fall with their square, time grows with them.
     pub substeps: u32,
@@ -240,6 +254,17 @@ impl Default for SolverConfig {
 }
 
 impl SolverConfig {
+    /// These settings with some changed. Settings grow with versions, so that a program changes them instead of listing them.
+    ///
+    /// ```
+    /// let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
+    /// assert_eq!(config.substeps, 32);
+    /// ```
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
     /// The same settings, but nothing falls asleep: for whatever is measured or compared.
     ///
     /// ```
@@ -249,60 +274,6 @@ impl SolverConfig {
         Self { sleep_after: 0.0, ..self }
     }
 
-    /// Reads settings from a TOML file; what it leaves out takes its default.
-    ///
-    /// # Errors
-    /// The file cannot be read, is not TOML, names an unknown setting or gives one an impossible value.
-    pub fn from_toml_file(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
-        let config: Self = toml::from_str(&text).map_err(|e| {
-            let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
-            Error::input(format!("{}: line {line}: {}", path.display(), first_line(&e)))
-        })?;
-        config.check().map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
-        Ok(config)
-    }
-
-    /// The settings that are not at their defaults, as `key=value`, but for those that are `said` otherwise.
-    pub fn unusual(&self, said: &[&str]) -> Vec<String> {
-        let table = |config: &Self| toml::Table::try_from(config).expect("a config is a table");
-        let usual = table(&Self::default());
-        let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-        let text = |(key, value): (String, toml::Value)| match value {
-            toml::Value::String(word) => format!("{key}={word}"),
-            // As it was written, without what f64 sees of its rounding.
-            toml::Value::Float(x) => format!("{key}={}", x as f32),
-            value => format!("{key}={value}"),
-        };
-        table(self).into_iter().filter(differs).map(text).collect()
-    }
-
-    /// Changes one setting, written `key=value` as in TOML; bare words need no quotes.
-    ///
-    /// # Errors
-    /// No `=`, an unknown key, or a value that does not fit.
-    pub fn set(&mut self, assignment: &str) -> Result<()> {
-        let (key, value) = assignment
-            .split_once('=')
-            .ok_or_else(|| Error::input(format!("--set {assignment}: write it as key=value")))?;
-        let (key, value) = (key.trim(), value.trim());
-        let mut table = toml::Table::try_from(&*self).expect("a config is a table");
-        let parse = |text: &str| toml::from_str::<toml::Table>(&format!("value = {text}")).ok();
-        let parsed = parse(value).or_else(|| parse(&format!("{value:?}"))).and_then(|mut t| t.remove("value"));
-        let mut parsed = parsed.ok_or_else(|| Error::input(format!("--set {assignment}: cannot read the value")))?;
-        // A whole number is a fine value for a real setting.
-        if let (Some(toml::Value::Float(_)), toml::Value::Integer(i)) = (table.get(key), &parsed) {
-            parsed = toml::Value::Float(*i as f64);
-        }
-        table.insert(key.to_owned(), parsed);
-        let changed: Self = table
-            .try_into()
-            .map_err(|e: toml::de::Error| Error::input(format!("--set {assignment}: {}", first_line(&e))))?;
-        changed.check_ranges().map_err(|e| Error::input(format!("--set {assignment}: {e}")))?;
-        *self = changed;
-        Ok(())
-    }
-
     /// Refuses values that no step can be made of, and settings that contradict each other.
     ///
     /// # Errors
@@ -310,7 +281,7 @@ impl SolverConfig {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.stabilization != Stabilization::Soft && self.relax > 0 {
-            let (rule, relax) = (word(&self.stabilization), self.relax);
+            let (rule, relax) = (self.stabilization, self.relax);
             return Err(Error::input(format!(
                 "stabilization = {rule} with relax = {relax}: relax sweeps belong to soft contacts; set relax=0"
             )));
@@ -329,8 +300,11 @@ impl SolverConfig {
         Ok(())
     }
 
-    /// Refuses values out of their range, one by one.
-    fn check_ranges(&self) -> Result<()> {
+    /// Refuses values out of their range, one by one, whether or not they contradict each other.
+    ///
+    /// # Errors
+    /// One line that names the setting, its value and the range.
+    pub fn check_ranges(&self) -> Result<()> {
         if self.tolerance > 0.0 && self.iterations == 0 {
             let tolerance = self.tolerance;
             return Err(Error::input(format!("tolerance = {tolerance} with iterations = 0: no sweep would be tested")));
@@ -375,15 +349,4 @@ impl SolverConfig {
         }
         Ok(())
     }
-}
-
-/// A rule by the word that names it in files.
-fn word(rule: &impl Serialize) -> String {
-    serde_json::to_value(rule).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
-}
-
-/// The message of a TOML error without its drawing of the text, and without the list of all settings.
-fn first_line(e: &toml::de::Error) -> String {
-    let message = e.message().lines().collect::<Vec<_>>().join(" ");
-    crate::suggest::shorten(&message, "`drystone settings` lists all")
 }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// One line that names what is wrong and where.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The caller's input cannot be used: a scene file, a setting, a parameter.
     #[error("{0}")]
@@ -34,7 +35,7 @@ impl Error {
     }
 
     /// Says where an [`Error::Input`] is: `place: message`.
-    pub(crate) fn within(self, place: impl std::fmt::Display) -> Self {
+    pub fn within(self, place: impl std::fmt::Display) -> Self {
         match self {
             Self::Input(message) => Self::Input(format!("{place}: {message}")),
             other => other,

@@ -5,57 +5,68 @@
 //!
 //! ```text
 //! detect   parry: tree over boxes -> persistent manifolds, at most 4 points   world  -> manifolds   collide
-//! color    greedy, deterministic; only bodies that can move count             pairs  -> colors      graph
-//! prepare  arms, masses, separations, carried-over impulses                   ...    -> StepProblem problem
+//! color    greedy, deterministic; only bodies that can move count             slots  -> order       graph
+//! prepare  arms, masses, separations; impulses stay in their rows             ...    -> StepProblem problem
 //! plan     substeps x (velocities, warm start, sweep, positions, relax)       config -> StepPlan    plan
 //! run      reference, lanes or GPU: same kernels                               in place              backend
-//! store    poses, velocities, impulses back                                   -> world, manifolds   problem
+//! store    poses and velocities back                                          -> world              problem
 //! ```
 //!
 //! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
-//! function of a shader has a Rust double of the same name ([`kernels`]), so that every number of the GPU has something
+//! function of a shader has a Rust double of the same name ([`stages::kernels`]), so that every number of the GPU has something
 //! to be compared with.
 //!
-//! One solve by itself, without bodies' poses: a [`ContactProblem`] from a file, swept by a [`solver::Solver`], and what is
-//! left of its error in [`residuals::Residuals`].
+//! | To | call |
+//! |---|---|
+//! | build a world | [`World`], [`Body`], [`Shape`], [`BallJoint`]; or find a [`Scene`] of the catalogue or a file |
+//! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
+//! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
+//! | step | [`Simulation::step`], which gives [`StepStats`] |
+//! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
+//! | measure overlap, speed, drift | [`metrics`] |
+//! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
+//!
+//! The stages one by one, which tests and measurements need, are in [`stages`].
+//!
+//! # Features
+//!
+//! - `gpu`, the default: the backend on compute shaders. Without it no crate of wgpu is built.
+//! - `serde`: scene files, their JSON Schema; settings serialize and deserialize, results serialize.
+//! - `fclib`: contact problems in FCLIB's HDF5 files.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod backend;
-pub mod cli;
-pub mod collide;
-pub mod compare;
+mod collide;
+mod compare;
 pub mod config;
 pub mod contacts;
-pub mod error;
-pub mod files;
-pub mod graph;
-pub mod hard;
-pub mod kernels;
+mod error;
+mod graph;
+mod kernels;
 pub mod load;
-pub mod math;
-pub mod maze;
+mod math;
 mod memory;
 pub mod metrics;
-pub mod plan;
+mod names;
+mod plan;
 pub mod preset;
-pub mod problem;
+mod problem;
 mod random;
-pub mod report;
 pub mod residuals;
 pub mod scenes;
-pub mod simulation;
-pub mod sleep;
+mod simulation;
+mod sleep;
 pub mod solver;
+pub mod stages;
 pub mod stats;
 mod suggest;
-#[cfg(feature = "view")]
-pub mod view;
 pub mod world;
 
 pub use backend::Backend;
 pub use backend::cpu::{Cpu, Reference};
+#[cfg(feature = "gpu")]
 pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
 pub use contacts::ContactProblem;
@@ -64,7 +75,7 @@ pub use glam;
 pub use plan::StepPlan;
 pub use problem::StepProblem;
 pub use scenes::Scene;
-pub use simulation::Simulation;
+pub use simulation::{Simulation, SolvedManifold, SolvedPoint};
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyKind, MassProperties, Material, Shape, World};
 

@@ -20,6 +20,7 @@ const LEVEL: f64 = 0.1;
 
 /// The interface that sinks in deepest.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Load {
     /// The body that is borne.
     pub upper: usize,

@@ -7,13 +7,13 @@ use crate::error::{Error, Result};
 
 /// Bytes that a body takes at least while it is simulated, rows and a copy of the scene included. Measured: 2.1 kB in a grid of
 /// joints, 4 kB in a pile that still falls.
-pub(crate) const BODY: f64 = 2000.0;
+pub const BODY: f64 = 2000.0;
 
 /// Refuses a world or film that takes more memory than the machine has. Where the machine does not say, all pass.
 ///
 /// # Errors
 /// One line that names `what`, what it takes and what there is.
-pub(crate) fn check(bytes: f64, what: impl Display) -> Result<()> {
+pub fn check(bytes: f64, what: impl Display) -> Result<()> {
     match available().filter(|&there| bytes > there) {
         Some(there) => Err(Error::TooLarge(format!(
             "{what}: at least {:.1} GB of memory, of which {:.1} GB are available",

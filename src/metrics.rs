@@ -7,6 +7,7 @@ use crate::world::{Body, BodyKind, World};
 
 /// Overlap over all touching pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Penetration {
     /// Deepest (m).
     pub max: f64,

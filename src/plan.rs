@@ -17,6 +17,7 @@ use crate::problem::{
 
 /// One of the compute shaders, with its rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Kernel {
     /// Gravity and forces; over bodies.
     IntegrateVelocities {

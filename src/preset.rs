@@ -1,11 +1,13 @@
 //! Settings by name. A preset is a promise with numbers, which tests/presets.rs keeps.
 
 use crate::config::SolverConfig;
+use crate::names::named;
 
 /// How much error is paid for with time: the same rules with more or fewer substeps, which measures best of all ways to spend
 /// a sweep (docs/speed-vs-error.md).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Preset {
     /// 4 substeps: for games and previews.
     Fast,
@@ -18,8 +20,11 @@ pub enum Preset {
     Reference,
 }
 
+named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Reference = "reference", });
+
 /// What a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Promise {
     /// Cubes of a tower that stands for 20 s.
     pub tower: u32,
@@ -32,9 +37,6 @@ pub struct Promise {
 }
 
 impl Preset {
-    /// All, from fast to accurate.
-    pub const ALL: [Self; 4] = [Self::Fast, Self::Balanced, Self::Accurate, Self::Reference];
-
     /// The settings.
     pub fn config(self) -> SolverConfig {
         let substeps = match self {
@@ -55,11 +57,5 @@ impl Preset {
             Self::Accurate => promise(160, 1000.0, 0.16e-3, 2e-6),
             Self::Reference => promise(400, 5000.0, 0.011e-3, 1e-6),
         }
-    }
-}
-
-impl std::fmt::Display for Preset {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        clap::ValueEnum::to_possible_value(self).expect("no preset is skipped").get_name().fmt(f)
     }
 }

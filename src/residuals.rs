@@ -9,7 +9,9 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::contacts::{ContactProblem, Operator, Velocity};
 
 /// What impulses leave unsolved. All numbers are NaN if any of them is not finite.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Residuals {
     /// The natural map in velocities: the norm of F/rho over all contacts with rho = 3/trace(W_ii), over the norm of
     /// the free relative velocities. Independent of units; the number to steer by.

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Times and counts of one step.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct StepStats {
     /// Wall time of each stage.
     pub times: StageTimes,
@@ -41,6 +42,7 @@ pub struct StepStats {
 
 /// Time that a device spent at one kernel in one step.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct KernelTime {
     /// Its name.
     pub kernel: &'static str,
@@ -52,6 +54,7 @@ pub struct KernelTime {
 
 /// What a step moves between the processor and a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Traffic {
     /// Bytes sent to the device.
     pub up: u64,
@@ -63,6 +66,7 @@ pub struct Traffic {
 
 /// Wall time of each stage of a step.
 #[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
 pub struct StageTimes {
     /// Finding contacts.
     pub detect: Duration,

@@ -28,7 +28,7 @@ pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Opt
 }
 
 /// `; did you mean "pile"? more` or `; more`, to end a message with.
-pub(crate) fn hint<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>, more: impl Display) -> String {
+pub fn hint<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>, more: impl Display) -> String {
     match nearest(typed, names) {
         Some(name) => format!("; did you mean {name:?}? {more}"),
         None => format!("; {more}"),
@@ -40,7 +40,7 @@ const FEW: usize = 9;
 
 /// A message of serde's about an unknown name, which lists all known ones: the nearest instead of a long list, and `all`, which
 /// says where the list is.
-pub(crate) fn shorten(message: &str, all: &str) -> String {
+pub fn shorten(message: &str, all: &str) -> String {
     let Some((head, tail)) = message.split_once(", expected one of ") else { return message.to_owned() };
     let Some((list, place)) = tail.rsplit_once('`') else { return message.to_owned() };
     let quoted = |text: &str| text.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();

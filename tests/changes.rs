@@ -1,8 +1,8 @@
 //! What the caller changes between two steps: the next step follows it, whatever it is, or says why not.
 
-use drystone::compare::Difference;
 use drystone::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
+use drystone::stages::compare::Difference;
 use drystone::{Backend, BallJoint, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
 const DT: f32 = 1.0 / 60.0;
@@ -159,8 +159,8 @@ fn every_setting_may_change_on_a_settled_world() {
 #[test]
 fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_holds_again_afterwards() {
     for (backend, at) in BOTH.into_iter().zip([FrictionAt::Points, FrictionAt::Manifold]) {
-        let config = SolverConfig { friction_at: at, ..SolverConfig::default().without_sleep() };
-        let none = SolverConfig { friction: FrictionRule::None, ..config.clone() };
+        let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = at);
+        let none = config.clone().with(|c| c.friction = FrictionRule::None);
         let mut simulation = simulation(&standing(), &config, backend);
         run(&mut simulation, 60);
         let block = 17;
@@ -182,12 +182,12 @@ fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_ho
 #[test]
 fn a_pile_at_rest_stays_so_with_fewer_substeps_and_with_longer_steps() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let fine = SolverConfig { substeps: 32, ..SolverConfig::default().without_sleep() };
+    let fine = SolverConfig::default().without_sleep().with(|c| c.substeps = 32);
     for (substeps, dt) in [(8, DT), (32, 2.0 * DT), (16, 0.5 * DT)] {
         let mut simulation = simulation(&scene.world, &fine, cpu);
         run(&mut simulation, 400);
         let before = fastest(&simulation.world);
-        simulation.set_config(SolverConfig { substeps, ..fine.clone() }).expect("a setting");
+        simulation.set_config(fine.clone().with(|c| c.substeps = substeps)).expect("a setting");
         let mut worst = 0.0_f32;
         for _ in 0..60 {
             simulation.step(dt).expect("a step");
@@ -232,7 +232,7 @@ fn forces_stay_as_they_are_in_a_step_of_another_length() {
 /// A preload is an overlap at rest, which goes with the square of the substep where the contact is as stiff as the substep is short.
 #[test]
 fn preloads_follow_the_length_of_a_step() {
-    let config = SolverConfig { preload_rate: 0.0, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.preload_rate = 0.0);
     let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), reference);
     run(&mut simulation, 300);
     simulation.set_config(config).expect("a setting");
@@ -250,11 +250,11 @@ fn bodies_may_fall_asleep_once_the_settings_say_so() {
     let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 120);
     assert!(!(0..simulation.world.bodies.len()).any(|i| simulation.is_asleep(i)));
-    let asleep = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
+    let asleep = SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3);
     simulation.set_config(asleep.clone()).expect("a setting");
     run(&mut simulation, 60);
     assert!(simulation.is_asleep(1), "0.3 s of rest are over");
-    simulation.set_config(SolverConfig { sleep_speed: 1e-9, ..asleep.clone() }).expect("a setting");
+    simulation.set_config(asleep.clone().with(|c| c.sleep_speed = 1e-9)).expect("a setting");
     simulation.world.bodies[1].linear_velocity.x = 1e-4;
     run(&mut simulation, 60);
     assert!(!simulation.is_asleep(1), "nothing is slower than 1e-9 m/s");
@@ -268,11 +268,11 @@ fn bodies_may_fall_asleep_once_the_settings_say_so() {
 
 #[test]
 fn a_setting_that_changes_wakes_what_sleeps() {
-    let mut simulation = simulation(&standing(), &SolverConfig { sleep_after: 0.3, ..SolverConfig::default() }, cpu);
+    let mut simulation = simulation(&standing(), &SolverConfig::default().with(|c| c.sleep_after = 0.3), cpu);
     run(&mut simulation, 240);
     let block = 17;
     assert!(simulation.is_asleep(block));
-    let slippery = SolverConfig { friction: FrictionRule::None, ..simulation.config().clone() };
+    let slippery = simulation.config().clone().with(|c| c.friction = FrictionRule::None);
     simulation.set_config(slippery).expect("a setting");
     run(&mut simulation, 30);
     let slid = simulation.world.bodies[block].linear_velocity.length();
@@ -282,7 +282,7 @@ fn a_setting_that_changes_wakes_what_sleeps() {
 /// Neither a setting of sleeping nor a mass that changed long ago keeps anything awake.
 #[test]
 fn what_was_changed_once_sleeps_again() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut simulation = simulation(&standing(), &config, cpu);
     run(&mut simulation, 240);
     assert!(simulation.is_asleep(5));
@@ -291,7 +291,7 @@ fn what_was_changed_once_sleeps_again() {
     assert!(!simulation.is_asleep(5), "its mass changed");
     run(&mut simulation, 120);
     assert!(simulation.is_asleep(5), "its mass changed two seconds ago");
-    simulation.set_config(SolverConfig { sleep_after: 0.4, ..config }).expect("a setting");
+    simulation.set_config(config.with(|c| c.sleep_after = 0.4)).expect("a setting");
     run(&mut simulation, 1);
     assert!(simulation.is_asleep(5), "only the time until bodies sleep changed");
 }
@@ -304,7 +304,7 @@ fn as_many_colors_as_are_allowed_are_taken_from_the_step_on_in_which_they_are() 
     let colors = |s: &mut Simulation| s.problem().joint_colors().len();
     let many = colors(&mut simulation);
     assert!(many > 2, "{many} colors");
-    simulation.set_config(SolverConfig { max_colors: 1, ..config.clone() }).expect("a setting");
+    simulation.set_config(config.clone().with(|c| c.max_colors = 1)).expect("a setting");
     run(&mut simulation, 1);
     let mut anew = Simulation::new(net(), simulation.config().clone(), cpu()).expect("a good world");
     run(&mut anew, 1);
@@ -318,7 +318,7 @@ fn as_many_colors_as_are_allowed_are_taken_from_the_step_on_in_which_they_are() 
 /// The plan of a step is that of its problem, whatever began or ended before it.
 #[test]
 fn a_plan_is_always_that_of_its_problem() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut world = standing();
     // A ball that comes down after the rest fell asleep, and bounces; cubes and balls turn without a gyroscopic pass.
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 60.0, 0.0).restitution(0.8));
@@ -380,7 +380,7 @@ fn a_plan_follows_spins_where_its_colors_stay() {
     world.join(BallJoint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 0.0, 0.0));
     world.join(BallJoint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
-    let mut simulation = simulation(&world, &SolverConfig { sleep_after: 0.3, ..SolverConfig::default() }, cpu);
+    let mut simulation = simulation(&world, &SolverConfig::default().with(|c| c.sleep_after = 0.3), cpu);
     for _ in 0..60 {
         simulation.world.bodies[ball].linear_velocity.y = 0.1;
         run(&mut simulation, 1);
@@ -403,7 +403,10 @@ fn friction_that_acts_elsewhere_begins_without_impulses() {
     assert!(simulation.problem().impulses.iter().any(|i| i.tangent_1 != 0.0 || i.tangent_2 != 0.0));
     for friction_at in [FrictionAt::Manifold, FrictionAt::Points] {
         // All contacts are computed anew.
-        let other = SolverConfig { friction_at, recycle_distance: 0.0, ..config.clone() };
+        let other = config.clone().with(|c| {
+            c.friction_at = friction_at;
+            c.recycle_distance = 0.0;
+        });
         simulation.set_config(other).expect("a setting");
         let (next, _) = simulation.next_problem(DT).expect("a step");
         assert!(next.impulses.iter().all(|i| i.tangent_1 == 0.0 && i.tangent_2 == 0.0), "{friction_at:?}");
@@ -527,7 +530,7 @@ fn whether_jointed_bodies_collide_may_change() {
 
 #[test]
 fn a_changed_joint_wakes_what_it_held() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3);
     let mut simulation = simulation(&standing(), &config, cpu);
     run(&mut simulation, 240);
     let rod = 18;
@@ -541,7 +544,7 @@ fn a_changed_joint_wakes_what_it_held() {
 /// Two chains hang still. What changes of one wakes that one.
 #[test]
 fn a_changed_joint_wakes_only_what_it_holds() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default() };
+    let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut world = World::new();
     for x in [0.0, 5.0] {
         let upper = world.add(cube(x, -1.0, 0.0));
@@ -572,7 +575,7 @@ fn a_changed_joint_wakes_only_what_it_holds() {
 
 #[test]
 fn a_new_joint_wakes_both_of_its_bodies() {
-    let config = SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3);
     for swap in [false, true] {
         let mut simulation = simulation(&standing(), &config, cpu);
         run(&mut simulation, 240);
@@ -606,7 +609,7 @@ fn a_body_that_is_untied_rests_on_a_half_space() {
 #[test]
 fn masses_and_materials_may_change() {
     let mut simulation =
-        simulation(&standing(), &SolverConfig { sleep_after: 0.3, ..SolverConfig::default().without_sleep() }, cpu);
+        simulation(&standing(), &SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3), cpu);
     run(&mut simulation, 240);
     let (slope, block) = (16, 17);
     assert!(simulation.is_asleep(block));

@@ -1,14 +1,18 @@
 //! Problems from any source are checked before threads or drivers rely on them.
 
-use drystone::backend::CheckedStep;
-use drystone::plan::{Kernel, Pass};
-use drystone::problem::InertiaRow;
+#[path = "common/settings.rs"]
+mod settings;
+
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::InertiaRow;
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+use settings::set;
 
 /// The problem of a step with contacts, joints and spins, and its plan.
 fn step(settings: &[&str]) -> (StepProblem, StepPlan) {
     let mut config = SolverConfig::default();
-    settings.iter().for_each(|s| config.set(s).expect("a setting"));
+    settings.iter().for_each(|s| set(&mut config, s));
     let scene = Scene::find("bridge", &[]).expect("the scene");
     let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
     for _ in 0..60 {
@@ -45,8 +49,8 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
     for name in ["pile:n=60", "drop", "bridge", "joint-grid", "drum", "slide:mu=0", "chain:worlds=3", "rolling"] {
         for rule in rules {
             let scene = Scene::find_spec(name).expect("the scene");
-            let mut config = SolverConfig { sleep_after: 0.2, ..SolverConfig::default() };
-            rule.iter().for_each(|s| config.set(s).expect("a setting"));
+            let mut config = SolverConfig::default().with(|c| c.sleep_after = 0.2);
+            rule.iter().for_each(|s| set(&mut config, s));
             let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
             for step in 0..60 {
                 simulation.step(scene.dt).expect("a step");

@@ -1,8 +1,8 @@
 //! The comparison of backends finds what a backend does wrong, and where.
 
-use drystone::backend::CheckedStep;
-use drystone::compare::{Difference, FirstDifference, Stage, compare, first_difference};
-use drystone::problem::{JointImpulseRow, JointRow};
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::{Difference, FirstDifference, Stage, compare, first_difference};
+use drystone::stages::problem::{JointImpulseRow, JointRow};
 use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// What goes wrong at one pass.

@@ -66,7 +66,7 @@ fn slid(rule: FrictionRule, heading: f64, open: Open) -> f64 {
     let mut world = slope(FRAC_PI_6, heading, 0.3);
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).friction(0.3).position(0.0, 0.2, 0.0);
     let block = world.add(block);
-    let config = SolverConfig { friction: rule, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction = rule);
     let end = run(world, config, 1.0, 240, open).bodies[block].position;
     f64::from(end.x).hypot(f64::from(end.z))
 }
@@ -91,7 +91,7 @@ fn what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc(open: 
         let mut world = slope(20_f64.to_radians(), 0.5, 0.5);
         let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).position(0.0, 0.2, 0.0);
         let block = world.add(block);
-        let config = SolverConfig { friction: rule, ..SolverConfig::default().without_sleep() };
+        let config = SolverConfig::default().without_sleep().with(|c| c.friction = rule);
         let end = run(world, config, 10.0, 60, open).bodies[block].position;
         f64::from(end.x).hypot(f64::from(end.z))
     };
@@ -188,7 +188,7 @@ fn the_last_ball_of_a_cradle_leaves_with_the_speed_of_the_first(open: Open) {
         world.add(ball.position(x, 0.0, 0.0));
     }
     world.bodies[0].linear_velocity.x = 2.0;
-    let config = SolverConfig { restitution_threshold: 0.1, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.restitution_threshold = 0.1);
     // One impact after another: a step moves a ball by less than a gap.
     let end = run(world, config, 2.0, 9600, open);
     let speeds: Vec<f32> = end.bodies.iter().map(|b| b.linear_velocity.x).collect();
@@ -271,7 +271,7 @@ fn overhang_stands(share: f32, open: Open) -> bool {
     }
     let start = world.clone();
     // Stiff enough that the sag does not decide: boards of 1 m sink by micrometers.
-    let config = SolverConfig { substeps: 32, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.substeps = 32);
     let end = run(world, config, 10.0, 60, open);
     (2..5).all(|i| end.bodies[i].position.distance(start.bodies[i].position) < 0.05)
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use drystone::config::FrictionAt;
-use drystone::problem::effective::{EffectiveMass, InverseMass};
+use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
 
 /// FNV-1a over every bit of every pose and velocity.
@@ -105,7 +105,7 @@ fn a_settled_pile_reuses_its_contacts_and_a_new_one_computes_them() {
 fn reused_contacts_hold_as_well_as_new_ones() {
     let heights = |recycle_distance: f32| {
         let scene = Scene::find("tower", &["n=8".into()]).expect("the scene");
-        let config = SolverConfig { recycle_distance, ..SolverConfig::default().without_sleep() };
+        let config = SolverConfig::default().without_sleep().with(|c| c.recycle_distance = recycle_distance);
         let mut simulation = Simulation::new(scene.world, config, cpu()).expect("good settings");
         let mut computed = 0;
         for _ in 0..300 {
@@ -153,7 +153,7 @@ fn arms(r_a: [f32; 3], r_b: [f32; 3]) -> [u32; 6] {
 
 /// Separation of the surfaces, preload and normal impulse of each point of every row.
 fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
-    let of = |row: &drystone::problem::ContactRow| {
+    let of = |row: &drystone::stages::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         let points = &problem.points[own.clone()];
         let values = points
@@ -171,7 +171,7 @@ fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
 fn what_a_reused_contact_carries_stays_with_it() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
         let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-        let config = SolverConfig { friction_at, ..SolverConfig::default().without_sleep() };
+        let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
         let mut simulation = Simulation::new(scene.world, config, cpu()).expect("a simulation");
         let (mut carried, mut ended) = (0, 0);
         for step in 0..100 {

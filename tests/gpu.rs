@@ -2,19 +2,22 @@
 
 #[macro_use]
 mod common;
+#[path = "common/settings.rs"]
+mod settings;
 
 use common::difference::of_velocities;
 use common::gpu;
 use common::tolerance;
-use drystone::backend::{CheckedStep, crossover};
-use drystone::compare::{Difference, compare};
 use drystone::glam::Vec3;
-use drystone::plan::Kernel;
-use drystone::problem::carry::Carry;
+use drystone::stages::backend::{CheckedStep, crossover};
+use drystone::stages::compare::{Difference, compare};
+use drystone::stages::plan::Kernel;
+use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
     Backend, BallJoint, Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
+use settings::set;
 
 tests! {
     exact_gpu {
@@ -119,14 +122,14 @@ const LANDED: u32 = 80;
 fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
     for rule in RULES {
         let mut config = SolverConfig::default().without_sleep();
-        rule.iter().for_each(|assignment| config.set(assignment).expect("a setting"));
+        rule.iter().for_each(|assignment| set(&mut config, assignment));
         assert_same(&mixture(), &config, LANDED, &rule.join(" "));
     }
 }
 
 fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
     let config =
-        SolverConfig { friction_at: drystone::config::FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+        SolverConfig::default().without_sleep().with(|c| c.friction_at = drystone::config::FrictionAt::Manifold);
     let scene = Scene::find("slide", &["mu=0".into()]).expect("a scene of the catalogue");
     assert_same(&scene, &config, 20, "slide without friction");
 }

@@ -1,6 +1,6 @@
 //! Graph coloring: what every coloring must keep to, over random graphs.
 
-use drystone::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use proptest::prelude::*;
 
 /// What is wrong with the coloring of `edges`, if anything.

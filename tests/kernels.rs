@@ -8,9 +8,9 @@ use common::gpu;
 use common::kernels::{accelerated_sweeps, color_by_color, every_kernel, has_patches, in_one_pass, sweep};
 use common::{random, tolerance};
 use drystone::config::FrictionRule;
-use drystone::kernels::Rules;
-use drystone::plan::{Kernel, Pass};
-use drystone::problem::ConvergenceRow;
+use drystone::stages::kernels::Rules;
+use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::ConvergenceRow;
 use drystone::{Backend, Gpu, Reference, StepProblem};
 
 tests! {

@@ -1,7 +1,11 @@
 //! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
-use drystone::compare::{Comparison, compare};
+#[path = "common/settings.rs"]
+mod settings;
+
+use drystone::stages::compare::{Comparison, compare};
 use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
+use settings::set;
 
 /// Compares a backend with the reference on a scene of the catalogue, on a pool of `threads`.
 fn against_reference(
@@ -13,7 +17,7 @@ fn against_reference(
 ) -> Comparison {
     let scene = Scene::find_spec(scene).unwrap();
     let mut config = SolverConfig::default().without_sleep();
-    settings.iter().for_each(|s| config.set(s).unwrap());
+    settings.iter().for_each(|s| set(&mut config, s));
     let mut open = |which: usize| Ok(if which == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { backend() });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| compare(&scene, &config, &mut open, steps, || ()).unwrap())
@@ -159,7 +163,7 @@ impl Backend for Lazy {
     fn adapter(&self) -> String {
         String::new()
     }
-    fn run_checked(&mut self, step: drystone::backend::CheckedStep) -> drystone::Result<()> {
+    fn run_checked(&mut self, step: drystone::stages::backend::CheckedStep) -> drystone::Result<()> {
         let (problem, passes) = step.into_parts();
         self.0.run(problem, &passes[..passes.len() - 1])
     }

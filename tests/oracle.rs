@@ -5,7 +5,9 @@
 //! solution, and velocities that are not those of the program with their own slip solve nothing. So one program proves velocities
 //! right or wrong, also where friction allows several.
 
-mod common;
+mod common {
+    pub mod contacts;
+}
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};

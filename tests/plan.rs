@@ -61,13 +61,12 @@ solve_contacts(disc friction) over colors 0..4
 #[test]
 fn settings_are_in_the_plan() {
     let scene = Scene::find("tower", &[]).expect("the scene");
-    let config = SolverConfig {
-        substeps: 1,
-        iterations: 2,
-        relax: 0,
-        fuse_colors_below: 0,
-        ..SolverConfig::default().without_sleep()
-    };
+    let config = SolverConfig::default().without_sleep().with(|c| {
+        c.substeps = 1;
+        c.iterations = 2;
+        c.relax = 0;
+        c.fuse_colors_below = 0;
+    });
     let (plan, ..) = planned(scene.world, config);
     let expected = "\
 integrate_velocities
@@ -120,7 +119,7 @@ fn only_round_surfaces_are_solved_as_round() {
 fn a_world_that_touches_nothing_is_only_integrated() {
     let mut world = row(&cube(), 0.5, 0.5);
     world.bodies.remove(0);
-    let (plan, ..) = planned(world, SolverConfig { substeps: 2, ..SolverConfig::default().without_sleep() });
+    let (plan, ..) = planned(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 2));
     assert_eq!(
         plan.to_string(),
         "integrate_velocities\nintegrate_positions\nintegrate_velocities(carry)\nintegrate_positions\n"
@@ -131,7 +130,7 @@ fn a_world_that_touches_nothing_is_only_integrated() {
 #[test]
 fn contacts_that_find_no_color_are_counted_and_solved_all_the_same() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
-    let config = SolverConfig { max_colors: 1, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.max_colors = 1);
     let (_, _, mut simulation) = planned(scene.world.clone(), config);
     let mut stats = drystone::StepStats::default();
     for _ in 0..600 {
@@ -161,7 +160,11 @@ fn a_pile_needs_no_more_colors_than_there_are() {
 fn joints_are_swept_before_contacts() {
     let mut world = row(&cube(), 0.5, 0.0);
     world.join(drystone::BallJoint::new(1, Vec3::X, 2, -Vec3::X));
-    let config = SolverConfig { substeps: 1, iterations: 2, relax: 1, ..SolverConfig::default() };
+    let config = SolverConfig::default().with(|c| {
+        c.substeps = 1;
+        c.iterations = 2;
+        c.relax = 1;
+    });
     let (plan, ..) = planned(world, config);
     let expected = "\
 integrate_velocities
@@ -192,23 +195,22 @@ fn every_setting_of_a_sweep_is_in_the_plan() {
     let default = SolverConfig::default;
     assert_eq!(relax_sweep(default()), "solve_contacts(disc friction) over colors 0");
     for (config, expected) in [
-        (SolverConfig { manifold_passes: 2, ..default() }, "disc friction, repeated"),
-        (SolverConfig { friction_order: FrictionOrder::FrictionFirst, ..default() }, "disc friction, first"),
-        (SolverConfig { friction_at: FrictionAt::Manifold, ..default() }, "disc friction, per manifold"),
-        (SolverConfig { tolerance: 1e-3, ..default() }, "disc friction, measured"),
-        (SolverConfig { friction: FrictionRule::Slip, ..default() }, "slip friction"),
-        (SolverConfig { friction: FrictionRule::Box, ..default() }, "box friction"),
+        (default().with(|c| c.manifold_passes = 2), "disc friction, repeated"),
+        (default().with(|c| c.friction_order = FrictionOrder::FrictionFirst), "disc friction, first"),
+        (default().with(|c| c.friction_at = FrictionAt::Manifold), "disc friction, per manifold"),
+        (default().with(|c| c.tolerance = 1e-3), "disc friction, measured"),
+        (default().with(|c| c.friction = FrictionRule::Slip), "slip friction"),
+        (default().with(|c| c.friction = FrictionRule::Box), "box friction"),
     ] {
         assert_eq!(relax_sweep(config), format!("solve_contacts({expected}) over colors 0"));
     }
     // Impulses that begin at zero are cleared, not carried over.
-    let config = SolverConfig {
-        clamping: Clamping::PerCorrection,
-        stabilization: Stabilization::Baumgarte,
-        relax: 0,
-        substeps: 2,
-        ..default()
-    };
+    let config = default().with(|c| {
+        c.clamping = Clamping::PerCorrection;
+        c.stabilization = Stabilization::Baumgarte;
+        c.relax = 0;
+        c.substeps = 2;
+    });
     let (plan, ..) = planned(row(&cube(), 0.5, 0.0), config);
     let substep = "\
 integrate_velocities
@@ -223,8 +225,12 @@ integrate_positions
 fn momentum_begins_with_the_third_sweep_and_ends_before_the_last_is_measured() {
     use drystone::config::Method;
     let of = |iterations| {
-        let config =
-            SolverConfig { substeps: 1, iterations, relax: 0, method: Method::Accelerated, ..SolverConfig::default() };
+        let config = SolverConfig::default().with(|c| {
+            c.substeps = 1;
+            c.iterations = iterations;
+            c.relax = 0;
+            c.method = Method::Accelerated;
+        });
         planned(row(&cube(), 0.5, 0.0), config).0.to_string()
     };
     let sweep = "solve_contacts(biased, disc friction) over colors 0\n";

@@ -5,12 +5,12 @@
 mod common;
 
 use common::gpu;
-use drystone::backend::CheckedStep;
-use drystone::compare::Difference;
 use drystone::config::{FrictionAt, FrictionRule};
 use drystone::glam::{Quat, Vec3};
-use drystone::problem::carry::{Carry, NO_ROW};
-use drystone::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::Difference;
+use drystone::stages::problem::carry::{Carry, NO_ROW};
+use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
@@ -111,10 +111,10 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
                 60 => simulation.world.bodies[20].force.x = 1e4,
                 70 => simulation.world.gravity.x = 2.0,
                 80 => simulation
-                    .set_config(SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() })
+                    .set_config(SolverConfig::default().without_sleep().with(|c| c.substeps = 4))
                     .expect("good"),
                 90 => simulation
-                    .set_config(SolverConfig { warm_start: false, ..SolverConfig::default().without_sleep() })
+                    .set_config(SolverConfig::default().without_sleep().with(|c| c.warm_start = false))
                     .expect("good"),
                 _ => {}
             }
@@ -131,7 +131,7 @@ fn islands_fall_asleep_and_wake_with_their_impulses() {
     let mut scene = pile(60);
     // Touches nothing, so that there is something to do while all others sleep.
     scene.world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1e3, 1e3, 0.0));
-    let config = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
+    let config = SolverConfig::default().with(|c| c.sleep_after = 0.5);
     let mut both = both(&scene, &config);
     let mut fewest = [usize::MAX; 2];
     for step in 1..=420 {
@@ -317,7 +317,7 @@ fn sliding() -> World {
 }
 
 fn a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew() {
-    let config = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = FrictionAt::Manifold);
     same_on_a_device(sliding(), &config, 40, |_, _| ());
 }
 
@@ -337,6 +337,6 @@ fn a_device_takes_the_points_that_are_sent() {
     bouncing.bodies.iter_mut().for_each(|body| body.material.restitution = 0.7);
     bouncing.bodies[1].position.y += 1.0;
     same_on_a_device(bouncing, &SolverConfig::default().without_sleep(), 40, |_, _| ());
-    let config = SolverConfig { friction: FrictionRule::Slip, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Slip);
     same_on_a_device(sliding(), &config, 40, |_, _| ());
 }

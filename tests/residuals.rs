@@ -1,6 +1,8 @@
 //! Residuals: nothing at a known solution, something beside it, and the same whatever the axes and the units.
 
-mod common;
+mod common {
+    pub mod contacts;
+}
 
 use common::contacts::{FRICTION, GRAVITY, STEP, bearing, tower};
 use drystone::ContactProblem;

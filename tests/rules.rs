@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 use drystone::config::{FrictionAt, FrictionRule};
-use drystone::problem::{ContactRow, PointRow};
+use drystone::stages::problem::{ContactRow, PointRow};
 use drystone::{
     BallJoint, Body, Material, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, StepStats, World,
 };
@@ -78,7 +78,7 @@ fn slid(config: SolverConfig, friction: [f32; 2]) -> f32 {
     let mut world = World::new();
     world.add(floor().friction(friction[1]));
     world.add(cube().friction(friction[0]).velocity(Vec3::X * 4.0, Vec3::ZERO));
-    let mut simulation = simulation(world, SolverConfig { substeps: 4, ..config });
+    let mut simulation = simulation(world, config.with(|c| c.substeps = 4));
     run(&mut simulation, 360, 1.0 / 240.0);
     simulation.world.bodies[1].position.x
 }
@@ -90,7 +90,10 @@ fn a_sliding_box_stops_where_friction_says_under_every_rule() {
     use FrictionRule::{Box, Disc, Slip};
     let expected = 16.0 / (2.0 * 0.4 * G);
     for (friction, friction_at) in [(Slip, Points), (Box, Points), (Disc, Points), (Box, Manifold), (Disc, Manifold)] {
-        let config = SolverConfig { friction, friction_at, ..SolverConfig::default().without_sleep() };
+        let config = SolverConfig::default().without_sleep().with(|c| {
+            c.friction = friction;
+            c.friction_at = friction_at;
+        });
         near(&format!("{friction:?} at {friction_at:?}"), slid(config, [0.4; 2]), expected, 0.005 * expected);
     }
 }
@@ -117,7 +120,8 @@ fn a_spinning_box_is_braked_by_its_load_times_mu_times_the_distance_of_its_corne
         let mut world = World::new();
         world.add(floor().friction(0.4));
         world.add(cube().friction(0.4));
-        let mut simulation = simulation(world, SolverConfig { friction_at, ..SolverConfig::default().without_sleep() });
+        let mut simulation =
+            simulation(world, SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
         run(&mut simulation, 60, 1.0 / 240.0);
         simulation.world.bodies[1].angular_velocity = Vec3::Y * 6.0;
         run(&mut simulation, 48, 1.0 / 240.0);
@@ -177,13 +181,12 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
         let hung = world.add(ball().position(0.1, 0.0, 0.0));
         world.join(BallJoint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
         let h = DT / 4.0;
-        let config = SolverConfig {
-            substeps: 4,
-            relax: 0,
-            joint_frequency: frequency,
-            joint_damping: damping,
-            ..SolverConfig::default().without_sleep()
-        };
+        let config = SolverConfig::default().without_sleep().with(|c| {
+            c.substeps = 4;
+            c.relax = 0;
+            c.joint_frequency = frequency;
+            c.joint_damping = damping;
+        });
         let mut simulation = simulation(world, config);
         let (w, mut x, mut v) = (2.0 * PI * frequency / h, 0.1_f32, 0.0_f32);
         for step in 1..=20 {
@@ -229,7 +232,7 @@ fn friction_that_a_surface_lost_is_not_carried_over() {
 #[test]
 fn without_warm_start_a_step_begins_without_impulses() {
     for warm_start in [true, false] {
-        let mut simulation = on_a_slope(SolverConfig { warm_start, ..SolverConfig::default().without_sleep() });
+        let mut simulation = on_a_slope(SolverConfig::default().without_sleep().with(|c| c.warm_start = warm_start));
         let impulses = &simulation.next_problem(DT).expect("a step").0.impulses;
         assert_eq!(impulses.len(), 4);
         let sums = impulses.iter().map(|i| i.normal + i.tangent_1.hypot(i.tangent_2));
@@ -243,7 +246,7 @@ fn a_pair_says_how_far_its_surfaces_are_apart_whatever_they_are_preloaded_by() {
     let mut world = World::new();
     world.add(floor());
     world.add(cube());
-    let mut simulation = simulation(world, SolverConfig { substeps: 2, ..SolverConfig::default().without_sleep() });
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 2));
     for _ in 0..5 {
         run(&mut simulation, 60, DT);
         let above = simulation.world.bodies[1].position.y - 0.5;
@@ -311,7 +314,7 @@ fn slip_friction_acts_against_the_slip() {
     world.add(floor().friction(0.4));
     let direction = Vec3::new(0.6, 0.0, 0.8);
     world.add(cube().friction(0.4).velocity(direction * 4.0, Vec3::ZERO));
-    let config = SolverConfig { friction: FrictionRule::Slip, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Slip);
     let mut simulation = simulation(world, config);
     run(&mut simulation, 120, 1.0 / 240.0);
     let velocity = simulation.world.bodies[1].linear_velocity;
@@ -413,7 +416,7 @@ fn bodies_that_nothing_pushes_are_no_pair() {
 
 #[test]
 fn the_row_of_a_patch_is_the_middle_of_its_points_with_the_masses_there() {
-    let config = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = FrictionAt::Manifold);
     let mut simulation = on_a_slope(config);
     let problem = simulation.next_problem(DT).expect("a step").0;
     let [points @ .., patch] = &problem.points[..] else { panic!("points and a patch") };
@@ -435,7 +438,7 @@ fn the_row_of_a_patch_is_the_middle_of_its_points_with_the_masses_there() {
 #[test]
 fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
-        let mut simulation = on_a_slope(SolverConfig { friction_at, ..SolverConfig::default().without_sleep() });
+        let mut simulation = on_a_slope(SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
         let up = -1000.0 * simulation.world.gravity * DT / 8.0;
         let pair = simulation.pairs().next().expect("it lies").clone();
         let manifold = &pair.manifolds[0];
@@ -446,7 +449,7 @@ fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
     }
     // A spin that friction stops: its impulse about the vertical, -mu N d at the most.
     let mut simulation =
-        on_a_slope(SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() });
+        on_a_slope(SolverConfig::default().without_sleep().with(|c| c.friction_at = FrictionAt::Manifold));
     simulation.world.gravity = Vec3::NEG_Y * G;
     simulation.world.bodies[1].angular_velocity = Vec3::Y * 6.0;
     run(&mut simulation, 6, DT);
@@ -547,7 +550,7 @@ fn a_row_has_the_radius_of_each_of_its_surfaces() {
 fn friction_is_carried_over_whichever_way_a_surface_slopes() {
     for angle in [0.3, 1.2, 2.5] {
         let mut held = [FrictionAt::Points, FrictionAt::Manifold].map(|friction_at| {
-            let config = SolverConfig { friction_at, ..SolverConfig::default().without_sleep() };
+            let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
             on_a_slope_that_falls(Quat::from_rotation_y(angle), config)
         });
         for simulation in &mut held {
@@ -594,57 +597,28 @@ fn a_plank_that_turns_onto_a_board_meets_it() {
 }
 
 #[test]
-fn settings_out_of_their_range_are_refused_by_name() {
-    for (name, good, bad) in [
-        ("substeps", "1", "0"),
-        ("substeps", "4096", "4097"),
-        ("iterations", "1", "0"),
-        ("relax", "0", "4097"),
-        ("manifold_passes", "16", "17"),
-        ("max_colors", "64", "65"),
-        ("max_colors", "1", "0"),
-        ("baumgarte", "1", "1.1"),
-        ("slop", "0", "-0.1"),
-        ("relaxation", "2", "2.1"),
-        ("tolerance", "0.1", "nan"),
-        ("joint_frequency", "0.5", "0.6"),
-        ("joint_damping", "0", "-1"),
-        ("contact_frequency", "0.5", "0.6"),
-        ("contact_damping", "1e6", "2e6"),
-        ("fixed_contact_frequency_ratio", "1e3", "2e3"),
-        ("preload_rate", "1e3", "2e3"),
-        ("push_limit", "1e9", "2e9"),
-        ("restitution_threshold", "0", "-1"),
-        ("speculative_margin", "1e3", "inf"),
-        ("sleep_after", "1e6", "2e6"),
-        ("sleep_speed", "1e3", "2e3"),
-        ("recycle_distance", "0", "-1"),
-    ] {
-        let mut config = SolverConfig::default().without_sleep();
-        config.set(&format!("{name}={good}")).unwrap_or_else(|e| panic!("{e}"));
-        let before = config.clone();
-        let refusal = config.set(&format!("{name}={bad}")).expect_err(name).to_string();
-        assert!(refusal.contains(&format!("{name} = ")) && !refusal.contains('\n'), "{refusal}");
-        assert_eq!(config, before, "what is refused changes nothing");
-    }
-}
-
-#[test]
 fn settings_that_contradict_each_other_are_refused_together() {
     use drystone::config::{Clamping, Method, Stabilization};
-    let hard =
-        || SolverConfig { stabilization: Stabilization::None, relax: 0, ..SolverConfig::default().without_sleep() };
+    let hard = || {
+        SolverConfig::default().without_sleep().with(|c| {
+            c.stabilization = Stabilization::None;
+            c.relax = 0;
+        })
+    };
     let refused = |config: SolverConfig, words: [&str; 2]| {
         let line = config.check().expect_err(words[0]).to_string();
         assert!(words.iter().all(|word| line.contains(word)), "{line}");
     };
     hard().check().expect("good settings");
-    refused(SolverConfig { relax: 1, ..hard() }, ["stabilization = none", "relax = 1"]);
+    refused(hard().with(|c| c.relax = 1), ["stabilization = none", "relax = 1"]);
     let single = Clamping::PerCorrection;
     refused(
-        SolverConfig { clamping: single, ..SolverConfig::default().without_sleep() },
+        SolverConfig::default().without_sleep().with(|c| c.clamping = single),
         ["clamping = per-correction", "soft"],
     );
-    let both = SolverConfig { clamping: single, method: Method::Accelerated, ..hard() };
+    let both = hard().with(|c| {
+        c.clamping = single;
+        c.method = Method::Accelerated;
+    });
     refused(both, ["clamping = per-correction", "method = accelerated"]);
 }

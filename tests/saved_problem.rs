@@ -88,7 +88,7 @@ fn a_problem_says_what_the_bodies_are_about_to_do() {
     let falling = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).friction(0.5).position(0.0, 1.004, 0.0);
     world.add(falling.velocity(Vec3::NEG_Y, Vec3::ZERO));
     world.add(Body::dynamic().shape(Shape::ball(0.5)).position(50.0, 50.0, 0.0));
-    let config = SolverConfig { substeps: 4, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.substeps = 4);
     let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("it is sound");
     let (problem, _) = simulation.step_with_contacts("plate", 0.1).expect("no joints");
 

@@ -7,12 +7,12 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use common::kernels::{every_kernel, every_rules};
-use drystone::backend::gpu::shader::{
+use drystone::config::FrictionRule;
+use drystone::stages::backend::shader::{
     BINDINGS, PASSES, Program, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source,
 };
-use drystone::config::FrictionRule;
-use drystone::kernels::Rules;
-use drystone::plan::Kernel;
+use drystone::stages::kernels::Rules;
+use drystone::stages::plan::Kernel;
 
 /// One kernel without overrides that naga reads.
 fn reflected(kernel: Kernel) -> Reflected {
@@ -27,7 +27,7 @@ fn parsed(source: &str) -> naga::Module {
 
 mod layouts {
     use super::*;
-    use drystone::problem::{
+    use drystone::stages::problem::{
         BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
         MomentumRow, Params, PassColors, PointRow, Softness,
     };
@@ -186,9 +186,9 @@ fn every_binding_stands_where_its_name_stands_in_the_list() {
 /// The programs that carry rows from step to step.
 mod carry {
     use super::*;
-    use drystone::backend::gpu::CarryParams;
-    use drystone::backend::gpu::shader::{CARRY, CARRY_BINDINGS};
-    use drystone::problem::carry::{NO_ROW, Origin, Preload};
+    use drystone::stages::backend::shader::CarryParams;
+    use drystone::stages::backend::shader::{CARRY, CARRY_BINDINGS};
+    use drystone::stages::problem::carry::{NO_ROW, Origin, Preload};
 
     fn reflected(program: Program) -> Reflected {
         Reflected::new(&program.source(), program.name(), &program.constants()).unwrap_or_else(|e| panic!("{e}"))

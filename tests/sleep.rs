@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 const DT: f32 = 1.0 / 60.0;
 
 fn sleepy() -> SolverConfig {
-    SolverConfig { sleep_after: 0.5, ..SolverConfig::default() }
+    SolverConfig::default().with(|c| c.sleep_after = 0.5)
 }
 
 fn simulation(world: World, config: SolverConfig) -> Simulation {
@@ -243,7 +243,7 @@ fn drifting(velocity: Vec3, spin: f32, config: SolverConfig) -> Simulation {
 #[test]
 fn what_is_still_falls_asleep_after_the_time_that_was_set() {
     for (after, step) in [(0.5, 32), (0.25, 16), (1.0, 64)] {
-        let mut simulation = drifting(Vec3::ZERO, 0.0, SolverConfig { sleep_after: after, ..SolverConfig::default() });
+        let mut simulation = drifting(Vec3::ZERO, 0.0, SolverConfig::default().with(|c| c.sleep_after = after));
         assert_eq!(run(&mut simulation, step - 1).asleep, 0, "{after} s");
         assert_eq!(run(&mut simulation, 1).asleep, 1, "{after} s");
     }
@@ -253,7 +253,7 @@ fn what_is_still_falls_asleep_after_the_time_that_was_set() {
 #[test]
 fn speed_and_spin_just_above_the_limit_keep_awake() {
     let limit = 0.02;
-    let config = || SolverConfig { sleep_speed: limit, ..sleepy() };
+    let config = || sleepy().with(|c| c.sleep_speed = limit);
     for (share, asleep) in [(0.95, 1), (1.05, 0)] {
         let speed = share * limit;
         assert_eq!(run(&mut drifting(Vec3::X * speed, 0.0, config()), 64).asleep, asleep, "{speed} m/s");

@@ -6,7 +6,7 @@ mod common;
 use common::{Open, gpu};
 use drystone::preset::Preset;
 use drystone::scenes::SceneFile;
-use drystone::{Body, Cpu, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, MassProperties, Reference, Shape, Simulation, World};
 use glam::{DVec3, Quat, Vec3};
 
 const SPEEDS: [f32; 10] = [1.0, 30.0, 60.0, 120.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6];
@@ -107,7 +107,7 @@ fn drift_from(world: World, factor: f32, dt: f32, steps: u32) -> Drift {
 }
 
 fn simulate(world: World, open: Open) -> Simulation {
-    let config = SolverConfig { sleep_after: 0.0, ..Preset::Fast.config() };
+    let config = Preset::Fast.config().with(|c| c.sleep_after = 0.0);
     Simulation::new(world, config, open()).expect("good settings")
 }
 

@@ -36,8 +36,8 @@ fn end(scene: &Scene, backend: fn() -> Box<dyn Backend>, config: &SolverConfig, 
 
 #[test]
 fn every_copy_of_a_world_goes_as_it_goes_alone() {
-    let at_manifold = SolverConfig { friction_at: FrictionAt::Manifold, ..SolverConfig::default().without_sleep() };
-    let asleep = SolverConfig { sleep_after: 0.5, ..SolverConfig::default() };
+    let at_manifold = SolverConfig::default().without_sleep().with(|c| c.friction_at = FrictionAt::Manifold);
+    let asleep = SolverConfig::default().with(|c| c.sleep_after = 0.5);
     for (name, parameters, config, steps) in [
         ("pile", &["n=60"][..], SolverConfig::default().without_sleep(), 90),
         ("pile", &["n=27"], at_manifold, 60),

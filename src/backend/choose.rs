@@ -1,12 +1,15 @@
 //! Which backend runs a scene.
 
+use super::Backend;
 use super::cpu::{Cpu, Reference};
+#[cfg(feature = "gpu")]
 use super::gpu::{AdapterChoice, Gpu};
-use super::{Backend, crossover};
 use crate::error::Result;
+use crate::names::named;
 
 /// What a person asks for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BackendChoice {
     /// A hardware GPU where there is one and the scene is large enough that it pays, as measured by some steps of a small pile on
     /// both; else the CPU.
@@ -20,9 +23,12 @@ pub enum BackendChoice {
     Reference,
 }
 
+named!(BackendChoice { Auto = "auto", Gpu = "gpu", Cpu = "cpu", Reference = "reference", });
+
 /// What runs sweeps, by the numbers that it computes with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Numbers {
     /// The reference in double precision.
     F64,
@@ -34,6 +40,8 @@ pub enum Numbers {
     Gpu,
 }
 
+named!(Numbers { F64 = "f64", Reference = "reference", Cpu = "cpu", Gpu = "gpu", });
+
 impl Numbers {
     /// Opens it. `exact` asks a GPU for the reference's bits.
     ///
@@ -44,19 +52,16 @@ impl Numbers {
             Self::F64 => Box::new(Reference::<f64>::new()),
             Self::Reference => Box::new(Reference::<f32>::new()),
             Self::Cpu => Box::new(Cpu::new()),
-            Self::Gpu => Box::new(Gpu::new(AdapterChoice::Best, exact)?),
+            Self::Gpu => open_gpu(exact)?,
         })
-    }
-}
-
-impl std::fmt::Display for Numbers {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
     }
 }
 
 /// Scenes of fewer dynamic bodies run on the processor: their steps take less time than it takes to open a GPU.
 const LEAST_BODIES: usize = 500;
+
+#[cfg(not(feature = "gpu"))]
+const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
 
 /// Opens the backend for a scene of `dynamic_bodies`, and says in one line what was taken and why.
 ///
@@ -77,20 +82,40 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
         BackendChoice::Auto if dynamic_bodies < LEAST_BODIES => {
             Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, a GPU is not tried below {LEAST_BODIES}")))
         }
-        BackendChoice::Auto => {
-            let Ok(mut gpu) = Gpu::new(AdapterChoice::Hardware, exact) else {
-                return Ok(cpu("cpu: no hardware GPU found (drystone adapters lists what there is)".into()));
-            };
-            let adapter = gpu.adapter();
-            let crossover = crossover(&mut Cpu::new(), &mut gpu)?;
-            let pays = crossover.map_or("never pays".into(), |n| format!("pays from about {n} on"));
-            if crossover.is_some_and(|n| dynamic_bodies >= n) {
-                return Ok((
-                    Box::new(gpu),
-                    format!("gpu: {dynamic_bodies} dynamic bodies, and as measured it {pays}; {adapter}"),
-                ));
-            }
-            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies, and as measured the GPU {pays}; {adapter}")))
-        }
+        BackendChoice::Auto => match fastest(dynamic_bodies, exact)? {
+            (Some(gpu), why) => Ok((gpu, format!("gpu: {why}"))),
+            (None, why) => Ok(cpu(format!("cpu: {why}"))),
+        },
     }
+}
+
+/// A hardware GPU if it pays for a scene of `dynamic_bodies`, and why it does or does not.
+#[cfg(feature = "gpu")]
+fn fastest(dynamic_bodies: usize, exact: bool) -> Result<(Option<Box<dyn Backend>>, String)> {
+    let Ok(mut gpu) = Gpu::new(AdapterChoice::Hardware, exact) else {
+        return Ok((None, "no hardware GPU found (drystone adapters lists what there is)".into()));
+    };
+    let adapter = gpu.adapter();
+    let crossover = super::calibrate::crossover(&mut Cpu::new(), &mut gpu)?;
+    let pays = crossover.map_or("never pays".into(), |n| format!("pays from about {n} on"));
+    Ok(if crossover.is_some_and(|n| dynamic_bodies >= n) {
+        (Some(Box::new(gpu)), format!("{dynamic_bodies} dynamic bodies, and as measured it {pays}; {adapter}"))
+    } else {
+        (None, format!("{dynamic_bodies} dynamic bodies, and as measured the GPU {pays}; {adapter}"))
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn fastest(_: usize, _: bool) -> Result<(Option<Box<dyn Backend>>, String)> {
+    Ok((None, WITHOUT_GPU.into()))
+}
+
+#[cfg(feature = "gpu")]
+fn open_gpu(exact: bool) -> Result<Box<dyn Backend>> {
+    Ok(Box::new(Gpu::new(AdapterChoice::Best, exact)?))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open_gpu(_: bool) -> Result<Box<dyn Backend>> {
+    Err(crate::error::Error::Adapter(WITHOUT_GPU.into()))
 }

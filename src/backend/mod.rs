@@ -1,13 +1,13 @@
-//! Backends follow a plan over a problem, in place. Only [`gpu`] knows wgpu.
+//! Backends follow a plan over a problem, in place. Only the module `gpu` of the feature `gpu` knows wgpu.
 
-mod calibrate;
-mod checked;
+pub(crate) mod calibrate;
+pub(crate) mod checked;
 mod choose;
 pub mod cpu;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 
-pub use calibrate::crossover;
-pub use checked::CheckedStep;
+pub(crate) use checked::CheckedStep;
 pub use choose::{BackendChoice, Numbers, choose};
 
 use crate::error::Result;

@@ -55,6 +55,7 @@ pub(crate) enum Change<'a> {
 
 /// What one detection did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DetectStats {
     /// Pairs whose boxes overlap.
     pub pairs: usize,

@@ -56,14 +56,6 @@ impl ContactProblem {
         Ok(problem)
     }
 
-    /// Into a file: whole or not at all.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        crate::files::write(path.as_ref(), self.to_text().as_bytes())
-    }
-
     /// As text; every number is read back to the same bits.
     pub fn to_text(&self) -> String {
         let name = self.name.replace(char::is_control, " ");

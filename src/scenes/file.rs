@@ -8,9 +8,9 @@ use serde_json::Value;
 use serde_path_to_error::Segment;
 
 use super::joint::JointFile;
-use super::{CATALOGUE, Scene, check};
+use super::{Scene, check};
 use crate::error::{Error, Result};
-use crate::suggest::{hint, shorten};
+use crate::suggest::shorten;
 use crate::world::BodyKind;
 
 /// A scene as a file says it, before anything but its form is checked: version 1 of the format.
@@ -139,6 +139,7 @@ pub struct ShapeFile {
 /// A shape in its own frame. All lengths are in m and more than 0.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Geometry {
     /// A ball.
     Ball {
@@ -248,19 +249,6 @@ pub fn load(path: &Path) -> Result<Scene> {
 /// The JSON Schema of scene files.
 pub fn schema() -> Value {
     schemars::schema_for!(SceneFile).to_value()
-}
-
-/// Reads a scene file, or says that there is neither a scene nor a file of that name.
-pub(super) fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
-    let path = Path::new(name_or_path);
-    if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
-        let hint = hint(name_or_path, CATALOGUE.iter().map(|e| e.name), "`drystone scenes` lists the scenes");
-        return Err(Error::input(format!("{name_or_path:?} is neither a scene nor a scene file{hint}")));
-    }
-    match parameters.first() {
-        Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
-        None => load(path),
-    }
 }
 
 /// One line for what serde found: where it is, with the body's name, and what.

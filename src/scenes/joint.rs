@@ -13,6 +13,7 @@ use crate::world::{BallJoint, BodyKind, World};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(title = "Joint")]
+#[non_exhaustive]
 pub enum JointFile {
     /// Keeps a point of one body together with a point of another, or of the world. Needs an anchor or anchors.
     Ball {

@@ -3,12 +3,15 @@
 mod basics;
 mod boxes;
 mod catalogue;
+#[cfg(feature = "serde")]
 mod check;
 mod drop;
 mod drum;
 mod entries;
+#[cfg(feature = "serde")]
 mod file;
 mod hash;
+#[cfg(feature = "serde")]
 mod joint;
 mod jointed;
 mod masonry;
@@ -18,14 +21,18 @@ mod worlds;
 
 pub use catalogue::{Entry, Parameter};
 pub use entries::CATALOGUE;
+#[cfg(feature = "serde")]
 pub use file::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile, load, schema};
+#[cfg(feature = "serde")]
 pub use joint::{BodyRef, JointFile};
 
 use std::ops::Range;
+use std::path::Path;
 
 use glam::Vec3;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::suggest::hint;
 use crate::world::{BodyKind, World};
 
 /// A world with everything a run needs to know about it.
@@ -68,14 +75,15 @@ impl Scene {
         self
     }
 
-    /// Finds a scene by its catalogue name, else reads the file of that name. `parameters` are `key=value`.
+    /// Finds a scene by its catalogue name, else reads the file of that name, for which the feature `serde` is needed.
+    /// `parameters` are `key=value`.
     ///
     /// # Errors
     /// Neither a known name nor a readable scene file; an unknown parameter or an impossible value.
     pub fn find(name_or_path: &str, parameters: &[String]) -> Result<Self> {
         match CATALOGUE.iter().find(|e| e.name == name_or_path) {
             Some(entry) => entry.build(parameters),
-            None => file::load_or_suggest(name_or_path, parameters),
+            None => load_or_suggest(name_or_path, parameters),
         }
     }
 
@@ -85,4 +93,25 @@ impl Scene {
         let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
         dynamic.map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
     }
+}
+
+/// Reads a scene file, or says that there is neither a scene nor a file of that name.
+fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
+    let path = Path::new(name_or_path);
+    if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
+        let hint = hint(name_or_path, CATALOGUE.iter().map(|e| e.name), "`drystone scenes` lists the scenes");
+        return Err(Error::input(format!("{name_or_path:?} is neither a scene nor a scene file{hint}")));
+    }
+    match parameters.first() {
+        Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
+        None => load(path),
+    }
+}
+
+#[cfg(not(feature = "serde"))]
+fn load(path: &Path) -> Result<Scene> {
+    Err(Error::input(format!(
+        "{}: a scene file: drystone was built without the feature serde, which reads it",
+        path.display()
+    )))
 }

@@ -10,6 +10,7 @@ use crate::residuals::{Measure, Residuals};
 
 /// A solved contact problem.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Solution {
     /// Impulses of the contacts, each in its coordinates (N s). Often not the only ones that solve the problem.
     pub impulses: Vec<DVec3>,

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use crate::contacts::{ContactProblem, PointContact};
 use crate::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use crate::names::named;
 
 /// In which order a sweep goes over contacts. It is a part of the method: another order takes other numbers of sweeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Order {
     /// Every contact by itself: in the order of the file each takes the first color that is free on both of its bodies.
     Contacts,
@@ -16,6 +18,8 @@ pub enum Order {
     #[default]
     Manifolds,
 }
+
+named!(Order { Contacts = "contacts", Manifolds = "manifolds", });
 
 impl Order {
     /// How often a manifold is swept before the next one: twice, since its points depend on each other most (numbers in

@@ -4,16 +4,15 @@ use std::ops::RangeInclusive;
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
-use schemars::JsonSchema;
-use serde::Deserialize;
 
 use super::shape::{Shape, pose};
 use super::{MOST_LENGTH, MOST_SPEED, is_place};
 use crate::error::{Error, Result};
 
 /// Who decides how a body moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum BodyKind {
     /// Never moves.
     Fixed,

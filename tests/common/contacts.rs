@@ -1,4 +1,5 @@
 //! Contact problems whose solution is known, and how long a solver takes to find it.
+#![allow(dead_code)]
 
 use drystone::config::Method;
 use drystone::contacts::{FreeBody, PointContact, Velocity};

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use drystone::StepProblem;
 use drystone::config::FrictionRule;
-use drystone::kernels::Rules;
-use drystone::plan::{Kernel, Pass};
+use drystone::stages::kernels::Rules;
+use drystone::stages::plan::{Kernel, Pass};
 
 /// Every combination of rules that differ in what they do.
 pub fn every_rules() -> Vec<Rules> {

@@ -7,6 +7,7 @@ pub mod gpu;
 #[macro_use]
 pub mod harness;
 pub mod kernels;
+pub mod measurement;
 pub mod random;
 pub mod tolerance;
 

@@ -3,9 +3,9 @@
 #![allow(clippy::field_reassign_with_default)]
 
 use drystone::StepProblem;
-use drystone::graph::{ConstraintGraph, Edge, IMMOVABLE};
-use drystone::problem::softness::softness;
-use drystone::problem::{
+use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::problem::softness::softness;
+use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
 };
 use glam::{Mat3, Quat, Vec3};

@@ -1,7 +1,8 @@
 //! An engine and how it is set, before it has a scene.
 
-use drystone::report::front::{Contender, Drystone, Setting};
 use drystone::{Result, Scene, SolverConfig};
+use drystone_cli::report::front::{Contender, Drystone, Setting};
+use drystone_cli::settings;
 
 use crate::{box3d::Box3d, rapier::Rapier};
 
@@ -60,9 +61,9 @@ impl Entrant {
         let hertz = self.hertz(scene.dt);
         Ok(match self.engine {
             Engine::Drystone => {
-                let mut config = SolverConfig { substeps: self.substeps, ..SolverConfig::default().without_sleep() };
+                let mut config = SolverConfig::default().without_sleep().with(|c| c.substeps = self.substeps);
                 config.contact_frequency = self.frequency.unwrap_or(config.contact_frequency);
-                self.set.iter().try_for_each(|assignment| config.set(assignment))?;
+                self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
                 Box::new(Drystone::new(scene, "cpu", &config)?)
             }
             Engine::Rapier => Box::new(Rapier::new(scene, self.substeps, hertz, threads)?),

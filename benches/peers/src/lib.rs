@@ -1,5 +1,5 @@
 //! Other engines on drystone's scenes: each takes the same [`World`](drystone::World), steps it by itself and gives poses and
-//! velocities back, so that drystone's own [`race`](drystone::report::front::race) times and scores all of them.
+//! velocities back, so that drystone's own [`race`](drystone_cli::report::front::race) times and scores all of them.
 //!
 //! What is the same for all: shapes, masses and inertias, friction (geometric mean) and restitution (larger), joints,
 //! gravity, forces, the length of a step. Nothing sleeps and nothing is damped. Everything else (speculative margins, reuse of
@@ -14,7 +14,7 @@ pub use entrant::{Engine, Entrant};
 pub use team::team;
 
 use drystone::Result;
-use drystone::maze::{Game, Map};
+use drystone_cli::maze::{Game, Map};
 
 /// The maze game on `map` in Rapier's hands; `frequency` as in [`Entrant`], `unit` the size of things [m], 1 unless told: Rapier's
 /// margins and thresholds go with it.

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
-use drystone::cli::SurveyArgs;
-use drystone::report::front::{Origin, Row, blocks, race, scene};
 use drystone::{Error, Result, Scene};
+use drystone_cli::commands::SurveyArgs;
+use drystone_cli::report::front::{Origin, Row, blocks, race, scene};
 use drystone_peers::{Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
 

@@ -1,9 +1,9 @@
 //! rapier3d, from a drystone world and back.
 
-use drystone::maze;
-use drystone::report::front::{Contender, Setting};
 use drystone::world::{BodyKind, MassProperties as Mass};
 use drystone::{Body, Error, Result, Scene, World};
+use drystone_cli::maze;
+use drystone_cli::report::front::{Contender, Setting};
 use rapier3d::prelude::*;
 
 use crate::entrant::setting;

@@ -1,7 +1,7 @@
 //! Rapier and Box3D as a report has them: at their defaults, and over their substeps and the stiffness of their contacts.
 
-use drystone::report::front::{Contender, Extent, substeps};
 use drystone::{Result, Scene};
+use drystone_cli::report::front::{Contender, Extent, substeps};
 
 use crate::{Engine, Entrant};
 
@@ -22,7 +22,8 @@ pub fn team(scene: &Scene, extent: Extent, threads: usize) -> Result<Vec<Box<dyn
         }
         // More substeps at the stiffness of its defaults.
         entrants.extend([at(8, None), at(16, None)]);
-        let new = |e: &&Entrant| (e.substeps, e.hertz(scene.dt).round()) != (usual.substeps, usual.hertz(scene.dt).round());
+        let new =
+            |e: &&Entrant| (e.substeps, e.hertz(scene.dt).round()) != (usual.substeps, usual.hertz(scene.dt).round());
         let rest = entrants.iter().filter(new);
         for entrant in std::iter::once(&usual).chain(rest) {
             all.push(entrant.build(scene, threads)?);

@@ -5,14 +5,13 @@ mod groups;
 mod joints;
 mod lanes;
 mod parts;
-mod peak;
+pub(crate) mod peak;
 mod reference;
 mod shared;
 mod sweep;
 mod wide;
 
 pub use lanes::Cpu;
-pub use peak::multiply_and_add;
 pub use reference::Reference;
 
 use crate::problem::ConvergenceRow;

@@ -33,6 +33,7 @@ impl fmt::Display for AdapterSummary {
 
 /// Which adapter to open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AdapterChoice {
     /// The one with the most hardware: discrete, integrated, virtual, then software.
     Best,
@@ -103,8 +104,7 @@ fn usable(instance: &wgpu::Instance, backends: wgpu::Backends, wanted: &str) -> 
 ///
 /// # Errors
 /// There is none, or it cannot be opened.
-#[cfg(feature = "view")]
-pub(crate) fn open_for_surface(
+pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
 ) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {

@@ -12,16 +12,15 @@
 
 mod adapter;
 mod buffers;
-mod carry;
+pub(crate) mod carry;
 mod exact;
 mod programs;
 mod read_back;
-pub mod shader;
+pub(crate) mod shader;
 mod timer;
 mod whole;
 
-pub use adapter::{AdapterChoice, AdapterSummary, adapters};
-pub use carry::CarryParams;
+pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_for_surface};
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -44,15 +43,11 @@ use timer::Timer;
 ///
 /// # Errors
 /// No such adapter, or it cannot be opened.
-#[cfg(feature = "view")]
-pub(crate) fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
     let (adapter, summary) = adapter::find(choice)?;
     let (device, queue) = adapter::open(&adapter, false)?;
     Ok((device, queue, summary))
 }
-
-#[cfg(feature = "view")]
-pub(crate) use adapter::open_for_surface;
 
 /// Follows plans on a device through wgpu.
 pub struct Gpu {

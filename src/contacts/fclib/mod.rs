@@ -13,8 +13,6 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
-
 use glam::{DMat3, DVec3};
 
 use super::operator::inverse;
@@ -126,14 +124,6 @@ impl ContactProblem {
         let w = self.contacts.iter().flat_map(|c| c.offset.to_array()).collect();
         let mu = self.contacts.iter().map(|c| c.friction).collect();
         Global { title: &self.name, m, h, f, w, mu }.to_bytes()
-    }
-
-    /// Into an FCLIB file, global form.
-    ///
-    /// # Errors
-    /// As [`ContactProblem::to_fclib`]; the file cannot be written.
-    pub fn write_fclib(&self, path: impl AsRef<Path>) -> Result<()> {
-        crate::files::write(path.as_ref(), &self.to_fclib()?)
     }
 }
 

@@ -9,8 +9,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use drystone::backend::{BackendChoice, choose};
-use drystone::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
-use drystone::{Error, Result, SolverConfig, files};
+use drystone::{Error, Result, SolverConfig};
+use drystone_cli::files;
+use drystone_cli::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
 use drystone_peers::rapier_game;
 use plotters::prelude::*;
 
@@ -54,7 +55,7 @@ const DRYSTONE: usize = 0;
 const RAPIER: usize = 5;
 
 fn drystone(map: Map, substeps: u32) -> Result<Game> {
-    let config = SolverConfig { substeps, ..SolverConfig::default().without_sleep() };
+    let config = SolverConfig::default().without_sleep().with(|c| c.substeps = substeps);
     Game::new(map, config, choose(BackendChoice::Cpu, 1, false)?.0)
 }
 

@@ -1,0 +1,104 @@
+//! `drystone hard`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::words;
+use super::{print, print_json};
+use crate::hard::{Case, Check, Limit, Setup};
+use crate::report::hard_cases;
+use crate::settings;
+use drystone::Result;
+use drystone::backend::Numbers;
+use drystone::preset::Preset;
+
+/// Arguments of `drystone hard`.
+#[derive(Args)]
+pub struct HardArgs {
+    /// Run this case, such as H3; may be given several times.
+    ///
+    /// All are run if none is named; --list names them.
+    #[arg(long, value_name = "NAME")]
+    case: Vec<String>,
+    /// Settings by name.
+    #[arg(long, value_parser = words::preset(), default_value_t)]
+    preset: Preset,
+    /// Any setting; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// What runs the sweeps.
+    #[arg(long, value_parser = words::numbers(), default_value = "cpu")]
+    backend: Numbers,
+    /// Leave out what takes minutes.
+    #[arg(long)]
+    short: bool,
+    /// List the cases and run none.
+    #[arg(long)]
+    list: bool,
+    /// Write the page of all cases into this directory.
+    ///
+    /// Runs every preset on the CPU, and `balanced` on every backend.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json"])]
+    page: Option<PathBuf>,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl HardArgs {
+    /// Runs the cases and prints each as it ends.
+    pub fn run(&self) -> Result<()> {
+        let named: Result<Vec<&Case>> = self.case.iter().map(|name| Case::find(name)).collect();
+        let cases = match named? {
+            named if named.is_empty() => Case::ALL.iter().filter(|c| !(self.short && c.long)).collect(),
+            named => named,
+        };
+        if self.list {
+            return cases.iter().try_for_each(|c| print(format_args!("{:<10}  {}", c.name, c.summary)));
+        }
+        if let Some(directory) = &self.page {
+            let bar = super::Progress::new("case", hard_cases::count(&cases), false);
+            let page = hard_cases::page(&cases, |what| {
+                bar.set_message(what);
+                bar.inc();
+            })?;
+            bar.finish();
+            let path = directory.join("hard-cases.md");
+            crate::files::write(&path, page.as_bytes())?;
+            return print(path.display());
+        }
+        let mut config = self.preset.config().without_sleep();
+        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
+        config.check()?;
+        let setup = Setup { config, open: &|| self.backend.open(false) };
+        let mut all = Vec::new();
+        for case in cases {
+            let checks = case.run(&setup)?;
+            if !self.json {
+                print(format_args!("{}  {}", case.name, case.summary))?;
+                checks.iter().try_for_each(|c| print(line(c)))?;
+            }
+            all.push((case, checks));
+        }
+        let passed = |checks: &[Check]| checks.iter().all(|c| c.passed);
+        if self.json {
+            let case = |(case, checks): &(&Case, Vec<Check>)| serde_json::json!({"case": case.name, "summary": case.summary, "passed": passed(checks), "checks": checks});
+            let cases: Vec<_> = all.iter().map(case).collect();
+            return print_json(
+                &serde_json::json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "cases": cases}),
+            );
+        }
+        print(format_args!("{} of {} cases pass", all.iter().filter(|(_, c)| passed(c)).count(), all.len()))
+    }
+}
+
+/// `pass  what  value  (at most limit)`.
+fn line(check: &Check) -> String {
+    let verdict = if check.passed { "pass" } else { "FAIL" };
+    let limit = match check.limit {
+        Limit::AtMost(limit) => format!("at most {limit}"),
+        Limit::AtLeast(limit) => format!("at least {limit}"),
+    };
+    format!("  {verdict}  {}: {} ({limit})", check.what, hard_cases::number(check.value))
+}

@@ -1,0 +1,131 @@
+//! `drystone scenes` and `drystone adapters`.
+
+use clap::Args;
+use comfy_table::{Table, presets};
+use serde_json::Value;
+
+use super::words;
+use super::{print, print_json};
+use drystone::Result;
+use drystone::backend::gpu::adapters;
+use drystone::config::SolverConfig;
+use drystone::preset::Preset;
+use drystone::scenes::{CATALOGUE, schema};
+
+/// Arguments of `drystone scenes`.
+#[derive(Args)]
+pub struct ScenesArgs {
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Print the JSON Schema of scene files instead.
+    #[arg(long)]
+    schema: bool,
+}
+
+impl ScenesArgs {
+    /// Lists the catalogue.
+    pub fn run(&self) -> Result<()> {
+        if self.schema {
+            return print(serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
+        }
+        if self.json {
+            let parameter = |p: &drystone::scenes::Parameter| serde_json::json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
+            let scene = |e: &drystone::scenes::Entry| {
+                let parameters: Vec<_> = e.parameters.iter().map(parameter).collect();
+                serde_json::json!({"name": e.name, "summary": e.summary, "parameters": parameters})
+            };
+            return print_json(&serde_json::json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
+        }
+        for entry in CATALOGUE {
+            print(format_args!("{}\n    {}", entry.name, entry.summary))?;
+            for p in entry.parameters {
+                print(format_args!("    -p {}={}  {}", p.name, p.default, p.summary))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Arguments of `drystone settings`.
+#[derive(Args)]
+pub struct SettingsArgs {
+    /// Print those of this preset.
+    #[arg(long, value_parser = words::preset(), default_value_t)]
+    preset: Preset,
+}
+
+impl SettingsArgs {
+    /// Lists the settings with their values, as TOML, and what each is.
+    pub fn run(&self) -> Result<()> {
+        let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
+        let schema = schemars::schema_for!(SolverConfig).to_value();
+        let properties = schema["properties"].as_object().expect("a struct has properties");
+        for (name, property) in properties {
+            let value = match &config[name] {
+                // As it was written, without what f64 sees of its rounding.
+                toml::Value::Float(x) => format!("{:?}", *x as f32),
+                value => value.to_string(),
+            };
+            // The first sentence: the others say why.
+            let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+            let sentence = text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first);
+            print(format_args!("# {sentence}.{}\n{name} = {value}\n", words(&schema, property)))?;
+        }
+        Ok(())
+    }
+}
+
+/// The words that a setting takes: ` One of a, b.`, or nothing.
+fn words(schema: &Value, property: &Value) -> String {
+    let named = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name]);
+    let words = named.and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array())).into_iter().flatten();
+    let words: Vec<_> = words.filter_map(|w| w["const"].as_str().or_else(|| w.as_str())).collect();
+    if words.is_empty() { String::new() } else { format!(" One of {}.", words.join(", ")) }
+}
+
+/// Arguments of `drystone adapters`.
+#[derive(Args)]
+pub struct AdaptersArgs {
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl AdaptersArgs {
+    /// Lists the adapters, the one that `gpu` takes first.
+    pub fn run(&self) -> Result<()> {
+        let found = adapters();
+        if self.json {
+            let adapter = |a: &drystone::backend::gpu::AdapterSummary| {
+                serde_json::json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
+                    "hardware": a.hardware, "exact": a.exact, "buffer_limit": a.buffer_limit})
+            };
+            return print_json(&serde_json::json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
+        }
+        if found.is_empty() {
+            return print("none; everything runs on the CPU");
+        }
+        let mut table = Table::new();
+        table.load_preset(presets::NOTHING).set_header([
+            "name",
+            "api",
+            "kind",
+            "driver",
+            "exact mode",
+            "largest buffer",
+        ]);
+        for a in found {
+            let exact = if a.exact { "yes" } else { "no" };
+            table.add_row([
+                a.name,
+                a.api,
+                a.kind.into(),
+                a.driver,
+                exact.into(),
+                format!("{} MiB", a.buffer_limit >> 20),
+            ]);
+        }
+        print(table)
+    }
+}

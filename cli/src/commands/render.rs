@@ -1,0 +1,172 @@
+//! `drystone render`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::words;
+use super::{MACHINE, SceneArgs, SleepArgs, print, progress, replacing, say};
+use crate::files;
+use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
+use drystone::Simulation;
+use drystone::backend::{BackendChoice, choose};
+use drystone::config::SolverConfig;
+use drystone::scenes::{CATALOGUE, Scene};
+use drystone::stages::memory;
+use drystone::{Error, Result};
+
+/// Bytes that a body takes in a frame: pose and color.
+const FRAME: f64 = 32.0;
+
+/// Heading of the options in the help.
+const PICTURES: &str = "Pictures";
+
+/// Arguments of `drystone render`.
+#[derive(Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    scene: Option<SceneArgs>,
+    /// What runs the sweeps.
+    #[arg(long, value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
+    backend: BackendChoice,
+    #[command(flatten)]
+    sleep: SleepArgs,
+    /// FILE.png, FILE.gif, FILE.mp4, or FOLDER/ for numbered PNGs.
+    #[arg(long, help_heading = PICTURES, value_name = "PATH", required_unless_present = "gallery")]
+    out: Option<PathBuf>,
+    /// Pictures, evenly spaced over the run.
+    ///
+    /// 1 shows its end. PNG takes 1, the others 60 unless told.
+    #[arg(long, help_heading = PICTURES, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Width and height in pixels.
+    #[arg(long, help_heading = PICTURES, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
+    size: (u32, u32),
+    /// What bodies are colored by.
+    #[arg(long, help_heading = PICTURES, value_enum, default_value_t)]
+    color: ColorBy,
+    /// Turn of the camera around the scene, in degrees.
+    #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 30.0)]
+    yaw: f32,
+    /// Height of the camera above the horizon, in degrees.
+    #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 25.0)]
+    pitch: f32,
+    /// Draw the motion in a CSV that `drystone run --out` wrote.
+    ///
+    /// It must be of this scene, which is not solved again.
+    #[arg(long, help_heading = PICTURES, value_name = "FILE")]
+    from: Option<PathBuf>,
+    /// Draw every scene of the catalogue into this folder, and a page.
+    #[arg(long, help_heading = PICTURES, value_name = "FOLDER", conflicts_with_all = ["out", "from", "frames", "SceneArgs"])]
+    gallery: Option<PathBuf>,
+}
+
+impl RenderArgs {
+    /// Runs the scene, or reads its motion, and draws it.
+    pub fn run(&self) -> Result<()> {
+        match (&self.gallery, &self.scene, &self.out) {
+            (Some(folder), ..) => self.gallery(folder),
+            (None, Some(scene), Some(out)) => self.film(scene, out),
+            _ => Err(Error::input("render: name a scene and --out, or --gallery FOLDER")),
+        }
+    }
+
+    fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
+        Output::check(out)?;
+        let (scene, mut config) = args.load(1, None)?;
+        self.sleep.apply(&mut config);
+        args.set_threads(self.backend);
+        let png = out.extension().is_some_and(|e| e == "png");
+        let frames = self.frames.unwrap_or(if png { 1 } else { 60 });
+        if png && frames > 1 {
+            return Err(Error::input(format!(
+                "--frames {frames}: a PNG is one picture; write FILE.gif, FILE.mp4 or FOLDER/"
+            )));
+        }
+        // What cannot be drawn or written is refused before the run.
+        let mut canvas = Canvas::new(&scene.world, self.size)?;
+        let seconds = f64::from(scene.steps) * f64::from(scene.dt);
+        let mut output = Output::open(out, self.size, f64::from(frames) / seconds.max(1e-3))?;
+        let film = match &self.from {
+            Some(path) => {
+                let mut film = Film::read(scene, self.color, path)?;
+                film.thin(frames as usize);
+                film
+            }
+            None => self.shoot(scene, config, frames, args.json)?,
+        };
+        film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
+        replacing(out, || output.finish())?;
+        print(out.display())
+    }
+
+    /// Solves the scene and keeps `frames` of its states.
+    fn shoot(&self, scene: Scene, config: SolverConfig, frames: u32, quiet: bool) -> Result<Film> {
+        let (backend, why) = choose(self.backend, scene.world.dynamic_count(), false)?;
+        if !quiet {
+            say(why);
+        }
+        let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();
+        memory::check(FRAME * (scene.world.bodies.len() * kept.len()) as f64, format_args!("{} pictures", kept.len()))?;
+        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let bar = progress(scene.steps, quiet);
+        let (steps, dt) = (scene.steps, scene.dt);
+        let mut film = Film::new(scene, self.color);
+        for step in 0..=steps {
+            if step > 0 {
+                simulation.step(dt)?;
+                bar.inc();
+            }
+            if kept.binary_search(&(step as usize)).is_ok() {
+                film.add(f64::from(step) * f64::from(dt), &mut simulation);
+            }
+        }
+        bar.finish();
+        Ok(film)
+    }
+
+    fn look(&self) -> Look {
+        let (yaw, pitch) = (self.yaw.to_radians(), self.pitch.clamp(-89.0, 89.0).to_radians());
+        Look { yaw, pitch }
+    }
+
+    /// Every scene of the catalogue, a third of the way through its run, and a page.
+    fn gallery(&self, folder: &Path) -> Result<()> {
+        std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
+        let (width, height) = self.size;
+        let mut page = format!(
+            "# Every scene of the catalogue\n\nMade by `drystone render --gallery {} --size {width}x{height}`: each scene a \
+             third of the way through its run.\n",
+            folder.display()
+        );
+        for entry in CATALOGUE {
+            let mut scene = entry.build(&[])?;
+            scene.steps = (scene.steps / 3).max(1);
+            let path = folder.join(format!("{}.png", entry.name));
+            let mut output = Output::open(&path, self.size, 1.0)?;
+            let (name, steps) = (entry.name, scene.steps);
+            let mut canvas = Canvas::new(&scene.world, self.size)?;
+            let mut config = SolverConfig::default();
+            self.sleep.apply(&mut config);
+            let film = self.shoot(scene, config, 1, true)?;
+            film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
+            output.finish()?;
+            let picture = folder.file_name().map(Path::new).unwrap_or(folder).join(format!("{name}.png"));
+            page += &format!(
+                "\n## {name}\n\n{}\n\n`drystone render {name} --steps {steps} --out {name}.png`\n\n![{name}]({})\n",
+                entry.summary,
+                picture.display()
+            );
+        }
+        let page_path = folder.with_extension("md");
+        files::write(&page_path, page.as_bytes())?;
+        print(page_path.display())
+    }
+}
+
+pub(super) fn parse_size(text: &str) -> std::result::Result<(u32, u32), String> {
+    let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    parsed
+        .filter(|&(w, h): &(u32, u32)| (1..=16_384).contains(&w) && (1..=16_384).contains(&h))
+        .ok_or_else(|| "write it as WIDTHxHEIGHT, each 1 to 16384 pixels".into())
+}

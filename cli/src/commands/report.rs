@@ -1,0 +1,133 @@
+//! `drystone report`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{print, progress};
+use crate::files;
+use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone, scene};
+use crate::report::{RUNS, convergence, problems, rules};
+use drystone::backend::gpu::adapters;
+use drystone::{Error, Result};
+
+/// Arguments of `drystone report`.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    survey: SurveyArgs,
+    #[command(subcommand)]
+    page: Option<Page>,
+}
+
+#[derive(Subcommand)]
+enum Page {
+    /// What each rule of the course sheet does.
+    Rules {
+        /// Directory that the page and its pictures are written into.
+        #[arg(long, default_value = "docs")]
+        out: PathBuf,
+    },
+    /// How many sweeps contact problems take to which error.
+    Convergence {
+        /// Directory that the page is written into.
+        #[arg(long, default_value = "docs")]
+        out: PathBuf,
+        /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+        #[arg(long, value_name = "DIR")]
+        problems: Option<PathBuf>,
+    },
+}
+
+/// Speed against error: a page of pictures and tables, and the rows behind it.
+///
+/// Stopped, it goes on where it stopped: scenes whose rows are there already, from the same program and machine, are not run again.
+#[derive(Args)]
+pub struct SurveyArgs {
+    /// Directory for index.html, speed-against-error.svg, scenes.csv and problems.csv.
+    #[arg(long, default_value = "report")]
+    out: PathBuf,
+    /// Fewer scenes and settings: within two minutes.
+    #[arg(long)]
+    quick: bool,
+    /// Only this scene, as tower or tower:n=20,top_ratio=100, or the path of a file; may be given several times.
+    #[arg(long, value_name = "SCENE")]
+    scene: Vec<String>,
+    /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+    #[arg(long, value_name = "DIR")]
+    problems: Option<PathBuf>,
+    /// Threads of each engine.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Draw the rows that are there, and run nothing.
+    #[arg(long, conflicts_with_all = ["quick", "scene", "problems", "threads"])]
+    draw: bool,
+}
+
+impl ReportArgs {
+    /// Makes the page.
+    pub fn run(&self) -> Result<()> {
+        match &self.page {
+            None => self.survey.run(&[]),
+            Some(Page::Rules { out }) => {
+                let bar = super::progress(RUNS as u32, false);
+                let report = rules(|| bar.inc())?;
+                bar.finish();
+                report.write(out)?;
+                print(out.join("rules.md").display())
+            }
+            Some(Page::Convergence { out, problems }) => {
+                let bar = super::progress(0, false);
+                let page = convergence(problems.as_deref(), |problems| {
+                    bar.set_length(problems as u64);
+                    bar.inc();
+                })?;
+                bar.finish();
+                std::fs::create_dir_all(out).map_err(Error::file(out))?;
+                let path = out.join("convergence.md");
+                files::write(&path, page.as_bytes())?;
+                print(path.display())
+            }
+        }
+    }
+}
+
+impl SurveyArgs {
+    /// Threads that each engine should have.
+    pub fn threads(&self) -> usize {
+        self.threads.into()
+    }
+
+    /// Runs drystone and whoever else takes part, and makes the page.
+    ///
+    /// # Errors
+    /// A scene that there is not, a directory that cannot be written, or an engine that gives up.
+    pub fn run(&self, others: &[&Team]) -> Result<()> {
+        let report = if self.draw { Report::read(&self.out)? } else { self.race(others)? };
+        print(report.write(&self.out)?.display())
+    }
+
+    fn race(&self, others: &[&Team]) -> Result<Report> {
+        // Fails only if it was set before, which nothing does. This thread is one of them.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
+        let extent = if self.quick { Extent::Quick } else { Extent::Full };
+        let scenes = match self.scene.is_empty() {
+            true => course(extent)?,
+            false => self.scene.iter().map(|word| scene(word)).collect::<Result<_>>()?,
+        };
+        let some = self.scene.is_empty() || self.problems.is_some();
+        let problems = if some { problems(self.problems.as_deref())? } else { Vec::new() };
+        let own: &Team = &drystone;
+        let teams = std::iter::once(own).chain(others.iter().copied()).collect();
+        let adapter = adapters().into_iter().next().map(|a| a.to_string());
+        let bar = progress::Progress::new(progress::PERCENT, 1, false);
+        let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
+        let report = survey.run(&Origin::here(adapter), &mut |&Progress { what, done, total }| {
+            bar.set_message(what);
+            bar.set(done, total);
+        })?;
+        bar.finish();
+        Ok(report)
+    }
+}

@@ -1,0 +1,150 @@
+//! `drystone run`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+
+use super::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs};
+use super::{print, print_json, progress, replacing, say, step_with_contacts};
+use crate::files;
+use crate::report::{RunReport, Trajectory};
+use drystone::Simulation;
+use drystone::backend::choose;
+use drystone::scenes::Scene;
+use drystone::{Error, Result};
+
+/// Arguments of `drystone run`.
+#[derive(Args)]
+pub struct RunArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
+    /// Take the time of each kernel by the clock of the GPU.
+    ///
+    /// A software adapter is slower with it.
+    #[arg(long, help_heading = MACHINE)]
+    kernel_times: bool,
+    #[command(flatten)]
+    sleep: SleepArgs,
+    /// So many worlds of the scene, as one problem.
+    ///
+    /// They stand beside each other: their bodies never meet.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = SCENE)]
+    worlds: u32,
+    /// Let each world have one more of this parameter, such as seed.
+    ///
+    /// One more than the world before; without it all are the same.
+    #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
+    vary: Option<String>,
+    /// Write the motion of the bodies that can move, as CSV.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    out: Option<PathBuf>,
+    /// Write every K-th step.
+    #[arg(long, help_heading = OUTPUT, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Write what a step asks as a contact problem, for `drystone solve`.
+    ///
+    /// What it asks of the velocities; step 1 is the first.
+    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT)]
+    save_problem: Option<SaveProblem>,
+}
+
+/// Which step to save as a contact problem, and where.
+#[derive(Clone, Debug)]
+struct SaveProblem {
+    step: u32,
+    file: PathBuf,
+}
+
+impl FromStr for SaveProblem {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+        let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
+        let step = step.parse().map_err(|_| "STEP must be a whole number")?;
+        if file.is_empty() { Err("FILE is missing") } else { Ok(Self { step, file: file.into() }) }
+    }
+}
+
+impl SaveProblem {
+    /// Refuses what could not be saved, before anything runs.
+    fn check(&self, scene: &Scene) -> Result<()> {
+        let (step, file, steps) = (self.step, self.file.display(), scene.steps);
+        if !(1..=steps).contains(&step) {
+            return Err(Error::input(format!("--save-problem {step}:{file}: the run has steps 1 to {steps}")));
+        }
+        if !scene.world.joints.is_empty() {
+            let (name, joints) = (&scene.name, scene.world.joints.len());
+            return Err(Error::input(format!(
+                "--save-problem {step}:{file}: {name} has {joints} joints, which a contact problem has not"
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl RunArgs {
+    /// Runs the scene and prints the report.
+    pub fn run(&self) -> Result<()> {
+        let (scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
+        self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
+        self.sleep.apply(&mut config);
+        self.scene.set_threads(self.backend.choice);
+        let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
+        let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
+        say(why);
+        let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
+        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let mut report = RunReport::new(&scene, &simulation);
+        report.copy_bandwidth = copy_bandwidth;
+        let bar = progress(scene.steps, self.scene.json);
+        for step in 0..=scene.steps {
+            if step > 0 {
+                let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
+                    Some(save) => {
+                        let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
+                        replacing(&save.file, || files::write(&save.file, problem.to_text().as_bytes()))?;
+                        stats
+                    }
+                    None => simulation.step(scene.dt)?,
+                };
+                report.add(&stats);
+                bar.inc();
+            }
+            if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {
+                trajectory.write(step, scene.dt, &simulation.world)?;
+            }
+        }
+        bar.finish();
+        if let (Some(trajectory), Some(path)) = (trajectory, &self.out) {
+            replacing(path, || trajectory.finish())?;
+        }
+        report.measure(&scene, &mut simulation);
+        if self.scene.json {
+            print_json(&report)?;
+        } else {
+            print_table(&report)?;
+        }
+        match &report.first_non_finite {
+            Some(body) => {
+                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn print_table(report: &RunReport) -> Result<()> {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    for (what, value) in report.rows() {
+        table.add_row([what, value]);
+    }
+    if let Some(column) = table.column_mut(0) {
+        column.set_cell_alignment(CellAlignment::Left);
+    }
+    print(table)
+}

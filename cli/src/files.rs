@@ -1,0 +1,182 @@
+//! Files that are there whole or not at all.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use drystone::{Error, Result};
+
+/// Hidden places of all drafts that there are.
+static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A file or folder that is written under a hidden name beside its own. It gets its own when it is kept; else it goes away.
+pub struct Draft {
+    /// As the caller named it.
+    path: PathBuf,
+    /// Where it goes: what a link points to.
+    target: PathBuf,
+    /// Where it is until then; none if the target is no file, such as /dev/null or a pipe, and is written at once.
+    hidden: Option<PathBuf>,
+}
+
+impl Draft {
+    /// Nothing is made yet.
+    ///
+    /// # Errors
+    /// No file can have that name.
+    pub fn of(path: &Path) -> Result<Self> {
+        let there = std::fs::metadata(path);
+        if there.as_ref().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            return Ok(Self { path: path.into(), target: path.into(), hidden: None });
+        }
+        let target = if there.is_ok() { path.canonicalize().map_err(Error::file(path))? } else { path.into() };
+        let nameless = || Error::file(path)(ErrorKind::InvalidFilename.into());
+        let name = target.file_name().ok_or_else(nameless)?.to_string_lossy().into_owned();
+        let hidden = target.with_file_name(format!(".{}.{name}", std::process::id()));
+        drafts().push(hidden.clone());
+        Ok(Self { path: path.into(), target, hidden: Some(hidden) })
+    }
+
+    /// Where to write.
+    pub fn place(&self) -> &Path {
+        self.hidden.as_deref().unwrap_or(&self.target)
+    }
+
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// It cannot be written, or a folder has its name.
+    pub fn create(&self) -> Result<File> {
+        let made = if self.target.is_dir() { Err(ErrorKind::IsADirectory.into()) } else { File::create(self.place()) };
+        made.map_err(Error::file(&self.path))
+    }
+
+    /// Gives it its name: what had that name is gone.
+    ///
+    /// # Errors
+    /// It cannot be renamed; what had that name is still there.
+    pub fn keep(mut self) -> Result<()> {
+        let Some(hidden) = &self.hidden else { return Ok(()) };
+        std::fs::rename(hidden, &self.target).map_err(Error::file(&self.path))?;
+        self.forget();
+        Ok(())
+    }
+
+    fn forget(&mut self) {
+        if let Some(hidden) = self.hidden.take() {
+            drafts().retain(|draft| *draft != hidden);
+        }
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if let Some(hidden) = &self.hidden {
+            discard(hidden);
+        }
+        self.forget();
+    }
+}
+
+/// Removes all drafts, right before the process ends.
+pub fn discard_drafts() {
+    drafts().drain(..).for_each(|draft| discard(&draft));
+}
+
+fn drafts() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
+    DRAFTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn discard(draft: &Path) {
+    // It may not even be there.
+    let _ = if draft.is_dir() { std::fs::remove_dir_all(draft) } else { std::fs::remove_file(draft) };
+}
+
+/// A file that is written piece by piece and is there when it is finished.
+pub struct Writer {
+    file: File,
+    draft: Draft,
+}
+
+impl Writer {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// As [`Draft::create`].
+    pub fn create(path: &Path) -> Result<Self> {
+        let draft = Draft::of(path)?;
+        Ok(Self { file: draft.create()?, draft })
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// As [`Draft::keep`].
+    pub fn finish(self) -> Result<()> {
+        self.draft.keep()
+    }
+}
+
+impl Write for Writer {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Writes a file: a reader finds all of it, or what was there before.
+///
+/// # Errors
+/// It cannot be written; what was there before is still there.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut writer = Writer::create(path)?;
+    writer.write_all(bytes).map_err(Error::file(path))?;
+    writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let all = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        let mut all: Vec<_> = all.collect();
+        all.sort();
+        all
+    }
+
+    #[test]
+    fn a_file_that_is_not_finished_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        write(&path, b"old").unwrap();
+        let mut writer = Writer::create(&path).unwrap();
+        writer.write_all(b"half of a r").unwrap();
+        assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (2, b"old".to_vec()));
+        drop(writer);
+        assert_eq!(names(folder.path()), ["a.csv"]);
+        write(&path, b"new").unwrap();
+        assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (1, b"new".to_vec()));
+        let message = write(folder.path(), b"x").unwrap_err().to_string();
+        assert!(message.contains("directory"), "{message}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_stay_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link] = ["file", "link"].map(|name| folder.path().join(name));
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert_eq!((std::fs::read(&file).unwrap(), link.is_symlink()), (b"new".to_vec(), true));
+        let null = Draft::of(Path::new("/dev/null")).unwrap();
+        assert_eq!(null.place(), Path::new("/dev/null"));
+        drop(null);
+        assert!(Path::new("/dev/null").exists());
+    }
+}

@@ -1,0 +1,193 @@
+//! What stands, or should.
+
+use super::{Check, DT, Setup};
+use drystone::{Result, SolvedManifold};
+use drystone::config::Method;
+use drystone::load::Load;
+use drystone::residuals::Measure;
+use drystone::scenes::Scene;
+use drystone::solver::{Order, Solver};
+use drystone::stats::largest;
+use drystone::world::{Body, Shape, World};
+
+/// Sweeps over a saved step, a power of two.
+const SWEEPS: u32 = 4096;
+/// Ten seconds.
+const TEN: u32 = 600;
+
+pub(super) fn light_under_heavy(setup: &Setup) -> Result<Vec<Check>> {
+    let mut checks = Vec::new();
+    for ratio in [10.0, 100.0, 1e3, 1e4, 1e5, 1e6_f64] {
+        let parameters = ["n=2".to_owned(), format!("top_ratio={ratio}")];
+        let world = Scene::find("tower", &parameters)?.world;
+        let law =
+            Load::heaviest(&world, &setup.config).expect("a load").overlap(setup.config.substeps, DT, &setup.config);
+        let outcome = setup.outcome(world, TEN)?;
+        checks.push(outcome.stands(format!("1 under {ratio}")));
+        checks.push(Check::at_most(
+            format!("1 under {ratio}: overlap at rest over the static law"),
+            outcome.at_rest / law,
+            1.2,
+        ));
+        if ratio == 1e3 {
+            checks.push(Check::at_most("1 under 1000: overlap at rest [mm]", 1e3 * outcome.at_rest, 5.0));
+        }
+    }
+    Ok(checks)
+}
+
+pub(super) fn towers(setup: &Setup) -> Result<Vec<Check>> {
+    let mut checks = Vec::new();
+    for n in [20, 40] {
+        let outcome = setup.run("tower", &[&format!("n={n}"), "offset=0.01"], TEN)?;
+        checks.push(outcome.stands(format!("{n} cubes")));
+        checks.push(Check::at_most(format!("{n} cubes: drift [m]"), outcome.drift, 0.1));
+        checks.push(Check::at_most(format!("{n} cubes: rms speed at the end [m/s]"), outcome.rms, 0.05));
+    }
+    Ok(checks)
+}
+
+pub(super) fn heavy_tops(setup: &Setup) -> Result<Vec<Check>> {
+    let mut checks = Vec::new();
+    for (n, top) in [(20, 100), (10, 1000), (20, 1000)] {
+        let parameters = [&format!("n={n}"), &format!("top_ratio={top}"), "offset=0.01"];
+        checks.push(
+            setup.run("tower", &parameters.map(|p| p as &str), TEN)?.stands(format!("{n} cubes, top {top} times")),
+        );
+    }
+    let alternating = setup.run("mass-ratio", &["n=10", "ratio=1000"], TEN)?;
+    checks.push(alternating.stands("10 cubes, 1 and 1000 in turn"));
+    checks.push(Check::at_most("10 cubes, 1 and 1000 in turn: rms speed at the end [m/s]", alternating.rms, 0.05));
+    Ok(checks)
+}
+
+pub(super) fn redundancy(setup: &Setup) -> Result<Vec<Check>> {
+    let mut checks = Vec::new();
+    for side in [1, 2, 4] {
+        let mut simulation = setup.simulation(cube_on_pads(side))?;
+        for _ in 0..300 {
+            simulation.step(DT)?;
+        }
+        let (points, asymmetry) = asymmetry(simulation.manifolds(), side);
+        checks.push(Check::at_most(format!("{points} points: asymmetry of the forces"), asymmetry, 0.05));
+    }
+    let planks = Scene::find("kapla", &["storeys=9".into()])?.world;
+    for (what, world) in
+        [("64 points".to_owned(), cube_on_pads(4)), (format!("{} planks", planks.dynamic_count()), planks)]
+    {
+        let (growth, left) = convergence(setup, world)?;
+        checks.push(Check::at_most(format!("{what}: largest growth of e_vel as sweeps double"), growth, 1.0));
+        checks.push(Check::at_most(format!("{what}: e_vel after {SWEEPS} sweeps"), left, 1e-3));
+    }
+    Ok(checks)
+}
+
+/// A cube of 2 m on `side` x `side` fixed pads of 0.2 m.
+fn cube_on_pads(side: usize) -> World {
+    let mut world = World::new();
+    let step = 1.8 / side.max(2) as f32;
+    for i in 0..side * side {
+        let at = |k: usize| (k as f32 - (side as f32 - 1.0) / 2.0) * step;
+        world.add(Body::fixed().shape(Shape::cuboid(0.1, 0.1, 0.1)).position(at(i % side), -0.1, at(i / side)));
+    }
+    world.add(Body::dynamic().shape(Shape::cuboid(1.0, 1.0, 1.0)).position(0.0, 1.0, 0.0));
+    world
+}
+
+/// Contact points, and by what share the force on a pad is off the mean of the pads that are its mirror images.
+fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usize) -> (usize, f64) {
+    let force = |m: &SolvedManifold| m.points().iter().map(|p| f64::from(p.normal_impulse)).sum::<f64>();
+    let points = manifolds.clone().map(|m| m.points().len()).sum();
+    // Pads are the first bodies, in rows.
+    let mut forces = vec![f64::NAN; side * side];
+    manifolds.for_each(|m| forces[m.body_a.min(m.body_b)] = force(&m));
+    let image = |i: usize| {
+        let fold = |k: usize| k.min(side - 1 - k);
+        let (x, z) = (fold(i % side), fold(i / side));
+        (x.min(z), x.max(z))
+    };
+    let worst = (0..side * side).map(|i| {
+        let images: Vec<f64> = (0..side * side).filter(|&j| image(j) == image(i)).map(|j| forces[j]).collect();
+        let mean = images.iter().sum::<f64>() / images.len() as f64;
+        (forces[i] / mean - 1.0).abs()
+    });
+    (points, largest(0.0, worst))
+}
+
+/// By how much e_vel grows most as plain sweeps in f64 double, over the first step of a world, and what is left of it.
+fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
+    let problem = setup.simulation(world)?.step_with_contacts("first step", DT)?.0;
+    let mut solver = Solver::new(&problem, Method::Plain, Order::Manifolds, None)?;
+    let measure = Measure::new(&problem);
+    let mut error = |sweeps: u32| -> Result<f64> {
+        solver.advance(sweeps)?;
+        Ok(measure.of(&solver.impulses(), &solver.velocities()).e_vel)
+    };
+    let (mut growth, mut before) = (0.0_f64, error(1)?);
+    for power in 0..SWEEPS.ilog2() {
+        let e = error(1 << power)?;
+        // Below that it is rounding.
+        growth = largest(growth, [if e < 1e-12 { 0.0 } else { e / before }]);
+        before = e;
+    }
+    Ok((growth, before))
+}
+
+pub(super) fn cards(setup: &Setup) -> Result<Vec<Check>> {
+    let outcome = setup.run("card-house", &["storeys=5", "length=0.4", "thickness=0.002"], TEN)?;
+    Ok(vec![outcome.stands("34 cards"), Check::at_most("34 cards: deepest overlap [mm]", 1e3 * outcome.deepest, 1.0)])
+}
+
+pub(super) fn kapla(setup: &Setup) -> Result<Vec<Check>> {
+    let outcome = setup.run("kapla", &[], 3600)?;
+    Ok(vec![outcome.stands("105 planks"), Check::at_most("105 planks: drift [m]", outcome.drift, 0.1)])
+}
+
+pub(super) fn arches(setup: &Setup) -> Result<Vec<Check>> {
+    let thick = setup.run("arch", &["voussoirs=31", "thickness=0.12"], TEN)?;
+    let thin = setup.run("arch", &["voussoirs=31", "thickness=0.095"], TEN)?;
+    let fallen = Check::at_least("0.095 of the radius: stones out of place", thin.fallen, 1.0);
+    Ok(vec![thick.stands("0.12 of the radius"), fallen])
+}
+
+pub(super) fn aqueduct(setup: &Setup) -> Result<Vec<Check>> {
+    let outcome = setup.run("aqueduct", &["arches=8"], TEN)?;
+    Ok(vec![outcome.stands("stones"), Check::at_most("stones: rms speed at the end [m/s]", outcome.rms, 1e-3)])
+}
+
+pub(super) fn large_pyramid(setup: &Setup) -> Result<Vec<Check>> {
+    let outcome = setup.run("pyramid", &["base=100"], 10_000)?;
+    Ok(vec![
+        outcome.stands("boxes"),
+        Check::at_most("boxes: drift [m]", outcome.drift, 0.1),
+        Check::at_most("boxes: rms speed at the end [m/s]", outcome.rms, 0.05),
+        Check::at_most("boxes: overlap at the end [mm]", 1e3 * outcome.at_rest, 5.0),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_that_lean_to_one_side_are_seen() {
+        let mut world = cube_on_pads(2);
+        let lopsided = world.bodies[4].clone().position(0.2, 1.0, 0.0);
+        let measure = |world: World| {
+            let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn drystone::Backend>);
+            // With 8 substeps the order of the pads in a sweep shows: 0.07.
+            let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
+            let setup = Setup { config, open: &open };
+            let mut simulation = setup.simulation(world).expect("a simulation");
+            for _ in 0..60 {
+                simulation.step(DT).expect("a step");
+            }
+            asymmetry(simulation.manifolds(), 2)
+        };
+        let (points, even) = measure(world.clone());
+        assert!(points == 16 && even < 0.05, "{points} points, {even}");
+        world.bodies[4] = lopsided;
+        assert!(measure(world).1 > 0.1);
+        assert!(asymmetry([].into_iter(), 1).1.is_nan());
+    }
+}

@@ -1,0 +1,13 @@
+//! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and a game.
+
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod commands;
+pub mod files;
+pub mod hard;
+pub mod maze;
+pub mod report;
+pub mod settings;
+#[cfg(feature = "view")]
+pub mod view;

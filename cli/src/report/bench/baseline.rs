@@ -1,0 +1,118 @@
+//! A bench beside an earlier one.
+
+use super::{Bench, BenchRow};
+use drystone::{Error, Result};
+
+/// What became of one row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// The earlier bench has no such row.
+    New,
+    /// The scene of that name is another one now, so that its times say nothing.
+    OtherScene,
+    /// Ratio of the times, now to then; within the spread of the two.
+    Same(f64),
+    /// Slower than then: the lower quartile is above what was the upper one.
+    Slower(f64),
+    /// Faster than then: the upper quartile is below what was the lower one.
+    Faster(f64),
+}
+
+impl Bench {
+    /// Reads what `drystone bench --json` printed.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds something else.
+    pub fn read(path: &std::path::Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
+        serde_json::from_str(&text).map_err(|e| {
+            let e = e.to_string().replace(char::is_control, " ");
+            Error::input(format!("{}: not what `drystone bench --json` prints: {e}", path.display()))
+        })
+    }
+}
+
+/// What became of each row of `now` since `then`.
+pub fn compare_with(now: &Bench, then: &Bench) -> Vec<Change> {
+    let change = |row: &BenchRow| {
+        let Some(old) = then.rows.iter().find(|old| old.key() == row.key()) else { return Change::New };
+        let ratio = row.ms / old.ms;
+        match () {
+            () if old.hash != row.hash => Change::OtherScene,
+            () if row.ms_low > old.ms_high => Change::Slower(ratio),
+            () if row.ms_high < old.ms_low => Change::Faster(ratio),
+            () => Change::Same(ratio),
+        }
+    };
+    now.rows.iter().map(change).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::bench::bench;
+    use drystone::backend::Backend;
+    use drystone::config::SolverConfig;
+
+    fn measured() -> Bench {
+        let open = || Ok(vec![Box::new(drystone::Cpu::new()) as Box<dyn Backend>]);
+        let specs = ["tower:n=3".to_owned(), "pile:n=8,worlds=2".to_owned()];
+        bench(&specs, &SolverConfig::default().without_sleep(), &[1], &open, 3, &mut || ()).expect("a bench")
+    }
+
+    #[test]
+    fn a_bench_against_a_faster_one_is_marked_and_against_itself_is_not() {
+        let now = measured();
+        assert!(compare_with(&now, &now).iter().all(|c| *c == Change::Same(1.0)));
+        let times = |factor: f64| {
+            let mut then = now.clone();
+            then.rows
+                .iter_mut()
+                .for_each(|r| [&mut r.ms, &mut r.ms_low, &mut r.ms_high].into_iter().for_each(|t| *t *= factor));
+            compare_with(&now, &then)
+        };
+        assert!(times(0.01).iter().all(|c| matches!(c, Change::Slower(r) if (r - 100.0).abs() < 1e-6)));
+        assert!(times(100.0).iter().all(|c| matches!(c, Change::Faster(_))));
+    }
+
+    #[test]
+    fn rows_of_other_scenes_and_new_rows_have_no_ratio() {
+        let now = measured();
+        let mut then = now.clone();
+        then.rows[0].hash = "0".repeat(16);
+        then.rows[1].threads = 7;
+        assert_eq!(compare_with(&now, &then), [Change::OtherScene, Change::New]);
+    }
+
+    #[test]
+    fn a_row_says_what_was_measured_and_what_is_wrong_with_it() {
+        let bench = measured();
+        let [tower, piles] = &bench.rows[..] else { panic!("two rows") };
+        assert_eq!((tower.bodies, tower.worlds, piles.bodies, piles.worlds), (3, 1, 16, 2));
+        assert!(tower.manifolds == 3 && tower.points == 12 && piles.manifolds > 8);
+        for row in &bench.rows {
+            let stages = row.detect + row.color + row.prepare + row.run + row.store;
+            assert!(row.ms > 0.0 && row.ms_low <= row.ms && row.ms <= row.ms_high && stages < 2.0 * row.ms, "{row:?}");
+            assert!(row.penetration_max < 1e-3 && row.residual.is_some_and(|r| r > 0.0 && r < 0.5), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_time_within_the_spread_of_both_is_neither_slower_nor_faster() {
+        let then = measured();
+        let times = |ms: f64, low: f64, high: f64| {
+            let mut bench = then.clone();
+            bench.rows.iter_mut().for_each(|r| (r.ms, r.ms_low, r.ms_high) = (ms, low, high));
+            bench
+        };
+        let then = times(1.0, 0.8, 1.2);
+        for (now, expected) in [
+            (times(1.5, 1.1, 1.9), Change::Same(1.5)),
+            (times(1.5, 1.3, 1.9), Change::Slower(1.5)),
+            (times(0.5, 0.2, 0.9), Change::Same(0.5)),
+            (times(0.5, 0.2, 0.7), Change::Faster(0.5)),
+        ] {
+            assert!(compare_with(&now, &then).iter().all(|change| *change == expected), "{expected:?}");
+        }
+    }
+}

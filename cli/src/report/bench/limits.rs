@@ -1,0 +1,262 @@
+//! How far the sweeps are from what the machine can do: its memory and its arithmetic, measured in the same turns.
+
+use std::hint::black_box;
+use std::ops::{Add, Mul, Neg, Sub};
+use std::sync::Barrier;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use serde::Serialize;
+
+use drystone::backend::Backend;
+use drystone::backend::cpu::Cpu;
+use drystone::config::{FrictionRule, SolverConfig};
+use drystone::stages::backend::multiply_and_add;
+use drystone::stages::kernels::contact::solve_contact;
+use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
+use drystone::stages::math::Lane;
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
+use drystone::{Error, Result};
+
+use super::settled;
+
+/// Bytes that a sweep of the lanes streams a point of a manifold of four: a row of the point, its impulses there and back, and a
+/// quarter of the header. Bodies, which stay in a cache while a pile is small, are not in it.
+pub const BYTES: f64 = 48.0 + 2.0 * 16.0 + (40.0 + 8.0) / 4.0;
+
+/// What so many threads reach; the best of all turns, since whatever disturbs can only slow down.
+#[derive(Clone, Debug, Serialize)]
+pub struct LimitRow {
+    /// Threads.
+    pub threads: usize,
+    /// Manifolds of the pile.
+    pub manifolds: usize,
+    /// Its contact points.
+    pub points: usize,
+    /// Contact points swept a second, all threads together.
+    pub sweeps: f64,
+    /// Operations on single numbers of a point and sweep, counted.
+    pub operations: f64,
+    /// The same a second of multiplications and additions on registers alone.
+    pub peak: f64,
+    /// Bytes a second of a = b + s c, by the size of the three arrays together (bytes).
+    pub triads: Vec<(usize, f64)>,
+}
+
+impl LimitRow {
+    /// Share of the arithmetic peak that the sweeps take.
+    pub fn of_peak(&self) -> f64 {
+        self.sweeps * self.operations / self.peak
+    }
+
+    /// Share of a triad that their stream takes.
+    pub fn of_triad(&self, rate: f64) -> f64 {
+        self.sweeps * BYTES / rate
+    }
+}
+
+/// Sizes of the triads (bytes): within a core's cache, within a shared one, and beyond.
+const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
+
+/// Measures a settled pile of `boxes` with each number of `threads`, over so many `turns`.
+///
+/// # Errors
+/// The pile is none, a pool cannot be made.
+pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
+    let config = SolverConfig::default().without_sleep();
+    let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;
+    let problem = simulation.next_problem(dt)?.0;
+    let pools: Result<Vec<_>> = threads
+        .iter()
+        .map(|&t| rayon::ThreadPoolBuilder::new().num_threads(t).build().map_err(|e| Error::input(format!("{t}: {e}"))))
+        .collect();
+    let pools = pools?;
+    let row = |&threads: &usize| LimitRow {
+        threads,
+        manifolds: problem.swept_contacts().count(),
+        points: problem.swept_contacts().map(|contact| contact.point_count as usize).sum(),
+        sweeps: 0.0,
+        operations: operations(),
+        peak: 0.0,
+        triads: SIZES.map(|size| (size, 0.0)).to_vec(),
+    };
+    let mut rows: Vec<_> = threads.iter().map(row).collect();
+    let mut best = vec![[f64::INFINITY; 2]; rows.len()];
+    for _ in 0..turns {
+        for ((row, pool), best) in rows.iter_mut().zip(&pools).zip(&mut best) {
+            let mut cpu = Cpu::new();
+            for (best, sweeps) in best.iter_mut().zip([FEW, MANY]) {
+                *best = best.min(pool.install(|| seconds(&mut cpu, &problem, sweeps))?);
+            }
+            row.peak = row.peak.max(peak(pool));
+            for (size, rate) in &mut row.triads {
+                *rate = rate.max(triad(pool, *size / row.threads));
+            }
+            after_turn();
+        }
+    }
+    for (row, [few, many]) in rows.iter_mut().zip(best) {
+        row.sweeps = f64::from(MANY - FEW) * row.points as f64 / (many - few);
+    }
+    Ok(rows)
+}
+
+/// Sweeps whose times are subtracted, so that all that is done once a step drops out.
+const FEW: u32 = 4;
+const MANY: u32 = 24;
+
+/// Time of so many sweeps (s).
+fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
+    let config = SolverConfig::default().without_sleep().with(|c| {
+        c.substeps = 1;
+        c.iterations = sweeps;
+        c.relax = 0;
+    });
+    let plan = StepPlan::new(&config, problem);
+    let mut problem = problem.clone();
+    let begin = Instant::now();
+    cpu.run(&mut problem, &plan.passes)?;
+    Ok(begin.elapsed().as_secs_f64())
+}
+
+/// Operations a second of all threads together.
+fn peak(pool: &rayon::ThreadPool) -> f64 {
+    let begin = Instant::now();
+    let done: u64 = pool.broadcast(|_| multiply_and_add(1_000_000)).into_iter().sum();
+    done as f64 / begin.elapsed().as_secs_f64()
+}
+
+/// Bytes a second of all threads together, each on arrays of its own of `size` bytes in all, from the first that begins to the
+/// last that ends.
+fn triad(pool: &rayon::ThreadPool, size: usize) -> f64 {
+    let length = size / 12;
+    let rounds = (64 << 20) / size + 2;
+    let all_ready = Barrier::new(pool.current_num_threads());
+    let times = pool.broadcast(|_| {
+        let (mut a, b, c) = (vec![0.0_f32; length], vec![1.0_f32; length], vec![2.0_f32; length]);
+        all_ready.wait();
+        let begin = Instant::now();
+        for _ in 0..rounds {
+            let (b, c) = (black_box(&b), black_box(&c));
+            for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                *a = b + 3.0 * c;
+            }
+            black_box(&mut a);
+        }
+        (begin, Instant::now())
+    });
+    let (begin, end) = (times.iter().map(|t| t.0).min(), times.iter().map(|t| t.1).max());
+    let seconds = begin.zip(end).map_or(f64::NAN, |(begin, end)| (end - begin).as_secs_f64());
+    (times.len() * rounds * 12 * length) as f64 / seconds
+}
+
+/// Operations of one sweep of a contact of four points with friction, a point: counted by running the kernel.
+fn operations() -> f64 {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    struct Counted(f32);
+
+    fn counted(x: f32) -> Counted {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        Counted(x)
+    }
+
+    impl Add for Counted {
+        type Output = Self;
+        fn add(self, o: Self) -> Self {
+            counted(self.0 + o.0)
+        }
+    }
+
+    impl Sub for Counted {
+        type Output = Self;
+        fn sub(self, o: Self) -> Self {
+            counted(self.0 - o.0)
+        }
+    }
+
+    impl Mul for Counted {
+        type Output = Self;
+        fn mul(self, o: Self) -> Self {
+            counted(self.0 * o.0)
+        }
+    }
+
+    impl Neg for Counted {
+        type Output = Self;
+        fn neg(self) -> Self {
+            counted(-self.0)
+        }
+    }
+
+    impl Lane for Counted {
+        type Mask = bool;
+        fn constant(x: f64) -> Self {
+            Self(x as f32)
+        }
+        fn gt(self, o: Self) -> bool {
+            counted(self.0).0 > o.0
+        }
+        fn and(a: bool, b: bool) -> bool {
+            a && b
+        }
+        fn mask(value: bool) -> bool {
+            value
+        }
+        fn select(if_false: Self, if_true: Self, mask: bool) -> Self {
+            counted(if mask { if_true.0 } else { if_false.0 })
+        }
+        fn inverse_sqrt(self) -> Self {
+            counted(self.0.inverse_sqrt())
+        }
+        fn inverse_power(self) -> Self {
+            counted(self.0.inverse_power())
+        }
+    }
+
+    let rules = Rules { biased: true, friction: FrictionRule::Disc, accumulated: true, ..Rules::default() };
+    let (points, mut impulses) = ([Point::<Counted>::default(); 4], [Impulse::default(); 4]);
+    let before = COUNT.load(Ordering::Relaxed);
+    let mut pair = Pair::default();
+    solve_contact(rules, &Default::default(), &mut pair, &Default::default(), &points, &mut impulses);
+    (COUNT.load(Ordering::Relaxed) - before) as f64 / 4.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sweep_of_a_point_takes_some_hundreds_of_operations() {
+        assert!((150.0..500.0).contains(&operations()), "{}", operations());
+    }
+
+    // How much of the peak is reached says nothing on a machine that has other things to do.
+    #[test]
+    fn every_limit_is_measured_for_every_number_of_threads() {
+        let rows = limits(200, &[1, 2], 3, &mut || ()).expect("a measurement");
+        assert_eq!(rows.iter().map(|r| r.threads).collect::<Vec<_>>(), [1, 2]);
+        for row in rows {
+            assert!(row.points > 500 && row.sweeps > 0.0 && row.peak > 0.0, "{row:?}");
+            assert_eq!(row.of_peak(), row.sweeps * row.operations / row.peak);
+            assert!(row.triads.iter().all(|t| t.1 > 0.0), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn shares_are_of_what_the_machine_can_do() {
+        let row = LimitRow {
+            threads: 2,
+            manifolds: 1,
+            points: 4,
+            sweeps: 1e6,
+            operations: 300.0,
+            peak: 1.2e9,
+            triads: vec![],
+        };
+        assert_eq!(row.of_peak(), 0.25);
+        assert_eq!(row.of_triad(4e6 * BYTES), 0.25);
+    }
+}

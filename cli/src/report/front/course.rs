@@ -1,0 +1,118 @@
+//! The scenes of the report, and the settings with which drystone runs them.
+
+use super::contender::{Contender, Drystone, Extent};
+use crate::settings;
+use drystone::Result;
+use drystone::backend::gpu::adapters;
+use drystone::config::SolverConfig;
+use drystone::scenes::Scene;
+
+/// Scenes of the whole report.
+const FULL: [&str; 9] = [
+    "tower:n=20",
+    "tower:n=10,top_ratio=1000",
+    "mass-ratio",
+    "chain",
+    "wall",
+    "pile:n=512,ratio=100",
+    "pile:n=1000",
+    "pyramid:base=100",
+    "pile:n=5000",
+];
+
+/// Those of them that two minutes are enough for.
+const QUICK: [&str; 5] = ["tower:n=20", "tower:n=10,top_ratio=1000", "mass-ratio", "chain", "wall:rows=10,columns=10"];
+
+/// Bodies from which on a scene is large: run for fewer steps, with fewer settings, and not on an adapter that is software.
+const LARGE: usize = 2000;
+
+/// Steps of a large scene: the pile is at rest after half of them.
+const LARGE_STEPS: u32 = 300;
+
+/// The scenes of the report.
+///
+/// # Errors
+/// Never: the catalogue has them.
+pub fn course(extent: Extent) -> Result<Vec<Scene>> {
+    let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
+    let named = |name: &&str| {
+        let scene = scene(name)?;
+        let steps = if is_large(&scene) { scene.steps.min(LARGE_STEPS) } else { scene.steps };
+        Ok(Scene { steps, ..scene })
+    };
+    names.iter().map(named).collect()
+}
+
+/// A scene by one word as [`Scene::find_spec`] has it, which is its name then too.
+///
+/// # Errors
+/// As there.
+pub fn scene(word: &str) -> Result<Scene> {
+    Ok(Scene { name: word.to_owned(), ..Scene::find_spec(word)? })
+}
+
+fn is_large(scene: &Scene) -> bool {
+    scene.world.dynamic_count() >= LARGE
+}
+
+/// The line of substeps along which everything else is at its default: up to 128 where there are a few bodies, 32 where there are many.
+pub fn substeps(scene: &Scene, extent: Extent) -> impl Iterator<Item = u32> + use<> {
+    let most = match (extent, scene.world.dynamic_count()) {
+        (_, LARGE..) | (Extent::Quick, 100..) => 32,
+        (Extent::Quick, _) | (_, 100..) => 64,
+        _ => 128,
+    };
+    [2, 4, 8, 16, 32, 64, 128].into_iter().filter(move |&n| n <= most)
+}
+
+/// Substeps and sweeps of each off that line: sweeps where substeps could be.
+const SWEEPS: [(u32, u32); 8] = [(1, 16), (4, 4), (1, 4), (2, 4), (2, 16), (4, 2), (4, 16), (8, 4)];
+
+/// Drystone with the settings of the report.
+///
+/// Not the product of all axes, which is some hundred settings a scene: the line of substeps, and from it one step along each
+/// other axis. The reference gives the bits of the CPU's lanes, so its errors are theirs: it stands for itself at the defaults
+/// only, to show its time. Shaders on a software adapter run at the defaults only, for the same reason.
+///
+/// # Errors
+/// The scene is not fit to be simulated.
+pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>> {
+    let few = is_large(scene) || extent == Extent::Quick;
+    let default = SolverConfig::default().substeps;
+    // First of all the defaults, which times are related to.
+    let mut points: Vec<(&str, String)> = vec![("cpu", String::new())];
+    points.extend(substeps(scene, extent).filter(|&n| n != default).map(|n| ("cpu", format!("substeps={n}"))));
+    for (substeps, sweeps) in SWEEPS.into_iter().take(if few { 2 } else { SWEEPS.len() }) {
+        let point = format!("substeps={substeps} iterations={sweeps} relax={sweeps}");
+        if sweeps > 2 {
+            // Momentum begins with the third sweep.
+            points.push(("cpu", format!("{point} method=accelerated")));
+        }
+        points.push(("cpu", point));
+    }
+    for rule in [
+        "friction=box",
+        "friction_at=manifold",
+        "contact_frequency=0.25",
+        "preload_rate=0",
+        "preload_rate=0 contact_frequency=0.25",
+    ] {
+        let some: &[u32] = if few { &[8] } else { &[4, 8, 16] };
+        points.extend(some.iter().map(|n| ("cpu", format!("substeps={n} {rule}"))));
+    }
+    points.push(("reference", String::new()));
+    match adapters().first() {
+        Some(adapter) if adapter.hardware => {
+            points.extend(substeps(scene, extent).map(|n| ("gpu", format!("substeps={n}"))));
+        }
+        Some(_) if !is_large(scene) => points.push(("gpu", String::new())),
+        _ => {}
+    }
+    points.into_iter().map(|(backend, settings)| contender(scene, backend, &settings)).collect()
+}
+
+fn contender(scene: &Scene, backend: &str, settings: &str) -> Result<Box<dyn Contender>> {
+    let mut config = SolverConfig::default().without_sleep();
+    settings.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
+    Ok(Box::new(Drystone::new(scene, backend, &config)?))
+}

@@ -1,0 +1,183 @@
+//! Runs all scenes with all contenders, one race after another; what is finished is kept and not run again.
+
+use std::path::{Path, PathBuf};
+
+use super::contender::{Contender, Extent, Setting, Team};
+use super::origin::Origin;
+use super::page;
+use super::race::{Row, blocks, race};
+use super::solves::{self, SolveRow, solves};
+use super::table::Table;
+use crate::files;
+use drystone::contacts::ContactProblem;
+use drystone::scenes::Scene;
+use drystone::{Error, Result};
+
+/// What is run, and where it is written.
+pub struct Survey<'a> {
+    /// The scenes.
+    pub scenes: Vec<Scene>,
+    /// Who takes part. The first contender of the first team is what times are related to.
+    pub teams: Vec<&'a Team<'a>>,
+    /// How much is run.
+    pub extent: Extent,
+    /// Contact problems that drystone's ways to sweep are compared on.
+    pub problems: Vec<ContactProblem>,
+    /// Folder that everything is written into; made if need be.
+    pub out: PathBuf,
+}
+
+/// How far a survey is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<'a> {
+    /// What is running.
+    pub what: &'a str,
+    /// How much is done, in some unit.
+    pub done: u64,
+    /// How much there is.
+    pub total: u64,
+}
+
+/// Races of one survey, ready to be drawn.
+pub struct Report {
+    races: Vec<Vec<Row>>,
+    solves: Vec<Vec<SolveRow>>,
+}
+
+impl Survey<'_> {
+    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each race.
+    ///
+    /// A race counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
+    /// on the same machine with as many threads.
+    ///
+    /// # Errors
+    /// The folder cannot be written, holds other files of these names, or a contender gives up.
+    pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&Progress)) -> Result<Report> {
+        std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
+        let mut table = Table::<Row>::open(scenes_path(&self.out))?;
+        let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
+        let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
+        let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
+        let (mut before, mut races) = (0, Vec::new());
+        for scene in &self.scenes {
+            let mut contenders = self.contenders(scene)?;
+            let settings: Vec<_> = contenders.iter().map(|c| c.setting()).collect();
+            progress(&Progress { what: &scene.name, done: before, total });
+            let rows = match finished(table.rows(), scene, origin, &settings) {
+                Some(rows) => rows,
+                None => {
+                    let turns = u64::from(blocks(scene.steps)) * contenders.len() as u64;
+                    let mut turn = 0;
+                    let mut after_block = || {
+                        turn += 1;
+                        let done = before + weight(scene) * turn / turns;
+                        progress(&Progress { what: &scene.name, done, total });
+                    };
+                    let rows = race(scene, &mut contenders, origin, &mut after_block)?;
+                    table.add(rows.clone())?;
+                    rows
+                }
+            };
+            races.push(rows);
+            before += weight(scene);
+        }
+        let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
+        let mut all = Vec::new();
+        for problem in &self.problems {
+            progress(&Progress { what: &problem.name, done: before, total });
+            let rows = match solved(table.rows(), &solves::hash(problem), origin) {
+                Some(rows) => rows,
+                None => {
+                    let rows = solves(problem, origin)?;
+                    table.add(rows.clone())?;
+                    rows
+                }
+            };
+            all.push(rows);
+            before += problem_weight(problem);
+        }
+        Ok(Report { races, solves: all })
+    }
+
+    fn contenders(&self, scene: &Scene) -> Result<Vec<Box<dyn Contender>>> {
+        let of_each = self.teams.iter().map(|team| team(scene, self.extent)).collect::<Result<Vec<_>>>()?;
+        Ok(of_each.into_iter().flatten().collect())
+    }
+}
+
+/// The rows of `settings`, in their order, of the last run that has all of them.
+fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) -> Option<Vec<Row>> {
+    let (hash, steps) = (scene.content_hash(), super::race::steps(scene));
+    let fit = |row: &&Row| {
+        let Origin { build, commit: _, machine, threads } = origin;
+        row.hash == hash
+            && row.steps == steps
+            && row.build == *build
+            && row.machine == *machine
+            && row.threads == *threads
+    };
+    let fit: Vec<_> = rows.iter().filter(fit).collect();
+    let of_run = |run: &str| -> Option<Vec<Row>> {
+        let of = |setting: &Setting| {
+            fit.iter().find(|row| row.run == run && row.setting() == *setting).map(|&row| row.clone())
+        };
+        settings.iter().map(of).collect()
+    };
+    fit.iter().rev().find_map(|row| of_run(&row.run))
+}
+
+/// The rows of the last run on a problem; all solvers of a program are in each.
+fn solved(rows: &[SolveRow], hash: &str, origin: &Origin) -> Option<Vec<SolveRow>> {
+    let fit = |row: &&SolveRow| row.hash == hash && row.build == origin.build && row.machine == origin.machine;
+    let last = rows.iter().rfind(fit)?;
+    Some(rows.iter().filter(|row| row.run == last.run && row.hash == hash).cloned().collect())
+}
+
+fn problems_path(folder: &Path) -> PathBuf {
+    folder.join("problems.csv")
+}
+
+fn scenes_path(folder: &Path) -> PathBuf {
+    folder.join("scenes.csv")
+}
+
+impl Report {
+    /// The last race of each scene that the folder has.
+    ///
+    /// # Errors
+    /// There are no rows in it, or they cannot be read.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let (rows, solved) =
+            (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
+        if rows.rows().is_empty() && solved.rows().is_empty() {
+            return Err(Error::input(format!("{}: no rows to draw", scenes_path(folder).display())));
+        }
+        let races = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
+        let solves = last_of_each(solved.rows(), |row| (&row.problem, &row.run));
+        Ok(Self { races, solves })
+    }
+
+    /// Writes `index.html` and `speed-against-error.svg` into the folder, and says where the page is.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+        let page = page::page(&self.races, &self.solves)?;
+        let path = folder.join("index.html");
+        files::write(&folder.join("speed-against-error.svg"), page.main.as_bytes())?;
+        files::write(&path, page.html.as_bytes())?;
+        Ok(path)
+    }
+}
+
+/// Rows of one run after another, of which the last of each name is kept, where the first was. `key` is name and run.
+fn last_of_each<R: Clone>(rows: &[R], key: impl Fn(&R) -> (&String, &String)) -> Vec<Vec<R>> {
+    let mut kept: Vec<Vec<R>> = Vec::new();
+    for run in rows.chunk_by(|a, b| key(a) == key(b)) {
+        match kept.iter_mut().find(|known| key(&known[0]).0 == key(&run[0]).0) {
+            Some(known) => *known = run.to_vec(),
+            None => kept.push(run.to_vec()),
+        }
+    }
+    kept
+}

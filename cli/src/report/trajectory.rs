@@ -1,0 +1,57 @@
+//! The motion of a run as CSV.
+
+use std::path::{Path, PathBuf};
+
+use crate::files;
+use drystone::world::{BodyKind, World};
+use drystone::{Error, Result};
+
+/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes. The file is
+/// there when it is finished.
+pub struct Trajectory {
+    path: PathBuf,
+    writer: csv::Writer<files::Writer>,
+}
+
+impl Trajectory {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn create(path: &Path) -> Result<Self> {
+        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(files::Writer::create(path)?) };
+        let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
+        let written = trajectory.writer.write_record(header.split(' '));
+        trajectory.check(written)?;
+        Ok(trajectory)
+    }
+
+    /// Writes the bodies that can move.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
+        for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
+            let (p, q) = (body.center_of_mass(), body.rotation);
+            let (v, w) = (body.linear_velocity, body.angular_velocity);
+            let row =
+                (step, f64::from(step) * f64::from(dt), i, p.to_array(), q.to_array(), v.to_array(), w.to_array());
+            let written = self.writer.serialize(row);
+            self.check(written)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the file and gives it its name.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(self) -> Result<()> {
+        let unwritten = |e: csv::IntoInnerError<_>| Error::file(&self.path)(e.into_error());
+        self.writer.into_inner().map_err(unwritten)?.finish()
+    }
+
+    fn check(&self, written: csv::Result<()>) -> Result<()> {
+        written.map_err(|e| Error::file(&self.path)(e.into()))
+    }
+}

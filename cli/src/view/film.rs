@@ -1,0 +1,176 @@
+//! A run, or a recorded motion, as frames; and the pictures of them, all from one place.
+
+use std::path::Path;
+
+use glam::{Quat, Vec3};
+
+use super::camera::{Bounds, Camera};
+use super::canvas::{Canvas, Picture};
+use super::colors::ColorBy;
+use super::mesh::{Poses, poses};
+use super::overlay::ropes;
+use super::renderer::Shot;
+use drystone::Simulation;
+use drystone::scenes::Scene;
+use drystone::world::{BodyKind, World};
+use drystone::{Error, Result};
+
+/// A world at one time.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Seconds since the start.
+    pub time: f64,
+    /// Position (m) and rotation of each body.
+    pub poses: Vec<(Vec3, Quat)>,
+    /// What each body is colored by, as [`ColorBy::values`] gives it.
+    pub values: Vec<f32>,
+}
+
+/// Where a film is seen from.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Turn of the camera around the scene (rad).
+    pub yaw: f32,
+    /// Its height above the horizon as an angle (rad).
+    pub pitch: f32,
+}
+
+/// Step, time, body, place of its center of mass, rotation, velocities: as [`crate::report::Trajectory`] writes them.
+type Row = (u32, f64, usize, [f32; 3], [f32; 4], [f32; 3], [f32; 3]);
+
+/// Frames of one scene.
+#[derive(Clone, Debug)]
+pub struct Film {
+    scene: Scene,
+    color: ColorBy,
+    frames: Vec<Frame>,
+}
+
+impl Film {
+    /// A film without frames.
+    pub fn new(scene: Scene, color: ColorBy) -> Self {
+        Self { scene, color, frames: Vec::new() }
+    }
+
+    /// Adds the world as it is after the last step.
+    pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
+        let values = self.color.values(simulation);
+        self.frames.push(Frame { time, poses: poses(&simulation.world), values });
+    }
+
+    /// Adds a world of which no more is known.
+    fn add_world(&mut self, time: f64, world: &World) {
+        self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, &[], &[]) });
+    }
+
+    /// The frames.
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// Keeps `count` of the frames, evenly spaced and the last one among them.
+    pub fn thin(&mut self, count: usize) {
+        let kept: Vec<usize> = evenly(self.frames.len(), count).collect();
+        let mut index = 0;
+        self.frames.retain(|_| {
+            index += 1;
+            kept.binary_search(&(index - 1)).is_ok()
+        });
+    }
+
+    /// Reads the motion that `drystone run --out` wrote.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not such a motion of this scene; the line is named.
+    pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
+        if color.needs_run() {
+            return Err(Error::input(
+                "--from: a recorded motion has neither contacts nor sleep; color by material or speed",
+            ));
+        }
+        let file = std::fs::File::open(path).map_err(Error::file(path))?;
+        let mut film = Self::new(scene, color);
+        let mut world = film.scene.world.clone();
+        let mut last: Option<(u32, f64)> = None;
+        for (i, row) in csv::Reader::from_reader(file).deserialize::<Row>().enumerate() {
+            // The first line names the columns.
+            let line = i + 2;
+            let refuse = |what: String| Error::input(format!("{}: line {line}: {what}", path.display()));
+            let row = row.map_err(|e| match e.into_kind() {
+                csv::ErrorKind::Io(e) => Error::file(path)(e),
+                csv::ErrorKind::Deserialize { err, .. } => refuse(err.to_string()),
+                csv::ErrorKind::UnequalLengths { len, .. } => refuse(format!("{len} values instead of 16")),
+                _ => refuse("not a row of 16 numbers".into()),
+            })?;
+            let (step, time, index, place, [qx, qy, qz, qw], velocity, _) = row;
+            if let Some((before, then)) = last.filter(|(before, _)| *before != step) {
+                if step < before {
+                    return Err(refuse(format!("step {step} after step {before}")));
+                }
+                film.add_world(then, &world);
+            }
+            last = Some((step, time));
+            let bodies = world.bodies.len();
+            let Some(body) = world.bodies.get_mut(index).filter(|b| b.kind != BodyKind::Fixed) else {
+                return Err(refuse(format!("body {index} is not one of the {bodies} of the scene that can move")));
+            };
+            body.rotation = Quat::from_xyzw(qx, qy, qz, qw);
+            body.position = Vec3::from_array(place) - body.rotation * body.mass.center;
+            body.linear_velocity = Vec3::from_array(velocity);
+        }
+        match last {
+            Some((_, time)) => film.add_world(time, &world),
+            None => return Err(Error::input(format!("{}: no motion in it", path.display()))),
+        }
+        Ok(film)
+    }
+
+    /// What of the scene is in the pictures: everything that moves, over all frames.
+    pub fn bounds(&self) -> Bounds {
+        self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(bounds_at(&self.scene.world, &frame.poses)))
+    }
+
+    /// Draws every frame from one place, in order, on a canvas for the film's world.
+    ///
+    /// # Errors
+    /// The device was lost, or what `show` returns.
+    pub fn draw(&self, canvas: &mut Canvas, look: &Look, mut show: impl FnMut(&Picture) -> Result<()>) -> Result<()> {
+        let world = &self.scene.world;
+        let bounds = self.bounds();
+        let up = -world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+        let camera = Camera::framing(&bounds, up, look.yaw, look.pitch, canvas.aspect());
+        let scale = self.frames.iter().map(|f| self.color.scale(world, &f.values)).fold(0.0, f32::max);
+        let container = self.scene.container.map(|(low, high)| Bounds { low, high });
+        for frame in &self.frames {
+            let colors = self.color.paint(world, &frame.values, scale);
+            let ropes = ropes(world, &frame.poses);
+            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };
+            show(&canvas.draw(&shot)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` of the numbers below `all`, evenly spaced, the last one among them.
+pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
+    let count = count.min(all);
+    (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
+}
+
+/// Around everything in a world that moves, with room around it, and the points that it hangs from.
+pub fn bounds(world: &World) -> Bounds {
+    bounds_at(world, &poses(world))
+}
+
+fn bounds_at(world: &World, poses: &Poses) -> Bounds {
+    let moving = world.bodies.iter().zip(poses).filter(|(b, _)| b.kind != BodyKind::Fixed);
+    let around = moving.map(|(body, &(position, rotation))| {
+        let bounds = body.colliders.iter().map(|c| c.bounds(position, rotation));
+        let body = bounds.fold(Bounds::EMPTY, |all, (low, high)| all.join(Bounds { low, high }));
+        let room = 0.25 * (body.high - body.low);
+        Bounds { low: body.low - room, high: body.high + room }
+    });
+    let hung = world.joints.iter().filter(|j| j.body_b.is_none());
+    let anchors = hung.map(|j| Bounds::around(j.anchor_b, 0.0));
+    around.chain(anchors).fold(Bounds::EMPTY, Bounds::join)
+}

@@ -1,0 +1,220 @@
+//! The maze game in a window: arrow keys or the mouse tilt the board, a clock runs, R starts again.
+
+use glam::{Quat, Vec2, Vec3};
+use winit::keyboard::{Key, NamedKey};
+
+use super::camera::{Bounds, Camera};
+use super::canvas::{Canvas, Picture};
+use super::colors::Rgba;
+use super::renderer::Shot;
+use super::window::{Pointer, Show};
+use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
+use drystone::Result;
+use drystone::backend::{BackendChoice, choose};
+use drystone::config::SolverConfig;
+use drystone::world::World;
+
+const BOARD_COLOR: Rgba = [226, 202, 160, 255];
+const GOAL_COLOR: Rgba = [92, 170, 96, 255];
+const WALL_COLOR: Rgba = [150, 98, 58, 255];
+const BALL_COLOR: Rgba = [206, 210, 218, 255];
+/// Steps that a picture waits for at most: a tenth of a second.
+const MOST_STEPS: f32 = 12.0;
+
+/// Color of each body of a game.
+fn colors(world: &World) -> Vec<Rgba> {
+    let mut colors = vec![WALL_COLOR; world.bodies.len()];
+    (colors[BOARD], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
+    colors
+}
+
+/// The board with its rim, however it tilts.
+fn bounds_of(map: &Map) -> Bounds {
+    let half = 0.5 * CELL * Vec3::new(map.columns as f32 + 3.0, 1.0, map.rows as f32 + 3.0);
+    Bounds { low: -half, high: half }
+}
+
+/// As one sits before it.
+fn camera_for(map: &Map, aspect: f32) -> Camera {
+    Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
+}
+
+/// Draws a game that was played, from the poses of its bodies.
+///
+/// # Errors
+/// The device was lost, or what `show` returns.
+pub fn draw_game(
+    canvas: &mut Canvas,
+    map: &Map,
+    world: &World,
+    frames: &[Vec<(Vec3, Quat)>],
+    mut show: impl FnMut(&Picture) -> Result<()>,
+) -> Result<()> {
+    let (colors, camera, bounds) = (colors(world), camera_for(map, canvas.aspect()), bounds_of(map));
+    frames.iter().try_for_each(|poses| {
+        let shot = Shot { poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
+        show(&canvas.draw(&shot)?)
+    })
+}
+
+/// A game on a screen.
+pub struct Labyrinth {
+    game: Game,
+    map: Map,
+    config: SolverConfig,
+    backend: BackendChoice,
+    /// Left, right, back, front: which arrows are held.
+    held: [bool; 4],
+    /// Where the mouse pulls to from the middle of the window, while it is held.
+    mouse: Option<Vec2>,
+    begun: bool,
+    owed: f32,
+    best: Option<f32>,
+}
+
+impl Labyrinth {
+    /// A game that begins with the first tilt.
+    ///
+    /// # Errors
+    /// No such backend, or a setting out of range.
+    pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
+        let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
+        let held = [false; 4];
+        Ok(Self { game, map, config, backend, held, mouse: None, begun: false, owed: 0.0, best: None })
+    }
+
+    fn restart(&mut self) -> Result<()> {
+        let backend = choose(self.backend, 1, false)?.0;
+        self.game = Game::new(self.map.clone(), self.config.clone(), backend)?;
+        (self.begun, self.owed) = (false, 0.0);
+        Ok(())
+    }
+
+    /// Tilts that keys and mouse ask for, to the right and to the front (degrees).
+    fn wanted(&self) -> [f32; 2] {
+        let arrow = |less: usize, more: usize| f32::from(self.held[more]) - f32::from(self.held[less]);
+        match self.mouse {
+            Some(at) => [at.x, -at.y].map(|x| (1.5 * x).clamp(-1.0, 1.0) * TILT_LIMIT),
+            None => [arrow(0, 1), arrow(2, 3)].map(|x| x * TILT_LIMIT),
+        }
+    }
+}
+
+impl Show for Labyrinth {
+    fn title(&self) -> String {
+        format!("maze {}", self.map.name)
+    }
+
+    fn world(&self) -> &World {
+        self.game.world()
+    }
+
+    fn bounds(&self) -> Bounds {
+        bounds_of(&self.map)
+    }
+
+    fn camera(&self, aspect: f32) -> Camera {
+        camera_for(&self.map, aspect)
+    }
+
+    fn colors(&mut self) -> Vec<Rgba> {
+        colors(self.world())
+    }
+
+    fn advance(&mut self, seconds: f32) -> Result<()> {
+        let wanted = self.wanted();
+        self.begun |= wanted != [0.0; 2];
+        let dt = self.game.dt();
+        self.owed = (self.owed + seconds).min(MOST_STEPS * dt);
+        while self.begun && self.owed >= dt {
+            self.game.step(wanted)?;
+            self.owed -= dt;
+        }
+        if self.game.outcome == Some(Outcome::Goal) {
+            let time = self.game.time();
+            self.best = Some(self.best.map_or(time, |best| best.min(time)));
+        }
+        Ok(())
+    }
+
+    fn key(&mut self, key: &Key, down: bool) -> Result<()> {
+        let arrows = [NamedKey::ArrowLeft, NamedKey::ArrowRight, NamedKey::ArrowUp, NamedKey::ArrowDown];
+        match key.as_ref() {
+            Key::Named(name) => {
+                if let Some(arrow) = arrows.iter().position(|a| *a == name) {
+                    self.held[arrow] = down;
+                }
+            }
+            Key::Character("r") if down => self.restart()?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn grab(&mut self, pointer: &Pointer) -> bool {
+        self.mouse = Some(pointer.at);
+        true
+    }
+
+    fn drag(&mut self, pointer: &Pointer) {
+        self.mouse = Some(pointer.at);
+    }
+
+    fn release(&mut self) {
+        self.mouse = None;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.heading(match self.game.outcome {
+            Some(Outcome::Goal) => "won",
+            Some(_) => "lost: R starts again",
+            None if self.begun => "to the green square",
+            None => "arrow keys, or hold the mouse",
+        });
+        ui.monospace(format!("time {:6.2} s", self.game.time()));
+        if let Some(best) = self.best {
+            ui.monospace(format!("best {best:6.2} s"));
+        }
+        let [right, front] = self.game.tilt;
+        ui.monospace(format!("tilt {right:5.1} {front:5.1} degrees"));
+        ui.label("arrows or left mouse: tilt, right mouse: turn the view");
+        ui.label("r again, f whole board, h panel, esc close");
+        let known = BOARDS.map(|b| b.0).join(", ");
+        ui.label(format!("boards: {known}, or a file of your own"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labyrinth() -> Labyrinth {
+        let map = Map::find("easy").expect("a board");
+        Labyrinth::new(map, SolverConfig::default(), BackendChoice::Reference).expect("a game")
+    }
+
+    #[test]
+    fn the_clock_waits_for_the_first_tilt_and_arrows_roll_the_ball() {
+        let mut game = labyrinth();
+        game.advance(0.5).expect("time");
+        assert_eq!(game.game.time(), 0.0);
+        let start = game.game.ball();
+        game.key(&Key::Named(NamedKey::ArrowRight), true).expect("a key");
+        (0..30).for_each(|_| game.advance(1.0 / 60.0).expect("time"));
+        assert!(game.game.ball().x > start.x + 0.03, "{} m", game.game.ball().x - start.x);
+        game.key(&Key::Named(NamedKey::ArrowRight), false).expect("a key");
+        assert_eq!(game.wanted(), [0.0, 0.0]);
+        game.key(&Key::Character("r".into()), true).expect("a key");
+        assert_eq!((game.game.time(), game.game.ball()), (0.0, start));
+    }
+
+    #[test]
+    fn the_mouse_tilts_towards_where_it_is() {
+        let mut game = labyrinth();
+        let at = Vec2::new(0.2, -0.9);
+        assert!(game.grab(&Pointer { at, origin: Vec3::ZERO, direction: Vec3::NEG_Z }));
+        assert_eq!(game.wanted(), [0.3 * TILT_LIMIT, TILT_LIMIT]);
+        game.release();
+        assert_eq!(game.wanted(), [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,351 @@
+//! A scene that runs in a window: pause, step, restart, speed, colors, overlays, a mouse that pulls, settings that change live.
+
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+use winit::keyboard::{Key, NamedKey};
+
+use super::camera::{Bounds, Camera};
+use super::colors::{ColorBy, Rgba};
+use super::film::bounds;
+use super::overlay::{LineEnd, Overlay, lines};
+use super::panel;
+use super::window::{Pointer, Show};
+use drystone::Result;
+use drystone::Simulation;
+use drystone::backend::{BackendChoice, choose};
+use drystone::config::SolverConfig;
+use drystone::scenes::Scene;
+use drystone::stats::StepStats;
+use drystone::world::{BallJoint, BodyKind, World};
+
+/// Steps keep a picture waiting for this long, or for as long as drawing takes if that is longer.
+const PATIENCE: Duration = Duration::from_millis(30);
+/// How fast a body that is pulled closes the gap to the mouse (1/s): soft, however stiff joints are.
+const PULL: f32 = 10.0;
+
+/// A scene that runs.
+pub struct Live {
+    scene: Scene,
+    exact: bool,
+    pub(super) choice: BackendChoice,
+    pub(super) simulation: Simulation,
+    pub(super) color: ColorBy,
+    pub(super) overlay: Overlay,
+    pub(super) paused: bool,
+    /// Simulated seconds for a second, asked for.
+    pub(super) speed: f32,
+    /// The same, reached: a mean over the last pictures.
+    pub(super) reached: f32,
+    /// Pictures a second, likewise.
+    pub(super) pictures: f32,
+    pub(super) steps: u32,
+    pub(super) stats: StepStats,
+    /// Milliseconds of each stage: means over the last steps.
+    pub(super) stage_ms: [f64; 5],
+    /// Why a setting was refused.
+    pub(super) refused: Option<String>,
+    owed: f32,
+    /// How long the steps before the last picture took.
+    stepping: Duration,
+    grabbed: Option<Grabbed>,
+    bounds: Bounds,
+    light_end: f32,
+}
+
+/// A body that the mouse pulls, by the last joint of the world.
+struct Grabbed {
+    body: usize,
+    /// The point that is pulled, in the body's frame (m).
+    anchor: Vec3,
+    /// Distance from the eye at which the mouse moves (m).
+    distance: f32,
+    /// Where the mouse is (m).
+    target: Vec3,
+}
+
+impl Live {
+    /// A scene that is about to run.
+    ///
+    /// # Errors
+    /// No such backend, or a world or settings that cannot be run.
+    pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
+        let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
+        let simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        Ok(Self {
+            bounds: bounds(&scene.world),
+            exact,
+            choice,
+            simulation,
+            color,
+            overlay: Overlay::default(),
+            paused: false,
+            speed: 1.0,
+            reached: 0.0,
+            pictures: 0.0,
+            steps: 0,
+            stats: StepStats::default(),
+            stage_ms: [0.0; 5],
+            refused: None,
+            owed: 0.0,
+            stepping: Duration::ZERO,
+            grabbed: None,
+            light_end: 0.0,
+            scene,
+        })
+    }
+
+    /// Seconds simulated so far.
+    pub fn time(&self) -> f32 {
+        self.steps as f32 * self.scene.dt
+    }
+
+    /// Begins again with the settings as they are now.
+    pub(super) fn restart(&mut self) -> Result<()> {
+        let config = self.simulation.config().clone();
+        let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;
+        self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
+        (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
+        Ok(())
+    }
+
+    pub(super) fn set_config(&mut self, config: SolverConfig) {
+        self.refused = self.simulation.set_config(config).err().map(|e| e.to_string());
+    }
+
+    /// Goes on with another backend, unless it cannot be opened.
+    pub(super) fn set_backend(&mut self, choice: BackendChoice) {
+        match choose(choice, self.scene.world.dynamic_count(), self.exact) {
+            Ok((backend, _)) => {
+                self.simulation.set_backend(backend);
+                (self.choice, self.refused) = (choice, None);
+            }
+            Err(e) => self.refused = Some(e.to_string()),
+        }
+    }
+
+    pub(super) fn step(&mut self) -> Result<()> {
+        let dt = self.scene.dt;
+        if let (Some(grabbed), Some(joint)) = (&self.grabbed, self.simulation.world.joints.last_mut()) {
+            let body = &self.simulation.world.bodies[grabbed.body];
+            let at = body.position + body.rotation * grabbed.anchor;
+            joint.anchor_b = at + (grabbed.target - at) * (PULL * dt).min(1.0);
+        }
+        if let Some(grabbed) = &self.grabbed {
+            self.simulation.wake(grabbed.body);
+        }
+        self.stats = self.simulation.step(dt)?;
+        self.steps += 1;
+        for (mean, (_, time)) in self.stage_ms.iter_mut().zip(self.stats.times.stages()) {
+            *mean += 0.1 * (time.as_secs_f64() * 1e3 - *mean);
+        }
+        Ok(())
+    }
+}
+
+impl Show for Live {
+    fn title(&self) -> String {
+        self.scene.name.clone()
+    }
+
+    fn world(&self) -> &World {
+        &self.simulation.world
+    }
+
+    fn bounds(&self) -> Bounds {
+        // Where things are now, unless something flew far away.
+        let now = self.bounds.join(bounds(self.world()));
+        if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
+    }
+
+    fn container(&self) -> Option<Bounds> {
+        self.scene.container.map(|(low, high)| Bounds { low, high })
+    }
+
+    fn camera(&self, aspect: f32) -> Camera {
+        let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+        Camera::framing(&self.bounds, up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
+    }
+
+    fn colors(&mut self) -> Vec<Rgba> {
+        let values = self.color.values(&mut self.simulation);
+        let world = &self.simulation.world;
+        // Follows slowly, so that colors do not flicker.
+        let scale = self.color.scale(world, &values);
+        self.light_end += 0.05 * (scale - self.light_end);
+        self.color.paint(world, &values, self.light_end.max(0.5 * scale))
+    }
+
+    fn lines(&mut self) -> Vec<LineEnd> {
+        let size = 0.02 * self.bounds.radius();
+        let overlay = Overlay { joints: self.overlay.joints || self.grabbed.is_some(), ..self.overlay };
+        lines(&mut self.simulation, overlay, size)
+    }
+
+    fn advance(&mut self, seconds: f32) -> Result<()> {
+        let began = Instant::now();
+        let before = self.time();
+        let drawing = Duration::from_secs_f32(seconds).saturating_sub(self.stepping);
+        if !self.paused {
+            self.owed += seconds * self.speed;
+            while self.owed >= self.scene.dt && began.elapsed() < PATIENCE.max(drawing) {
+                self.step()?;
+                self.owed -= self.scene.dt;
+            }
+            // What cannot be made up for is let go.
+            self.owed = self.owed.min(2.0 * self.scene.dt);
+        }
+        self.stepping = began.elapsed();
+        self.pictures += (2.0 * seconds).min(1.0) * (1.0 / seconds.max(1e-4) - self.pictures);
+        let reached = (self.time() - before) / seconds.max(1e-4);
+        self.reached += (2.0 * seconds).min(1.0) * (reached - self.reached);
+        Ok(())
+    }
+
+    fn key(&mut self, key: &Key, down: bool) -> Result<()> {
+        if !down {
+            return Ok(());
+        }
+        match key.as_ref() {
+            Key::Named(NamedKey::Space) => self.paused = !self.paused,
+            Key::Character("n") => {
+                self.paused = true;
+                self.step()?;
+            }
+            Key::Character("r") => self.restart()?,
+            Key::Character("c") => self.color = self.color.next(),
+            Key::Character("1") => self.overlay.contacts = !self.overlay.contacts,
+            Key::Character("2") => self.overlay.joints = !self.overlay.joints,
+            Key::Character("3") => self.overlay.boxes = !self.overlay.boxes,
+            Key::Character("+" | "=") => self.speed = (self.speed * 2.0).min(16.0),
+            Key::Character("-") => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn grab(&mut self, pointer: &Pointer) -> bool {
+        let Pointer { origin, direction, .. } = *pointer;
+        let world = &mut self.simulation.world;
+        let met = |(i, b): (usize, &drystone::world::Body)| Some((b.meets_ray(origin, direction)?, i));
+        // What stands in front is seen, but only what is dynamic can be pulled.
+        let dynamic = world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic);
+        let Some((distance, body)) = dynamic.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
+        let target = origin + distance * direction;
+        let pulled = &world.bodies[body];
+        let anchor = pulled.rotation.inverse() * (target - pulled.position);
+        world.join(BallJoint::to_world(body, anchor, target));
+        self.grabbed = Some(Grabbed { body, anchor, distance, target });
+        true
+    }
+
+    fn drag(&mut self, pointer: &Pointer) {
+        if let Some(grabbed) = &mut self.grabbed {
+            grabbed.target = pointer.origin + grabbed.distance * pointer.direction;
+        }
+    }
+
+    fn release(&mut self) {
+        if self.grabbed.take().is_some() {
+            self.simulation.world.joints.pop();
+        }
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        panel::show(self, ui);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+
+    fn live(name: &str) -> Live {
+        let scene = Scene::find(name, &[]).expect("a scene");
+        Live::new(scene, SolverConfig::default(), BackendChoice::Reference, false, ColorBy::Batch).expect("a scene")
+    }
+
+    fn press(live: &mut Live, key: &str) {
+        live.key(&Key::Character(key.into()), true).expect("a key");
+    }
+
+    #[test]
+    fn time_passes_at_the_speed_asked_for_and_stands_still_in_a_pause() {
+        let mut live = live("tower");
+        (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
+        assert_eq!(live.steps, 6);
+        press(&mut live, "-");
+        (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
+        assert_eq!(live.steps, 9);
+        live.key(&Key::Named(NamedKey::Space), true).expect("a key");
+        live.advance(0.1).expect("time");
+        press(&mut live, "n");
+        assert_eq!(live.steps, 10);
+        press(&mut live, "r");
+        assert_eq!((live.steps, live.world().bodies[1].position.y), (0, 0.5));
+    }
+
+    #[test]
+    fn the_mouse_pulls_the_body_under_it_and_lets_it_go() {
+        let mut live = live("tower");
+        let camera = live.camera(1.5);
+        let top = live.world().bodies.len() - 1;
+        let place = camera.projection(1.5, 10.0).project_point3(live.world().bodies[top].position);
+        let pointer = |at: Vec2| {
+            let (origin, direction) = camera.ray(at, 1.5);
+            Pointer { at, origin, direction }
+        };
+        assert!(!live.grab(&pointer(Vec2::new(0.95, 0.95))), "there is nothing");
+        assert!(live.grab(&pointer(place.truncate())));
+        let before = live.world().bodies[top].position;
+        live.drag(&pointer(place.truncate() + Vec2::new(0.0, 0.3)));
+        (0..40).for_each(|_| live.step().expect("a step"));
+        assert!(live.world().bodies[top].position.y > before.y + 0.5, "it is lifted");
+        assert!(live.world().joints.len() == 1 && !live.lines().is_empty());
+        live.release();
+        (0..60).for_each(|_| live.step().expect("a step"));
+        assert!(live.world().joints.is_empty() && live.world().bodies[top].position.y < before.y + 0.5, "it falls");
+    }
+
+    /// The number of joints is then the same as before, and the joint is another one.
+    #[test]
+    fn another_body_can_be_grabbed_right_after_one_was_let_go() {
+        let mut live = live("tower");
+        let camera = live.camera(1.5);
+        let projection = camera.projection(1.5, 10.0);
+        let top = live.world().bodies.len() - 1;
+        let above = |live: &Live, body: usize| {
+            let at = projection.project_point3(live.world().bodies[body].position).truncate();
+            let (origin, direction) = camera.ray(at, 1.5);
+            Pointer { at, origin, direction }
+        };
+        assert!(live.grab(&above(&live, top)));
+        live.step().expect("a step");
+        press(&mut live, " ");
+        live.release();
+        assert!(live.grab(&above(&live, top - 3)));
+        let grabbed = live.grabbed.as_ref().expect("a body").body;
+        assert_eq!(grabbed, top - 3);
+        for _ in 0..30 {
+            live.step().expect("a step");
+            let world = live.world();
+            assert!(world.joint_gap() < 0.05, "{} m", world.joint_gap());
+            assert!((world.bodies[top].position.x.abs()).max(world.bodies[top].position.z.abs()) < 0.05);
+        }
+    }
+
+    #[test]
+    fn settings_and_backend_change_while_it_runs_and_what_contradicts_is_refused() {
+        let mut live = live("tower");
+        live.step().expect("a step");
+        live.set_config(SolverConfig::default().with(|c| c.substeps = 3));
+        live.set_backend(BackendChoice::Cpu);
+        live.step().expect("a step");
+        assert_eq!((live.simulation.config().substeps, live.simulation.backend().name()), (3, "cpu"));
+        live.set_config(SolverConfig::default().with(|c| c.substeps = 0));
+        assert!(live.refused.as_ref().is_some_and(|e| e.contains("substeps")));
+        assert_eq!(live.simulation.config().substeps, 3);
+    }
+}

@@ -1,0 +1,138 @@
+//! The panel of a live scene: what it does, and what can be changed while it runs.
+
+use clap::ValueEnum;
+
+use super::colors::ColorBy;
+use super::live::Live;
+use drystone::backend::BackendChoice;
+use drystone::config::FrictionRule;
+
+/// Fills `ui`.
+pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
+    numbers(live, ui);
+    ui.separator();
+    controls(live, ui);
+    ui.separator();
+    settings(live, ui);
+    ui.collapsing("keys and mouse", |ui| {
+        for line in [
+            "space pause, n one step, r restart, + - speed",
+            "c color, 1 contacts, 2 joints, 3 boxes",
+            "f whole scene, h panel, esc close",
+            "left: pull a body, or turn the view",
+            "right: turn, middle: move, wheel: nearer",
+        ] {
+            ui.label(line);
+        }
+    });
+}
+
+fn numbers(live: &mut Live, ui: &mut egui::Ui) {
+    let asleep = live.stats.asleep;
+    let depth = live.simulation.solved_penetration();
+    // With those of sleepers, which the last step does not count.
+    let (manifolds, points, colors) =
+        live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
+            (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
+        });
+    let world = &live.simulation.world;
+    let total: f64 = live.stage_ms.iter().sum();
+    egui::Grid::new("numbers").num_columns(2).show(ui, |ui| {
+        let mut row = |what: &str, value: String| {
+            ui.label(what);
+            ui.monospace(value);
+            ui.end_row();
+        };
+        row("backend", live.simulation.backend().name().into());
+        row("bodies", format!("{}, {asleep} asleep", world.dynamic_count()));
+        row("time", format!("{:.2} s, {} steps", live.time(), live.steps));
+        row("speed", format!("{:.2} of {:.2} real time", live.reached, live.speed));
+        row("pictures", format!("{:.1} a second", live.pictures));
+        row("a step", format!("{total:.2} ms"));
+        for ((stage, _), ms) in live.stats.times.stages().iter().zip(live.stage_ms) {
+            row(&format!("  {stage}"), format!("{ms:.2} ms"));
+        }
+        row("contacts", format!("{manifolds} of {points} points, {colors} colors"));
+        row("penetration", format!("{:.3} mm, mean {:.3}", depth.max * 1e3, depth.mean * 1e3));
+        row("kinetic", format!("{:.3e} J", world.kinetic_energy()));
+        row("potential", format!("{:.3e} J", world.potential_energy()));
+    });
+}
+
+fn controls(live: &mut Live, ui: &mut egui::Ui) {
+    let mut restart = false;
+    ui.horizontal(|ui| {
+        ui.toggle_value(&mut live.paused, "pause");
+        if ui.button("step").clicked() {
+            live.paused = true;
+            live.refused = live.step().err().map(|e| e.to_string());
+        }
+        restart = ui.button("restart").clicked();
+    });
+    if restart {
+        live.refused = live.restart().err().map(|e| e.to_string());
+    }
+    ui.add(egui::Slider::new(&mut live.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
+    let mut color = live.color;
+    choice(ui, "color", ColorBy::value_variants(), &mut color);
+    live.color = color;
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut live.overlay.contacts, "contacts");
+        ui.checkbox(&mut live.overlay.joints, "joints");
+        ui.checkbox(&mut live.overlay.boxes, "boxes");
+    });
+}
+
+fn settings(live: &mut Live, ui: &mut egui::Ui) {
+    let before = live.simulation.config().clone();
+    let mut config = before.clone();
+    ui.add(egui::Slider::new(&mut config.substeps, 1..=64).logarithmic(true).text("substeps"));
+    ui.add(egui::Slider::new(&mut config.iterations, 1..=32).text("sweeps"));
+    ui.add(egui::Slider::new(&mut config.relax, 0..=8).text("relax sweeps"));
+    let rules = [
+        (FrictionRule::None, "none"),
+        (FrictionRule::Slip, "slip"),
+        (FrictionRule::Box, "box"),
+        (FrictionRule::Disc, "disc"),
+    ];
+    ui.horizontal(|ui| {
+        ui.label("friction");
+        for (rule, name) in rules {
+            ui.selectable_value(&mut config.friction, rule, name);
+        }
+    });
+    let changed = config.substeps != before.substeps
+        || config.iterations != before.iterations
+        || config.relax != before.relax
+        || config.friction != before.friction;
+    if changed {
+        live.set_config(config);
+    }
+    let mut backend = live.choice;
+    choice(ui, "backend", &BackendChoice::ALL, &mut backend);
+    if backend != live.choice {
+        live.set_backend(backend);
+    }
+    if let Some(refused) = &live.refused {
+        ui.colored_label(egui::Color32::from_rgb(200, 40, 40), refused);
+    }
+}
+
+/// One of the values that the command line knows too.
+fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str, all: &[T], value: &mut T) {
+    ui.horizontal(|ui| {
+        ui.label(what);
+        for option in all {
+            ui.selectable_value(value, *option, option.to_string());
+        }
+    });
+}
+
+impl ColorBy {
+    /// The one after this, in turn.
+    pub fn next(self) -> Self {
+        let all = Self::value_variants();
+        let at = all.iter().position(|&c| c == self).map_or(0, |i| i + 1);
+        all[at % all.len()]
+    }
+}

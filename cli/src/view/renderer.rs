@@ -1,0 +1,395 @@
+//! Draws the bodies of a world with wgpu: one instanced draw for each mesh, a shadow map, lines on top.
+//!
+//! Runs on any adapter, the software one included, into any texture: a window's or one that is read back.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use glam::camera::rh::proj::directx;
+use glam::camera::rh::view::look_at_mat4;
+use wgpu::util::DeviceExt;
+
+use super::camera::{Bounds, Camera};
+use super::colors::Rgba;
+use super::mesh::{Instance, Meshes, Poses, Vertex};
+use super::overlay::LineEnd;
+use drystone::world::World;
+
+/// How much work goes into a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quality {
+    /// Samples of a pixel, 1 or 4.
+    samples: u32,
+    /// Side of the shadow map in texels.
+    shadow_size: u32,
+    /// Places of the shadow map that are compared on either side of a point.
+    shadow_reach: u32,
+}
+
+impl Quality {
+    /// For pictures, and for windows on hardware.
+    pub const FINE: Self = Self { samples: 4, shadow_size: 2048, shadow_reach: 1 };
+    /// For windows on a software adapter.
+    pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
+}
+
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// The background, as sRGB.
+const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
+
+/// What one picture shows.
+#[derive(Clone, Copy)]
+pub struct Shot<'a> {
+    /// Where the bodies are.
+    pub poses: &'a Poses,
+    /// The color of each body.
+    pub colors: &'a [Rgba],
+    /// Where it is seen from.
+    pub camera: &'a Camera,
+    /// What casts shadows and is drawn with depth: the scene.
+    pub bounds: Bounds,
+    /// A space whose near walls are left out, so that one sees what is inside.
+    pub container: Option<Bounds>,
+    /// Lines on top.
+    pub lines: &'a [LineEnd],
+}
+
+/// As `View` in shaders/view/view.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct View {
+    view_projection: [[f32; 4]; 4],
+    light_projection: [[f32; 4]; 4],
+    eye: [f32; 4],
+    light: [f32; 4],
+    up: [f32; 4],
+    background: [f32; 4],
+}
+
+/// Draws one world.
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    meshes: Meshes,
+    vertices: wgpu::Buffer,
+    view: wgpu::Buffer,
+    shadow_map: wgpu::TextureView,
+    shadow_group: wgpu::BindGroup,
+    main_group: wgpu::BindGroup,
+    shadow: wgpu::RenderPipeline,
+    bodies: wgpu::RenderPipeline,
+    lines: wgpu::RenderPipeline,
+    format: wgpu::TextureFormat,
+    quality: Quality,
+    /// Depth, and color where there are several samples, as large as the picture.
+    targets: Option<Targets>,
+}
+
+struct Targets {
+    size: (u32, u32),
+    color: Option<wgpu::TextureView>,
+    depth: wgpu::TextureView,
+}
+
+impl Renderer {
+    /// A renderer for the bodies of `world` into textures of `format`, which is not one that encodes sRGB by itself.
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        format: wgpu::TextureFormat,
+        quality: Quality,
+        world: &World,
+    ) -> Self {
+        let meshes = Meshes::new(world);
+        let vertices = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("vertices"),
+            contents: if meshes.vertices.is_empty() { &[0; 24] } else { bytemuck::cast_slice(&meshes.vertices) },
+            usage: wgpu::BufferUsages::VERTEX,
+        });
+        let view = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("view"),
+            size: size_of::<View>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+        let shadow_map = texture(device, (quality.shadow_size, quality.shadow_size), DEPTH, 1, usage);
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("shadow"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            compare: Some(wgpu::CompareFunction::LessEqual),
+            ..Default::default()
+        });
+
+        let uniform = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let depth_texture = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Depth,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
+        let resources = [
+            view.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&shadow_map),
+            wgpu::BindingResource::Sampler(&sampler),
+        ];
+        // The shadow pass writes the map, so it cannot have it bound.
+        let (shadow_layout, shadow_group) = bind(device, &[uniform], &resources[..1]);
+        let (main_layout, main_group) = bind(device, &[uniform, depth_texture, comparison], &resources);
+
+        let module = |label: &str, source: &str| {
+            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(label),
+                source: wgpu::ShaderSource::Wgsl([VIEW_WGSL, source].concat().into()),
+            })
+        };
+        let (mesh, line) = (module("mesh", MESH_WGSL), module("line", LINE_WGSL));
+        let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+        let row = wgpu::vertex_attr_array![2 => Float32x3, 3 => Unorm8x4, 4 => Float32x4, 5 => Float32x3, 6 => Uint32];
+        let end = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
+        let rows = [
+            layout_of::<Vertex>(wgpu::VertexStepMode::Vertex, &corner),
+            layout_of::<Instance>(wgpu::VertexStepMode::Instance, &row),
+        ];
+        let ends = [layout_of::<LineEnd>(wgpu::VertexStepMode::Vertex, &end)];
+        let make = |layout, module, vertex, fragment, buffers, topology, depth| {
+            pipeline(device, &Drawing { layout, module, vertex, fragment, buffers, topology, depth, format, quality })
+        };
+        use wgpu::CompareFunction::{Always, Less};
+        use wgpu::PrimitiveTopology::{LineList, TriangleList};
+        Self {
+            shadow: make(&shadow_layout, &mesh, "cast_shadow", None, &rows, TriangleList, Less),
+            bodies: make(&main_layout, &mesh, "transform", Some("shade"), &rows, TriangleList, Less),
+            // Contacts lie inside of bodies: lines are never hidden.
+            lines: make(&shadow_layout, &line, "end_of_line", Some("paint_line"), &ends, LineList, Always),
+            device: device.clone(),
+            queue: queue.clone(),
+            meshes,
+            vertices,
+            view,
+            shadow_map,
+            shadow_group,
+            main_group,
+            format,
+            quality,
+            targets: None,
+        }
+    }
+
+    /// Draws `shot` into `target`, which is `size` in pixels: width, height.
+    pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), shot: &Shot) {
+        self.write_view(shot, size.0 as f32 / size.1 as f32);
+        let eye = shot.camera.eye();
+        let container = shot.container.filter(|c| c.low.is_finite() && c.high.is_finite());
+        let hidden = |b: &Bounds| container.is_some_and(|c| stands_before(b, &c, eye));
+        let ground = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
+        let instances = self.meshes.instances(shot.poses, shot.colors, ground, hidden);
+        let buffer = |bytes: &[u8]| {
+            let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
+            let usage = wgpu::BufferUsages::VERTEX;
+            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
+        };
+        let (rows, ends) = (buffer(bytemuck::cast_slice(&instances)), buffer(bytemuck::cast_slice(shot.lines)));
+
+        if self.targets.as_ref().is_none_or(|t| t.size != size) {
+            let samples = self.quality.samples;
+            let of = |format| texture(&self.device, size, format, samples, wgpu::TextureUsages::RENDER_ATTACHMENT);
+            self.targets = Some(Targets { size, color: (samples > 1).then(|| of(self.format)), depth: of(DEPTH) });
+        }
+        let Some(Targets { color, depth, .. }) = &self.targets else { return };
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let draw_bodies = |pass: &mut wgpu::RenderPass, pipeline, group| {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.set_vertex_buffer(0, self.vertices.slice(..));
+            pass.set_vertex_buffer(1, rows.slice(..));
+            self.meshes.draws().for_each(|(vertices, instances)| pass.draw(vertices, instances));
+        };
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("shadow"),
+                depth_stencil_attachment: Some(cleared_depth(&self.shadow_map, wgpu::StoreOp::Store)),
+                ..Default::default()
+            });
+            draw_bodies(&mut pass, &self.shadow, &self.shadow_group);
+        }
+        let [r, g, b] = BACKGROUND.map(f64::from);
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: color.as_ref().unwrap_or(target),
+            depth_slice: None,
+            resolve_target: color.as_ref().map(|_| target),
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                store: if color.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
+            },
+        };
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("bodies"),
+                color_attachments: &[Some(attachment)],
+                depth_stencil_attachment: Some(cleared_depth(depth, wgpu::StoreOp::Discard)),
+                ..Default::default()
+            });
+            draw_bodies(&mut pass, &self.bodies, &self.main_group);
+            pass.set_pipeline(&self.lines);
+            pass.set_bind_group(0, &self.shadow_group, &[]);
+            pass.set_vertex_buffer(0, ends.slice(..));
+            pass.draw(0..shot.lines.len() as u32, 0..1);
+        }
+        self.queue.submit([encoder.finish()]);
+    }
+
+    fn write_view(&self, shot: &Shot, aspect: f32) {
+        let (camera, bounds) = (shot.camera, shot.bounds);
+        let (center, radius) = (bounds.center(), bounds.radius());
+        // From behind the camera's left shoulder, so that the sides that are seen differ in brightness.
+        let [right, _, back] = camera.axes();
+        let level = |v: Vec3| (v - camera.up * v.dot(camera.up)).normalize_or_zero();
+        let light = (1.0 * camera.up + 0.35 * level(back) - 0.55 * level(right)).normalize();
+        let from = look_at_mat4(center + 3.0 * radius * light, center, camera.axes()[1]);
+        let around = directx::orthographic(-radius, radius, -radius, radius, radius, 5.0 * radius);
+        let view = View {
+            view_projection: camera.projection(aspect, radius).to_cols_array_2d(),
+            light_projection: (around * from).to_cols_array_2d(),
+            eye: camera.eye().extend(camera.distance + 2.0 * radius).to_array(),
+            light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
+            up: camera.up.extend(pattern_edge(radius)).to_array(),
+            background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
+        };
+        self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+    }
+}
+
+const VIEW_WGSL: &str = include_str!("../../shaders/view/view.wgsl");
+const MESH_WGSL: &str = include_str!("../../shaders/view/mesh.wgsl");
+const LINE_WGSL: &str = include_str!("../../shaders/view/line.wgsl");
+
+/// Edge of the squares on the ground for a scene of this radius: a power of ten (m).
+fn pattern_edge(radius: f32) -> f32 {
+    10.0_f32.powf((radius.log10() - 0.5).round())
+}
+
+/// Whether something outside of `container` is on the side of it that the eye is on, and covers more than half of its length and
+/// of its height there: a wall.
+fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
+    let slack = 1e-3 * container.radius();
+    let covered = b.high.min(container.high) - b.low.max(container.low);
+    let is_wide = |k: usize| covered[k] > 0.5 * (container.high[k] - container.low[k]);
+    (0..3).any(|k| {
+        let above = eye[k] > container.high[k] && b.low[k] > container.high[k] - slack;
+        let below = eye[k] < container.low[k] && b.high[k] < container.low[k] + slack;
+        (above || below) && is_wide((k + 1) % 3) && is_wide((k + 2) % 3)
+    })
+}
+
+fn texture(
+    device: &wgpu::Device,
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+    sample_count: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn cleared_depth(view: &wgpu::TextureView, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store });
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
+}
+
+fn bind(
+    device: &wgpu::Device,
+    kinds: &[wgpu::BindingType],
+    resources: &[wgpu::BindingResource],
+) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
+    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty,
+        count: None,
+    };
+    let entries: Vec<_> = (0..).zip(kinds).map(entry).collect();
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+    let bound = (0..).zip(resources).map(|(binding, r)| wgpu::BindGroupEntry { binding, resource: r.clone() });
+    let entries: Vec<_> = bound.collect();
+    let group =
+        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    (layout, group)
+}
+
+fn layout_of<T>(step_mode: wgpu::VertexStepMode, attributes: &[wgpu::VertexAttribute]) -> wgpu::VertexBufferLayout<'_> {
+    wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
+}
+
+/// What tells one pipeline from another.
+struct Drawing<'a> {
+    layout: &'a wgpu::BindGroupLayout,
+    module: &'a wgpu::ShaderModule,
+    vertex: &'a str,
+    /// None draws depth only.
+    fragment: Option<&'a str>,
+    buffers: &'a [wgpu::VertexBufferLayout<'a>],
+    topology: wgpu::PrimitiveTopology,
+    depth: wgpu::CompareFunction,
+    format: wgpu::TextureFormat,
+    quality: Quality,
+}
+
+fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(d.vertex),
+        bind_group_layouts: &[Some(d.layout)],
+        immediate_size: 0,
+    });
+    let targets = [Some(d.format.into())];
+    let buffers: Vec<_> = d.buffers.iter().cloned().map(Some).collect();
+    let constants = [("SHADOW_REACH", f64::from(d.quality.shadow_reach))];
+    let compilation_options = wgpu::PipelineCompilationOptions::default;
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(d.vertex),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: d.module,
+            entry_point: Some(d.vertex),
+            compilation_options: compilation_options(),
+            buffers: &buffers,
+        },
+        fragment: d.fragment.map(|entry| wgpu::FragmentState {
+            module: d.module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: if entry == "shade" { &constants } else { &[] },
+                ..Default::default()
+            },
+            targets: &targets,
+        }),
+        primitive: wgpu::PrimitiveState { topology: d.topology, ..Default::default() },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(d.depth == wgpu::CompareFunction::Less),
+            depth_compare: Some(d.depth),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: if d.fragment.is_some() { d.quality.samples } else { 1 },
+            ..Default::default()
+        },
+        multiview_mask: None,
+        cache: None,
+    })
+}

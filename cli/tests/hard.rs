@@ -1,0 +1,67 @@
+//! The short hard cases with 32 substeps: which pass, and which are known not to.
+
+use drystone::preset::Preset;
+use drystone::{Backend, Cpu};
+use drystone_cli::hard::{Case, Setup};
+
+/// What fails, by the beginning of its name. docs/hard-cases.md has the numbers for all presets, and says why.
+const FAILS: &[(&str, &str)] = &[
+    ("H1", "1 under 10000: bodies out of place"),
+    ("H1", "1 under 100000: bodies out of place"),
+    ("H1", "1 under 100000: overlap"),
+    ("H1", "1 under 1000000: bodies out of place"),
+    ("H3", "20 cubes, top 1000 times"),
+    ("H4", "64 points: asymmetry"),
+    ("H6", "largest gap"),
+    ("H11", "way of what lies still"),
+    ("H11", "speed at any time"),
+    ("flip", "spin (0.01, 10, 0): energy"),
+    ("flip", "spin (1, 10, 0): energy"),
+    ("rolling", "disc, 60 degrees"),
+    ("rolling", "disc, 90 degrees"),
+    ("rolling", "box, 90 degrees"),
+];
+
+#[test]
+fn what_passes_passes_and_what_fails_is_known_to() {
+    let open = || Ok(Box::new(Cpu::new()) as Box<dyn Backend>);
+    let setup = Setup { config: Preset::Accurate.config().without_sleep(), open: &open };
+    let mut failed = Vec::new();
+    for case in Case::ALL.iter().filter(|c| !c.long) {
+        let checks = case.run(&setup).expect(case.name);
+        assert!(!checks.is_empty());
+        failed.extend(checks.into_iter().filter(|c| !c.passed).map(|c| (case.name, c)));
+    }
+    let known = |case: &str, what: &str| FAILS.iter().any(|(c, w)| *c == case && what.starts_with(w));
+    let surprises: Vec<_> = failed.iter().filter(|(case, check)| !known(case, &check.what)).collect();
+    assert!(surprises.is_empty(), "{surprises:#?}");
+    for (case, what) in FAILS {
+        let fails = failed.iter().any(|(c, check)| c == case && check.what.starts_with(what));
+        assert!(fails, "{case}: {what}: passes now, take it off the list");
+    }
+}
+
+#[test]
+fn no_number_passes_no_limit() {
+    use drystone_cli::hard::Check;
+    assert!(Check::at_most("x", 1.0, 1.0).passed && Check::at_least("x", 1.0, 1.0).passed);
+    for bad in [f64::NAN, 1.0 + 1e-9, f64::INFINITY] {
+        assert!(!Check::at_most("x", bad, 1.0).passed, "{bad}");
+    }
+    for bad in [f64::NAN, 1.0 - 1e-9, f64::NEG_INFINITY] {
+        assert!(!Check::at_least("x", bad, 1.0).passed, "{bad}");
+    }
+}
+
+#[test]
+fn an_unknown_case_is_answered_with_the_nearest_one_and_where_all_are() {
+    let message = Case::find("H13").err().expect("no such case").to_string();
+    assert!(
+        message.contains("H13")
+            && message.contains("did you mean \"H1")
+            && message.contains("hard --list")
+            && !message.contains('\n'),
+        "{message}"
+    );
+    assert_eq!(Case::find("h3").expect("a case").name, "H3");
+}

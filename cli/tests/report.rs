@@ -1,0 +1,145 @@
+//! `drystone report`: what is run, kept, gone on with and drawn.
+
+use std::cell::Cell;
+use std::path::Path;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use drystone::{Error, Result, Scene, SolverConfig};
+use drystone_cli::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
+
+/// Drystone with 1, 2 and 4 substeps.
+fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
+    let of = |substeps| {
+        let config = SolverConfig::default().with(|c| c.substeps = substeps);
+        Ok(Box::new(Drystone::new(scene, "cpu", &config)?) as Box<dyn Contender>)
+    };
+    [1, 2, 4].into_iter().map(of).collect()
+}
+
+/// Small scenes, run for a moment.
+fn scenes() -> Vec<Scene> {
+    let short = |word: &str| Scene { steps: 20, ..scene(word).expect("a scene of the catalogue") };
+    ["tower:n=2", "chain:links=2", "pile:n=8"].map(short).to_vec()
+}
+
+fn survey<'a>(team: &'a Team<'a>, out: &Path) -> Survey<'a> {
+    Survey { scenes: scenes(), teams: vec![team], extent: Extent::Full, problems: Vec::new(), out: out.to_owned() }
+}
+
+fn origin(build: &str) -> Origin {
+    Origin { build: build.into(), commit: "c0ffee".into(), machine: "a machine".into(), threads: 1 }
+}
+
+/// Scene and setting of every row, and the runs, in the order of the file.
+fn rows(out: &Path) -> (Vec<String>, Vec<String>) {
+    let mut reader = csv::Reader::from_path(out.join("scenes.csv")).expect("rows");
+    let rows: Vec<drystone_cli::report::front::Row> =
+        reader.deserialize().collect::<std::result::Result<_, _>>().unwrap();
+    let mut runs: Vec<_> = rows.iter().map(|row| row.run.clone()).collect();
+    runs.dedup();
+    (rows.iter().map(|row| format!("{} {}", row.scene, row.setting().label())).collect(), runs)
+}
+
+#[test]
+fn a_report_that_was_stopped_goes_on_where_it_stopped() {
+    let whole = tempfile::tempdir().unwrap();
+    survey(&three, whole.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    let (wanted, runs) = rows(whole.path());
+    assert_eq!((wanted.len(), runs.len()), (9, 3));
+
+    // Gives up in the third scene.
+    let folder = tempfile::tempdir().unwrap();
+    let asked = Cell::new(0);
+    let stops = |scene: &Scene, extent: Extent| {
+        asked.set(asked.get() + 1);
+        if asked.get() == 3 { Err(Error::input("stop")) } else { three(scene, extent) }
+    };
+    survey(&stops, folder.path()).run(&origin("a"), &mut |_| ()).map(|_| ()).unwrap_err();
+    let (part, before) = rows(folder.path());
+    assert_eq!(part, wanted[..6]);
+
+    let report = survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    let (all, after) = rows(folder.path());
+    assert_eq!((all, &after[..2]), (wanted.clone(), &before[..]));
+    report.write(folder.path()).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
+    assert!(after.iter().all(|run| html.contains(run)));
+
+    // Nothing is left to run, and drawing what is there gives the same page.
+    survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    assert_eq!(rows(folder.path()).1, after);
+    Report::read(folder.path()).unwrap().write(folder.path()).unwrap();
+    assert_eq!(std::fs::read_to_string(folder.path().join("index.html")).unwrap(), html);
+}
+
+#[test]
+fn rows_of_another_scene_program_or_setting_are_not_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |scenes: Vec<Scene>, team: &Team, build: &str| {
+        let survey = Survey { scenes, ..survey(team, folder.path()) };
+        survey.run(&origin(build), &mut |_| ()).unwrap();
+        rows(folder.path()).1.len()
+    };
+    let first = || scenes()[..1].to_vec();
+    assert_eq!(run(first(), &three, "a"), 1);
+    assert_eq!(run(first(), &three, "a"), 1);
+    assert_eq!(run(first(), &three, "b"), 2, "another program");
+    let mut heavier = first();
+    heavier[0].world.bodies[1].mass.mass *= 2.0;
+    assert_eq!(run(heavier, &three, "a"), 3, "another scene of that name");
+    let longer = first().into_iter().map(|scene| Scene { steps: 40, ..scene }).collect();
+    assert_eq!(run(longer, &three, "a"), 4, "more steps");
+    let more = |scene: &Scene, extent: Extent| {
+        let config = SolverConfig::default().with(|c| c.substeps = 3);
+        let mut all = three(scene, extent)?;
+        all.push(Box::new(Drystone::new(scene, "cpu", &config)?));
+        Ok(all)
+    };
+    assert_eq!(run(first(), &more, "a"), 5, "one more setting");
+    assert_eq!(run(first(), &three, "a"), 5, "all of these are there");
+}
+
+#[test]
+fn a_folder_with_other_rows_is_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scenes.csv");
+    std::fs::write(&path, "scene,hash\ntower,12\n").unwrap();
+    let message = survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("scenes.csv: line 2"), "{message}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "scene,hash\ntower,12\n");
+    let empty = tempfile::tempdir().unwrap();
+    let message = Report::read(empty.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("no rows to draw"), "{message}");
+}
+
+/// Numbers that no run gives, but a file may hold: each in each column that is a number, the page is drawn within seconds.
+#[test]
+fn a_page_is_drawn_of_any_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("scenes.csv")).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let first: Vec<&str> = lines[1].split(',').collect();
+    let real = |k: &usize| first[*k].contains(['.', 'e']) && first[*k].parse::<f64>().is_ok();
+    let columns: Vec<usize> = (0..first.len()).filter(real).collect();
+    assert!(columns.len() >= 10, "{columns:?}");
+    for number in ["1.7976931348623157e308", "-1.7976931348623157e308", "4.9e-324", "1e-310", "inf", "NaN", "0.0"] {
+        for &column in &columns {
+            let mut cells = first.clone();
+            cells[column] = number;
+            let other = tempfile::tempdir().unwrap();
+            let changed = [&lines[..1], &[&cells.join(",")], &lines[2..]].concat().join("\n");
+            std::fs::write(other.path().join("scenes.csv"), changed).unwrap();
+            let (done, when_done) = mpsc::channel();
+            std::thread::spawn(move || {
+                let drawn = Report::read(other.path()).and_then(|report| report.write(other.path()));
+                done.send(drawn.map(|page| std::fs::metadata(page).unwrap().len())).unwrap();
+            });
+            let name = lines[0].split(',').nth(column).unwrap();
+            let drawn = when_done.recv_timeout(Duration::from_secs(20));
+            let length = drawn.unwrap_or_else(|_| panic!("{name} = {number}: not drawn")).unwrap();
+            assert!(length < 1_000_000, "{name} = {number}: {length} bytes");
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! SimBenchmark's rolling test: 25 balls on a plate that is pushed. All move along the push with accelerations known on
+//! paper; published errors are the mean over 4 s of the squared velocity errors of the plate and the first ball [m²/s²].
+
+use drystone::config::FrictionRule;
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};
+use drystone_cli::hard::rolling_error;
+
+fn error(angle: f32, config: SolverConfig, backend: Box<dyn Backend>) -> f64 {
+    rolling_error(angle, |world| Simulation::new(world, config, backend)).expect("a run")
+}
+
+#[test]
+fn the_disc_is_right_in_every_direction() {
+    for angle in [90.0, 60.0] {
+        let error = error(angle, SolverConfig::default().without_sleep(), Box::new(Cpu::new()));
+        println!("{angle} degrees: {error:.1e}");
+        assert!(error < 1e-5, "{angle} degrees: {error:e}");
+    }
+}
+
+#[test]
+fn in_box_mode_a_plate_that_is_pushed_across_its_tangents_does_not_move() {
+    let config = || SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Box);
+    let across = error(60.0, config(), Box::new(Reference::<f32>::new()));
+    println!("60 degrees, box: {across:.4}");
+    assert!((across - 3.145).abs() < 0.005, "{across}");
+    let along = error(90.0, config(), Box::new(Reference::<f32>::new()));
+    println!("90 degrees, box: {along:.1e}");
+    assert!(along < 1e-5, "{along:e}");
+}

@@ -1,0 +1,34 @@
+//! The names of kinds in files, on command lines and in messages.
+
+/// Gives a kind without fields one name a value: `ALL`, `name`, `Display`, `FromStr`.
+macro_rules! named {
+    ($kind:ident { $($value:ident = $name:literal,)+ }) => {
+        impl $kind {
+            /// All, in their order.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$value),+];
+
+            /// Its name in files, on command lines and in messages.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$value => $name,)+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $kind {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                self.name().fmt(f)
+            }
+        }
+
+        impl std::str::FromStr for $kind {
+            type Err = $crate::error::Error;
+
+            fn from_str(name: &str) -> $crate::error::Result<Self> {
+                let unknown = || $crate::error::Error::input(format!("{name:?} is none of {}", [$($name),+].join(", ")));
+                Self::ALL.into_iter().find(|value| value.name() == name).ok_or_else(unknown)
+            }
+        }
+    };
+}
+pub(crate) use named;

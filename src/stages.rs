@@ -1,0 +1,63 @@
+//! The stages of a step one by one, and what the command shares with the library.
+//!
+//! Tests, measurements and backends need these parts; a program that steps a [`Simulation`](crate::Simulation) does not. They change
+//! from version to version.
+
+/// Contacts: tree over boxes, then persistent manifolds.
+pub mod collide {
+    pub use crate::collide::*;
+}
+
+/// Colors: no body twice in one.
+pub mod graph {
+    pub use crate::graph::*;
+}
+
+/// A step as a value: plain rows.
+pub mod problem {
+    pub use crate::problem::*;
+}
+
+/// The order of work as data: a list of passes.
+pub mod plan {
+    pub use crate::plan::*;
+}
+
+/// What a pass does to its rows; every function of a shader has a double of the same name here.
+pub mod kernels {
+    pub use crate::kernels::*;
+}
+
+/// The arithmetic of kernels, over one number or many.
+pub mod math {
+    pub use crate::math::*;
+}
+
+/// What backends rely on.
+pub mod backend {
+    pub use crate::backend::calibrate::crossover;
+    pub use crate::backend::checked::CheckedStep;
+    pub use crate::backend::cpu::peak::multiply_and_add;
+
+    /// The compute shaders: texts, bindings, constants.
+    #[cfg(feature = "gpu")]
+    pub mod shader {
+        pub use crate::backend::gpu::carry::CarryParams;
+        pub use crate::backend::gpu::shader::*;
+    }
+}
+
+/// Two backends on the same scene.
+pub mod compare {
+    pub use crate::compare::*;
+}
+
+/// Whether what is asked for fits into memory.
+pub mod memory {
+    pub use crate::memory::*;
+}
+
+/// The known name that is nearest to one that is not known.
+pub mod suggest {
+    pub use crate::suggest::*;
+}
