@@ -29,13 +29,13 @@ fn stages(c: &mut Criterion) {
     group.throughput(Throughput::Elements(simulation.next_problem(dt).expect("a step").0.contacts.len() as u64));
 
     let mut detector = Detector::new(&world);
-    detector.detect(&world, &config, dt, &[], &|_| ());
-    group.bench_function("detect, reused", |b| b.iter(|| detector.detect(&world, &config, dt, &[], &|_| ())));
+    detector.detect(&world, &config, dt, &[]);
+    group.bench_function("detect, reused", |b| b.iter(|| detector.detect(&world, &config, dt, &[])));
     let mut fresh = Detector::new(&world);
-    group.bench_function("detect, computed", |b| b.iter(|| fresh.detect(&world, &anew, dt, &[], &|_| ())));
+    group.bench_function("detect, computed", |b| b.iter(|| fresh.detect(&world, &anew, dt, &[])));
 
     let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
-    let touching = detector.pairs().filter(|p| !p.manifolds.is_empty());
+    let touching = detector.pairs().filter(|p| p.is_touching());
     let mut edges: Vec<_> =
         touching.map(|p| Edge { a: movable(p.body_a), b: movable(p.body_b), color: None, rank: p.rank() }).collect();
     let (mut graph, bodies) = (ConstraintGraph::default(), world.bodies.len());

@@ -35,13 +35,13 @@ fn fallen(scene: &Scene, simulation: &Simulation) -> usize {
 /// That what cannot move pushes up with the weight of all that can, so that nothing only hangs in the air.
 fn bears_its_weight(name: &str, simulation: &mut Simulation) {
     let substep = 1.0 / 60.0 / simulation.config().substeps as f32;
-    let (world, pairs) = simulation.world_and_pairs();
-    let is_fixed = |body: u32| world.bodies[body as usize].kind == BodyKind::Fixed;
+    let manifolds: Vec<_> = simulation.manifolds().collect();
+    let world = &simulation.world;
+    let is_fixed = |body: usize| world.bodies[body].kind == BodyKind::Fixed;
     let mut pushed = Vec3::ZERO;
-    for pair in pairs.filter(|pair| is_fixed(pair.body_a) || is_fixed(pair.body_b)) {
-        let own = pair.manifolds.iter().flat_map(|m| m.points().iter().map(|p| (m.normal * p.normal_impulse, p)));
-        let sum: Vec3 = own.map(|(normal, p)| normal + p.friction_impulse).sum();
-        pushed += if is_fixed(pair.body_a) { sum } else { -sum };
+    for m in manifolds.iter().filter(|m| is_fixed(m.body_a) || is_fixed(m.body_b)) {
+        let sum: Vec3 = m.points().iter().map(|p| m.normal * p.normal_impulse + p.friction_impulse).sum();
+        pushed += if is_fixed(m.body_a) { sum } else { -sum };
     }
     let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
     let weight = -world.gravity * dynamic.map(|b| b.mass.mass).sum::<f32>() * substep;

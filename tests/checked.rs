@@ -69,7 +69,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 24] = [
+    let cases: [(&str, Break); 27] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -85,29 +85,32 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("inertias[1]: body", |p, _| p.inertias[1] = InertiaRow { ..p.inertias[0] }),
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),
         ("contacts[0].point_count = 5", |p, _| p.contacts[0].point_count = 5),
-        ("contacts[1].first_point", |p, _| p.contacts[1].first_point += 1),
-        ("contacts[1].first_point", |p, _| {
-            // One point more is taken for a patch, which every other contact lacks.
-            p.points.push(p.points[0]);
-            p.impulses.push(p.impulses[0]);
-            p.params.point_count += 1;
+        ("contacts[0].first_point", |p, _| p.contacts[0].first_point = p.points.len() as u32),
+        ("contacts[2].first_point = 0: points of contacts[0] are there", |p, _| {
+            p.contacts[2].first_point = 0;
+            p.order.sort_unstable_by_key(|&row| row);
+            p.colors = vec![0, p.order.len() as u32];
+            p.first_joint_color = 1;
+            p.order.retain(|&row| row == 0 || row == 2);
+            p.order.dedup();
+            p.colors[1] = 2;
         }),
-        ("points: ", |p, _| {
-            // The contacts but one are gone, their points are not.
-            p.contacts.truncate(1);
-            p.points.truncate(p.contacts[0].point_count as usize + 2);
-            p.impulses.truncate(p.points.len());
-            p.params.point_count = p.points.len() as u32;
+        ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32),
+        ("colors: must ascend", |p, _| p.colors[1] = u32::MAX),
+        ("colors: must ascend", |p, _| p.colors[0] = 1),
+        ("colors: must ascend", |p, _| *p.colors.last_mut().expect("joints") += 1),
+        ("colors: must ascend", |p, _| p.colors.clear()),
+        ("order: contact 999999, but there are", |p, _| p.order[0] = 999_999),
+        ("order: contact 0 occurs twice", |p, _| p.order[..2].fill(0)),
+        ("order: joint 999999, but there are", |p, _| *p.order.last_mut().expect("joints") = 999_999),
+        ("order: joint 0 occurs twice", |p, _| {
+            let joints = p.order.len() - 2;
+            p.order[joints..].fill(0);
         }),
-        ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32 + 1),
-        ("colors of contacts", |p, _| p.colors[1] = u32::MAX),
-        ("colors of contacts", |p, _| p.colors[0] = 1),
-        ("colors of contacts", |p, _| p.colors[p.first_joint_color as usize - 1] -= 1),
-        ("colors of joints", |p, _| *p.colors.last_mut().expect("joints") += 1),
         ("color 0: body", |p, _| {
             // All contacts in one color.
-            p.colors.splice(1..p.first_joint_color as usize - 1, []);
-            p.first_joint_color = 2;
+            p.colors.splice(1..p.first_joint_color as usize, []);
+            p.first_joint_color = 1;
         }),
     ];
     for (start, spoil) in cases {
@@ -124,7 +127,7 @@ fn a_joint_color_with_a_body_twice_is_refused() {
     let (mut problem, plan) = step(&[]);
     let first = problem.first_joint_color as usize;
     problem.colors.truncate(first + 1);
-    problem.colors.push(problem.joints.len() as u32);
+    problem.colors.push(problem.order.len() as u32);
     let line = refusal(problem, &plan.passes[..1]).expect("refused");
     assert!(line.contains("occurs twice, and can move"), "{line}");
 }
@@ -136,14 +139,14 @@ fn passes_over_colors_that_are_not_there_are_refused() {
     let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
     let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));
     let bodies = of(|k| matches!(k, Kernel::IntegratePositions));
-    let all = problem.colors.len() as u32;
+    let all = problem.colors.len() as u32 - 1;
     #[allow(clippy::reversed_empty_ranges)]
     for (pass, colors) in [
-        (contacts, 0..problem.first_joint_color),
+        (contacts, 0..problem.first_joint_color + 1),
         (contacts, problem.first_joint_color..problem.first_joint_color + 1),
         (contacts, 2..1),
         (joints, 0..1),
-        (joints, problem.first_joint_color..all),
+        (joints, problem.first_joint_color..all + 1),
         (bodies, 0..1),
     ] {
         let mut passes = plan.passes.clone();

@@ -248,10 +248,9 @@ fn every_interface_of_a_tower_carries_what_stands_on_it(open: Open) {
     for _ in 0..900 {
         simulation.step(1.0 / 60.0).unwrap();
     }
-    for pair in simulation.pairs() {
-        let points = pair.manifolds.iter().flat_map(|m| m.points());
-        let force: f64 = points.map(|p| f64::from(p.normal_impulse)).sum::<f64>() / substep;
-        let above = n + 1 - pair.body_a.max(pair.body_b) as usize;
+    for manifold in simulation.manifolds() {
+        let force = manifold.points().iter().map(|p| f64::from(p.normal_impulse)).sum::<f64>() / substep;
+        let above = n + 1 - manifold.body_a.max(manifold.body_b);
         // A17: 1e-3 of the force.
         holds("interface", force, above as f64 * 1000.0 * G, 1e-3);
     }

@@ -9,7 +9,7 @@ use drystone::config::{FrictionAt, FrictionRule};
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::Difference;
-use drystone::stages::problem::carry::{Carry, NO_ROW};
+use drystone::stages::problem::carry::Carry;
 use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
@@ -20,8 +20,8 @@ tests! {
         what_somebody_changes_between_two_steps_reaches_the_device,
         islands_fall_asleep_and_wake_with_their_impulses,
         a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
-        two_rows_in_each_others_places_are_found,
-        places_that_were_not_there_are_refused,
+        impulses_at_the_wrong_points_are_found,
+        rows_that_are_not_there_are_refused,
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
         a_device_carries_no_friction_that_a_surface_lost,
         a_device_takes_the_points_that_are_sent,
@@ -29,7 +29,7 @@ tests! {
     any_gpu {
         the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart,
         a_small_world_is_one_dispatch_after_those_that_carry_its_rows,
-        a_falling_pile_sends_what_was_computed_and_where_the_rest_was,
+        a_falling_pile_sends_what_was_computed_and_the_order,
     }
 }
 
@@ -41,14 +41,19 @@ fn pile(n: usize) -> Scene {
     Scene::find("pile", &[format!("n={n}")]).expect("a scene of the catalogue")
 }
 
-/// Everything that a step leaves behind, as bytes.
-fn rows(problem: &StepProblem) -> [&[u8]; 5] {
+/// Everything that a step leaves behind, as bytes: of the contacts those that take part, in the order of the sweeps.
+fn rows(problem: &StepProblem) -> [Vec<u8>; 5] {
+    let patch = problem.params.patches;
+    let own = |c: &ContactRow| c.first_point as usize..(c.first_point + c.point_count + patch) as usize;
+    let contacts: Vec<_> = problem.swept_contacts().copied().collect();
+    let points: Vec<_> = contacts.iter().flat_map(|c| problem.points[own(c)].iter().copied()).collect();
+    let impulses: Vec<_> = contacts.iter().flat_map(|c| problem.impulses[own(c)].iter().copied()).collect();
     [
-        bytemuck::cast_slice(&problem.bodies),
-        bytemuck::cast_slice(&problem.contacts),
-        bytemuck::cast_slice(&problem.points),
-        bytemuck::cast_slice(&problem.impulses),
-        bytemuck::cast_slice(&problem.joint_impulses),
+        bytemuck::cast_slice(&problem.bodies).to_vec(),
+        bytemuck::cast_slice(&contacts).to_vec(),
+        bytemuck::cast_slice(&points).to_vec(),
+        bytemuck::cast_slice(&impulses).to_vec(),
+        bytemuck::cast_slice(&problem.joint_impulses).to_vec(),
     ]
 }
 
@@ -83,8 +88,8 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
         match step % 12 {
             0 => assert_same(&mut both, &what),
             4 => {
-                let pairs = both.each_mut().map(|s| s.pairs().map(|pair| format!("{pair:?}")).collect::<Vec<_>>());
-                assert_eq!(pairs[0], pairs[1], "{what}");
+                let manifolds = both.each_mut().map(|s| s.manifolds().map(|manifold| format!("{manifold:?}")).collect::<Vec<_>>());
+                assert_eq!(manifolds[0], manifolds[1], "{what}");
             }
             // Detections between two steps.
             7 => {
@@ -162,7 +167,7 @@ fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
     assert_same(&mut both, "at the end");
 }
 
-/// A GPU whose map of rows has a mistake.
+/// A GPU that is told wrong things of the rows that were written again.
 struct Confused(drystone::Gpu, fn(&mut Carry));
 
 impl Backend for Confused {
@@ -177,7 +182,7 @@ impl Backend for Confused {
     }
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let mut carry = carry.clone();
-        if carry.rows_before.len() > 1 {
+        if carry.written.len() > 1 {
             (self.1)(&mut carry);
         }
         self.0.step(step, &carry)
@@ -190,10 +195,11 @@ impl Backend for Confused {
     }
 }
 
-fn two_rows_in_each_others_places_are_found() {
+fn impulses_at_the_wrong_points_are_found() {
     let scene = pile(60);
     let [mut ours, _] = both(&scene, &SolverConfig::default().without_sleep());
-    let confused = Confused(gpu::exact(), |carry| carry.rows_before.swap(0, 1));
+    let reverse = |carry: &mut Carry| carry.written.iter_mut().for_each(|written| written.points_before.reverse());
+    let confused = Confused(gpu::exact(), reverse);
     let mut theirs = simulation(&scene, &SolverConfig::default().without_sleep(), Box::new(confused));
     for _ in 0..80 {
         ours.step(scene.dt).expect("a step");
@@ -202,24 +208,14 @@ fn two_rows_in_each_others_places_are_found() {
     assert_ne!(rows(ours.problem()), rows(theirs.problem()));
 }
 
-/// Kernels would read other rows in their place.
-fn places_that_were_not_there_are_refused() {
-    let spoils: [fn(&mut Carry); 6] = [
-        |carry| carry.rows_before.push(0),
-        |carry| carry.rows_before.iter_mut().filter(|row| **row != NO_ROW).take(1).for_each(|row| *row = 1 << 20),
-        |carry| carry.computed.truncate(carry.computed.len().saturating_sub(1)),
-        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.row = 1 << 20),
-        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.contact = 1 << 20),
-        |carry| carry.computed.iter_mut().take(1).for_each(|origin| origin.points[0] = 1 << 20),
-    ];
+/// Kernels would write other rows in their place.
+fn rows_that_are_not_there_are_refused() {
     let scene = pile(60);
-    for (i, spoil) in spoils.into_iter().enumerate() {
-        let confused = Box::new(Confused(gpu::exact(), spoil));
-        let mut simulation = simulation(&scene, &SolverConfig::default().without_sleep(), confused);
-        let line =
-            (0..80).find_map(|_| simulation.step(scene.dt).err()).unwrap_or_else(|| panic!("case {i} was taken"));
-        assert!(line.to_string().starts_with("carry: names rows"), "case {i}: {line}");
-    }
+    let spoil = |carry: &mut Carry| carry.written.iter_mut().take(1).for_each(|written| written.row = 1 << 20);
+    let confused = Box::new(Confused(gpu::exact(), spoil));
+    let mut simulation = simulation(&scene, &SolverConfig::default().without_sleep(), confused);
+    let line = (0..80).find_map(|_| simulation.step(scene.dt).err()).expect("the row is refused");
+    assert!(line.to_string().starts_with("carry: names contacts"), "{line}");
 }
 
 /// What each of the last steps of a scene moved to the device and back, and the simulation.
@@ -231,7 +227,7 @@ fn traffic_of(scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation
 
 /// Bytes of all rows of a problem.
 fn all_rows(problem: &StepProblem) -> usize {
-    rows(problem).map(<[u8]>::len).iter().sum::<usize>() + size_of_val(&problem.masses[..])
+    rows(problem).iter().map(Vec::len).sum::<usize>() + size_of_val(&problem.masses[..])
 }
 
 /// What comes back from every step.
@@ -245,9 +241,9 @@ fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() 
     assert!(first[0].up as usize >= all_rows(simulation.problem()), "{first:?}");
     let (settled, mut simulation) = traffic_of(&scene, 400, 10);
     let problem = simulation.problem();
-    let separations = size_of_val(&problem.points[..]) / size_of::<PointRow>() * size_of::<f32>();
+    let separations = 4 * size_of::<f32>() * problem.swept_contacts().count();
     let least = settled.iter().map(|t| t.up).min().expect("ten steps") as usize;
-    let (all, contacts) = (all_rows(problem), problem.contacts.len());
+    let (all, contacts) = (all_rows(problem), problem.swept_contacts().count());
     measured!("{contacts} manifolds: {least} B up of {all} B of rows, {separations} B of them separations");
     // Nothing but separations and the words of the carry itself.
     assert!((separations..separations + 512).contains(&least), "{settled:?}");
@@ -259,23 +255,21 @@ fn a_small_world_is_one_dispatch_after_those_that_carry_its_rows() {
     let scene = Scene::find("tower", &[]).expect("a scene of the catalogue");
     let (settled, simulation) = traffic_of(&scene, 100, 1);
     assert!(simulation.plan().passes.len() > 20);
-    // begin_bodies and begin_contacts; carry_contacts where a manifold was computed.
+    // begin_bodies and begin_contacts; write_contacts where a manifold was computed.
     assert!((3..=4).contains(&settled[0].dispatches), "{settled:?}");
     let (settled, simulation) = traffic_of(&pile(400), 2, 1);
     assert!(settled[0].dispatches > simulation.plan().passes.len());
 }
 
-fn a_falling_pile_sends_what_was_computed_and_where_the_rest_was() {
+fn a_falling_pile_sends_what_was_computed_and_the_order() {
     let scene = pile(200);
     let mut steps = 0;
     let (_, mut simulation) = traffic_of(&scene, 60, 1);
     for _ in 0..30 {
         let stats = simulation.step(scene.dt).expect("a step");
-        let (manifolds, points) = (stats.manifolds, stats.points);
-        // A place and separations for all, rows and an origin for those that were computed.
-        let computed =
-            stats.computed * (size_of::<ContactRow>() + 4 * (size_of::<PointRow>() + size_of::<ImpulseRow>()) + 24);
-        let most = manifolds * 8 + points * 4 + computed + 1024;
+        // Four separations and a place in the order for all, rows for those that were computed.
+        let computed = stats.computed * (size_of::<ContactRow>() + 4 * size_of::<PointRow>() + 8);
+        let most = stats.manifolds * (16 + 4) + computed + 2048;
         assert!(stats.traffic.up as usize <= most, "{:?} of {most}: {stats:?}", stats.traffic);
         assert_eq!(stats.traffic.down as usize, simulation.world.bodies.len() * size_of::<BodyRow>() + 32);
         steps += usize::from(stats.computed > 0 && stats.computed < stats.pairs);

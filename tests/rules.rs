@@ -250,8 +250,8 @@ fn a_pair_says_how_far_its_surfaces_are_apart_whatever_they_are_preloaded_by() {
     for _ in 0..5 {
         run(&mut simulation, 60, DT);
         let above = simulation.world.bodies[1].position.y - 0.5;
-        let pair = simulation.pairs().next().expect("they touch").clone();
-        let [manifold] = &pair.manifolds[..] else { panic!("one manifold") };
+        let manifolds: Vec<_> = simulation.manifolds().collect();
+        let [manifold] = &manifolds[..] else { panic!("one manifold") };
         assert!(manifold.preload > 1e-4, "{} m", manifold.preload);
         for point in manifold.points() {
             // Of the step that has run: as it was when that began.
@@ -329,9 +329,9 @@ fn arms_end_midway_between_the_surfaces() {
     world.add(ball().position(0.0, 0.51, 0.0));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 1, DT);
-    let pair = simulation.pairs().next().expect("near enough").clone();
-    let point = pair.manifolds[0].points()[0];
-    let bodies = [pair.body_a, pair.body_b].map(|b| simulation.world.bodies[b as usize].position);
+    let manifold = simulation.manifolds().next().expect("near enough");
+    let point = manifold.points()[0];
+    let bodies = [manifold.body_a, manifold.body_b].map(|b| simulation.world.bodies[b].position);
     for (center, arm) in bodies.into_iter().zip([point.r_a, point.r_b]) {
         near("height of the contact [m]", (center + arm).y, 0.005, 1e-6);
     }
@@ -399,8 +399,8 @@ fn a_cylinder_that_stands_is_flat_and_one_that_lies_is_round() {
         world.add(Body::dynamic().shape(Shape::cylinder(0.5, 0.3)).rotation(turn).position(0.0, height, 0.0));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         run(&mut simulation, 1, DT);
-        let manifold = simulation.pairs().next().expect("it touches").manifolds[0].clone();
-        assert_eq!(manifold.radius_a.max(manifold.radius_b), radius);
+        let row = *simulation.problem().swept_contacts().next().expect("it touches");
+        assert_eq!(row.radius_a.max(row.radius_b), radius);
     }
 }
 
@@ -440,11 +440,10 @@ fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
         let mut simulation = on_a_slope(SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
         let up = -1000.0 * simulation.world.gravity * DT / 8.0;
-        let pair = simulation.pairs().next().expect("it lies").clone();
-        let manifold = &pair.manifolds[0];
+        let manifold = simulation.manifolds().next().expect("it lies");
         let pushed = manifold.points().iter().map(|p| manifold.normal * p.normal_impulse + p.friction_impulse);
         let total = pushed.sum::<Vec3>() + manifold.friction_impulse;
-        let total = if pair.body_a == 1 { -total } else { total };
+        let total = if manifold.body_a == 1 { -total } else { total };
         assert!(total.distance(up) < 0.01 * up.length(), "{friction_at:?}: {total} N s, not {up}");
     }
     // A spin that friction stops: its impulse about the vertical, -mu N d at the most.
@@ -453,9 +452,8 @@ fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
     simulation.world.gravity = Vec3::NEG_Y * G;
     simulation.world.bodies[1].angular_velocity = Vec3::Y * 6.0;
     run(&mut simulation, 6, DT);
-    let pair = simulation.pairs().next().expect("it lies").clone();
-    let manifold = &pair.manifolds[0];
-    let borne: f32 = manifold.points().iter().map(|p| p.normal_impulse).sum();
+    let manifold = simulation.manifolds().next().expect("it lies");
+    let borne = manifold.normal_impulse();
     near("twist [N m s]", manifold.twist_impulse.abs(), 0.7 * borne * 0.5_f32.sqrt(), 0.02 * borne);
 }
 
@@ -503,7 +501,7 @@ fn a_contact_keeps_its_color_while_it_lasts() {
     let (mut kept, mut anew, mut begun) = (0, 0, 0);
     for step in 0..90 {
         anew += run(&mut simulation, 1, DT).computed;
-        let colors = simulation.pairs().flat_map(|p| p.manifolds.iter().map(|m| ((p.body_a, p.body_b), m.color)));
+        let colors = simulation.manifolds().map(|m| ((m.body_a, m.body_b), m.color));
         let now: HashMap<_, _> = colors.collect();
         for (pair, color) in &now {
             match known.get(pair) {

@@ -3,7 +3,7 @@
 #![allow(clippy::field_reassign_with_default)]
 
 use drystone::StepProblem;
-use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
@@ -53,6 +53,8 @@ impl Random {
 const BODIES: u32 = 200;
 /// Contacts of a random problem: some of its colors are then larger than a workgroup.
 const CONTACTS: u32 = 600;
+/// Contacts that take no part.
+const IDLE: usize = 5;
 /// Joints of a random problem.
 const JOINTS: u32 = 300;
 
@@ -72,10 +74,11 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
             problem.inertias.push(inertia_row(random, body));
         }
     }
-    let (contacts, colors) = in_color_order(random, CONTACTS);
-    problem.first_joint_color = colors.len() as u32;
-    problem.colors = colors;
-    for bodies in contacts {
+    let (contacts, coloring) = colored(random, CONTACTS);
+    problem.first_joint_color = coloring.color_count() as u32;
+    (problem.order, problem.colors) = (coloring.order, coloring.offsets);
+    // The last of them take no part.
+    for bodies in contacts.into_iter().chain([[1, 2]; IDLE]) {
         let first_point = problem.points.len() as u32;
         let point_count = 1 + random.below(4);
         problem.contacts.push(contact_row(random, bodies, first_point, point_count));
@@ -84,8 +87,9 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
             problem.impulses.push(impulse_row(random, row == point_count));
         }
     }
-    let (joints, colors) = in_color_order(random, JOINTS);
-    problem.colors.extend(colors);
+    let (joints, coloring) = colored(random, JOINTS);
+    problem.colors.extend(coloring.offsets[1..].iter().map(|end| end + CONTACTS));
+    problem.order.extend(coloring.order);
     for bodies in joints {
         problem.joints.push(joint_row(random, bodies));
         let mut impulse = JointImpulseRow::default();
@@ -157,13 +161,13 @@ fn params(problem: &StepProblem) -> Params {
 }
 
 /// The bodies of `count` random constraints in color order, and where each color begins and the last ends.
-fn in_color_order(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Vec<u32>) {
+fn colored(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Coloring) {
     let pairs: Vec<_> = (0..count).map(|_| random_pair(random)).collect();
     let place = |body: u32| if is_movable(body) { body } else { IMMOVABLE };
     let mut edges: Vec<_> =
         pairs.iter().map(|&[a, b]| Edge { a: place(a), b: place(b), color: None, rank: 0 }).collect();
     let coloring = ConstraintGraph::default().color(BODIES as usize, &mut edges, 64);
-    (coloring.order.iter().map(|&i| pairs[i as usize]).collect(), coloring.offsets)
+    (pairs, coloring)
 }
 
 fn random_pair(random: &mut Random) -> [u32; 2] {
