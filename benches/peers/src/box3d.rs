@@ -65,6 +65,7 @@ impl Box3d {
                 BodyKind::Fixed => b3BodyType_b3_staticBody,
                 BodyKind::Kinematic => b3BodyType_b3_kinematicBody,
                 BodyKind::Dynamic => b3BodyType_b3_dynamicBody,
+                other => return Err(Error::input(format!("box3d has no kind like {other:?} of body {index}"))),
             };
             def.position = vec3(body.position);
             def.rotation = quat(body.rotation);

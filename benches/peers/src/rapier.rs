@@ -28,7 +28,7 @@ impl Rapier {
         parameters.static_contact_softness.natural_frequency = 2.0 * hertz;
         set_threads(&mut physics, threads)?;
 
-        let handles: Vec<_> = world.bodies.iter().map(|body| insert(&mut physics, body)).collect();
+        let handles: Vec<_> = world.bodies.iter().map(|body| insert(&mut physics, body)).collect::<Result<_>>()?;
         // The body that stands for the world in joints to it.
         let ground = physics.insert_body(RigidBodyBuilder::fixed());
         for joint in &world.joints {
@@ -46,7 +46,7 @@ impl Rapier {
     }
 }
 
-fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {
+fn insert(physics: &mut PhysicsWorld, body: &Body) -> Result<RigidBodyHandle> {
     let builder = match body.kind {
         BodyKind::Fixed => RigidBodyBuilder::fixed(),
         // Any mass at its origin, which it turns about: colliders have none to say where its center is.
@@ -57,6 +57,7 @@ fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {
             let mass = MassProperties::with_principal_inertia_frame(center, mass, principal_inertia, principal_frame);
             RigidBodyBuilder::dynamic().additional_mass_properties(mass)
         }
+        other => return Err(Error::input(format!("Rapier has no kind like {other:?}"))),
     };
     let builder = builder.pose(Pose::from_parts(body.position, body.rotation)).can_sleep(false);
     let handle = physics.insert_body(builder.linvel(body.linear_velocity).angvel(body.angular_velocity));
@@ -72,7 +73,7 @@ fn insert(physics: &mut PhysicsWorld, body: &Body) -> RigidBodyHandle {
         physics.insert_collider(builder, Some(handle));
     }
     physics.bodies[handle].add_force(body.force, true);
-    handle
+    Ok(handle)
 }
 
 #[cfg(feature = "parallel")]
