@@ -50,19 +50,15 @@ fn stages(c: &mut Criterion) {
     group.bench_function("color, kept", |b| b.iter(|| graph.color(bodies, &mut edges, config.max_colors)));
 
     let mut problem = StepProblem::default();
-    group.bench_function("rows, from nothing", |b| {
-        b.iter_batched_ref(
-            Prepared::default,
-            |prepared| {
-                prepared.color(&world, &mut detector, &mut graph, config.max_colors);
-                prepared.prepare(&world, &[], &detector, &config, dt, &mut problem);
-            },
-            BatchSize::LargeInput,
-        );
-    });
     let mut prepared = Prepared::default();
-    prepared.color(&world, &mut detector, &mut graph, config.max_colors);
-    prepared.prepare(&world, &[], &detector, &config, dt, &mut problem);
+    prepared.follow(&world, &mut detector);
+    prepared.color(&world, config.max_colors);
+    group.bench_function("rows, written again", |b| {
+        b.iter(|| {
+            prepared.write_again();
+            prepared.prepare(&world, &[], &detector, &config, dt, &mut problem);
+        });
+    });
     group.bench_function("rows, carried", |b| {
         b.iter(|| prepared.prepare(&world, &[], &detector, &config, dt, &mut problem));
     });

@@ -10,7 +10,7 @@ use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::Difference;
 use drystone::stages::problem::carry::Carry;
-use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, ImpulseRow, MomentumRow, PointRow};
+use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 

@@ -82,7 +82,7 @@ mod layouts {
             Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
             Params = Params {
                 substep inverse_substep restitution_threshold inertia_count movable fixed joint
-                body_count point_count slop relaxation tolerance joint_count
+                body_count point_count slop relaxation tolerance joint_count patches
             }
             PassColors = PassColors { first end }
         }
@@ -187,8 +187,9 @@ fn every_binding_stands_where_its_name_stands_in_the_list() {
 mod carry {
     use super::*;
     use drystone::stages::backend::shader::CarryParams;
+    use drystone::stages::collide::MAX_POINTS;
     use drystone::stages::backend::shader::{CARRY, CARRY_BINDINGS};
-    use drystone::stages::problem::carry::{NO_ROW, Origin, Preload};
+    use drystone::stages::problem::carry::{NO_POINT, Preload, Written};
 
     fn reflected(program: Program) -> Reflected {
         Reflected::new(&program.source(), program.name(), &program.constants()).unwrap_or_else(|e| panic!("{e}"))
@@ -219,10 +220,10 @@ mod carry {
     #[test]
     fn every_binding_has_the_number_of_its_name() {
         let name_of = |at: usize| BINDINGS.get(at).copied().unwrap_or_else(|| CARRY_BINDINGS[at - BINDINGS.len()]);
-        let module = parsed(&Program::CarryContacts.source());
+        let module = parsed(&Program::WriteContacts.source());
         let bound: Vec<_> = module.global_variables.iter().filter_map(|(_, v)| Some((v.binding?, v))).collect();
         // All but that of a plan that one workgroup follows.
-        assert_eq!(bound.len(), 5 + CARRY_BINDINGS.len() - 1);
+        assert_eq!(bound.len(), 6 + CARRY_BINDINGS.len() - 1);
         for (at, variable) in bound {
             assert_eq!(variable.name.as_deref(), Some(name_of(at.binding as usize)));
             assert_eq!(variable.space == naga::AddressSpace::Uniform, at.binding == CARRY);
@@ -231,7 +232,7 @@ mod carry {
 
     #[test]
     fn every_struct_has_the_layout_of_its_twin() {
-        let theirs = layouts::in_wgsl(&Program::CarryContacts.source());
+        let theirs = layouts::in_wgsl(&Program::WriteContacts.source());
         let fields = |name: &str| theirs[name].fields.clone();
         let own = |fields: &[(&str, usize)]| BTreeMap::from_iter(fields.iter().map(|&(n, at)| (n.to_owned(), at)));
         let preload = [
@@ -245,24 +246,22 @@ mod carry {
             ("preload", offset_of!(CarryParams, preload)),
             ("body_count", offset_of!(CarryParams, body_count)),
             ("contact_count", offset_of!(CarryParams, contact_count)),
-            ("contacts_before", offset_of!(CarryParams, contacts_before)),
+            ("order", offset_of!(CarryParams, order)),
+            ("written_count", offset_of!(CarryParams, written_count)),
             ("patches", offset_of!(CarryParams, patches)),
             ("has_points", offset_of!(CarryParams, has_points)),
         ];
         assert_eq!(fields("Carry"), own(&carry));
         assert!(theirs["Carry"].size <= size_of::<CarryParams>());
-        let origin = [
-            ("row", offset_of!(Origin, row)),
-            ("contact", offset_of!(Origin, contact)),
-            ("points", offset_of!(Origin, points)),
-        ];
-        assert_eq!((fields("Origin"), theirs["Origin"].size), (own(&origin), size_of::<Origin>()));
-        assert_eq!(theirs["Place"].size, size_of::<[u32; 2]>());
-        let constants = parsed(&Program::CarryContacts.source());
-        let no_row =
-            constants.constants.iter().find(|(_, c)| c.name.as_deref() == Some("NO_ROW")).expect("the constant");
-        let value = &constants.global_expressions[no_row.1.init];
-        assert!(matches!(value, naga::Expression::Literal(naga::Literal::U32(x)) if *x == NO_ROW), "{value:?}");
+        let written =
+            [("row", offset_of!(Written, row)), ("points_before", offset_of!(Written, points_before))];
+        assert_eq!((fields("Written"), theirs["Written"].size), (own(&written), size_of::<Written>()));
+        // A point that is new is one more than the last.
+        let constants = parsed(&Program::WriteContacts.source());
+        let most = constants.constants.iter().find(|(_, c)| c.name.as_deref() == Some("MAX_POINTS"));
+        let value = &constants.global_expressions[most.expect("the constant").1.init];
+        let same = |x: u32| x == u32::from(NO_POINT) && x as usize == MAX_POINTS;
+        assert!(matches!(value, naga::Expression::Literal(naga::Literal::U32(x)) if same(*x)), "{value:?}");
     }
 }
 
