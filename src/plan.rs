@@ -148,7 +148,7 @@ pub struct StepPlan {
 }
 
 /// What a plan was made for, besides the settings and what is in the rows of contacts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     first_joint_color: u32,
@@ -157,6 +157,12 @@ pub(crate) struct PlanKey {
 }
 
 impl PlanKey {
+    /// Whether it is that of the plan of a problem.
+    pub fn is_of(&self, problem: &StepProblem) -> bool {
+        let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
+        others == (self.first_joint_color, self.has_inertias, self.is_long_enough) && self.colors == problem.colors
+    }
+
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         Self {

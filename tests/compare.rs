@@ -99,7 +99,8 @@ fn whatever_a_backend_gives_back_is_compared() {
     problem.joints.push(JointRow { body_a: 30, body_b: 31, ..JointRow::default() });
     problem.joint_impulses.push(JointImpulseRow::default());
     problem.params.joint_count = 1;
-    problem.colors.extend([0, 1]);
+    problem.order.push(0);
+    problem.colors.push(problem.order.len() as u32);
     let spoils: [fn(&mut StepProblem); 5] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
         |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),

@@ -156,11 +156,8 @@ fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
     let of = |row: &drystone::stages::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         let points = &problem.points[own.clone()];
-        let values = points
-            .iter()
-            .zip(&problem.impulses[own])
-            .map(|(p, i)| [p.separation, row.preload, i.normal])
-            .collect();
+        let values =
+            points.iter().zip(&problem.impulses[own]).map(|(p, i)| [p.separation, row.preload, i.normal]).collect();
         ((row.body_a, row.body_b, points.iter().map(|p| arms(p.r_a, p.r_b)).collect()), values)
     };
     problem.swept_contacts().map(of).collect()

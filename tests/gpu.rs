@@ -244,7 +244,7 @@ fn a_device_tells_how_long_it_was_at_what() {
         let (wall, sum) = (start.elapsed(), stats.kernels.iter().map(|k| k.time).sum::<std::time::Duration>());
         assert!(sum <= wall && !sum.is_zero(), "{sum:?} of {wall:?}");
         let planned = simulation.plan().passes.iter().map(|pass| pass.kernel.name());
-        let carried = ["begin_bodies", "carry_contacts", "begin_contacts"];
+        let carried = ["begin_bodies", "write_contacts", "begin_contacts"];
         let named = |name: &str| stats.kernels.iter().filter(|k| k.kernel == name).count();
         assert!(planned.clone().all(|name| named(name) == 1), "{:?}", stats.kernels);
         let known = |name: &str| planned.clone().any(|p| p == name) || (step > 1 && carried.contains(&name));

@@ -168,14 +168,14 @@ fn joints_are_swept_before_contacts() {
     let (plan, ..) = planned(world, config);
     let expected = "\
 integrate_velocities
-warm_start_joints over colors 2
+warm_start_joints over colors 1
 warm_start(disc friction) over colors 0
-solve_joints(biased) over colors 2
+solve_joints(biased) over colors 1
 solve_contacts(biased) over colors 0
-solve_joints(biased) over colors 2
+solve_joints(biased) over colors 1
 solve_contacts(biased) over colors 0
 integrate_positions
-solve_joints() over colors 2
+solve_joints() over colors 1
 solve_contacts(disc friction) over colors 0
 ";
     assert_eq!(plan.to_string(), expected);
@@ -214,7 +214,7 @@ fn every_setting_of_a_sweep_is_in_the_plan() {
     let (plan, ..) = planned(row(&cube(), 0.5, 0.0), config);
     let substep = "\
 integrate_velocities
-clear_impulses
+clear_impulses over colors 0
 solve_contacts(biased, disc friction, clamped per correction) over colors 0
 integrate_positions
 ";
@@ -258,8 +258,7 @@ fn bytes_moved_are_those_of_the_rows_that_a_pass_names() {
         let mut simulation = planned(row(&cube(), 0.5, 0.0), SolverConfig::default().without_sleep()).2;
         let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
         let mut passes = plan.passes.iter().zip(plan.bytes_of_passes(&problem));
-        let (_, bytes) =
-            passes.find(|(p, _)| p.kernel.to_string() == name).unwrap_or_else(|| panic!("{name}: {plan}"));
+        let (_, bytes) = passes.find(|(p, _)| p.kernel.to_string() == name).unwrap_or_else(|| panic!("{name}: {plan}"));
         assert_eq!(bytes, expected, "{name}");
     }
 }

@@ -187,8 +187,8 @@ fn every_binding_stands_where_its_name_stands_in_the_list() {
 mod carry {
     use super::*;
     use drystone::stages::backend::shader::CarryParams;
-    use drystone::stages::collide::MAX_POINTS;
     use drystone::stages::backend::shader::{CARRY, CARRY_BINDINGS};
+    use drystone::stages::collide::MAX_POINTS;
     use drystone::stages::problem::carry::{NO_POINT, Preload, Written};
 
     fn reflected(program: Program) -> Reflected {
@@ -253,8 +253,7 @@ mod carry {
         ];
         assert_eq!(fields("Carry"), own(&carry));
         assert!(theirs["Carry"].size <= size_of::<CarryParams>());
-        let written =
-            [("row", offset_of!(Written, row)), ("points_before", offset_of!(Written, points_before))];
+        let written = [("row", offset_of!(Written, row)), ("points_before", offset_of!(Written, points_before))];
         assert_eq!((fields("Written"), theirs["Written"].size), (own(&written), size_of::<Written>()));
         // A point that is new is one more than the last.
         let constants = parsed(&Program::WriteContacts.source());

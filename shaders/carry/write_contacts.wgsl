@@ -1,9 +1,9 @@
 // write_contacts: one thread writes the rows of one manifold again, and brings its impulses to the points and tangents that it has now.
 // Reads written, written_contacts, written_points. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::bring_impulses and turned in src/problem/contacts.rs.
+// Doubles: Writer::bring_impulses and retangented in src/problem/contacts.rs.
 
 // Rules and materials are those of the step before: where they change, no row stays on the device.
-fn turned(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
+fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
     let friction = before.tangent * impulse.tangent_1 + cross3(before.normal, before.tangent) * impulse.tangent_2;
     let tangent_2 = cross3(now.normal, now.tangent);
     return Impulse(impulse.normal, dot3(friction, now.tangent), dot3(friction, tangent_2), 0.0);
@@ -26,12 +26,12 @@ fn write_contact(i: u32) {
     var old = array(nothing, nothing, nothing, nothing);
     var patch_impulse = nothing;
     if !is_new {
-        for (var k = 0u; k < before.point_count; k++) { old[k] = turned(before, now, impulses[first + k]); }
-        if carry.patches == 1u { patch_impulse = turned(before, now, impulses[first + before.point_count]); }
+        for (var k = 0u; k < before.point_count; k++) { old[k] = retangented(before, now, impulses[first + k]); }
+        if carry.patches == 1u { patch_impulse = retangented(before, now, impulses[first + before.point_count]); }
     }
     for (var k = 0u; k < now.point_count; k++) {
-        let from = (points_before >> (8u * k)) & 0xffu;
-        if from < MAX_POINTS { impulses[first + k] = old[from]; } else { impulses[first + k] = nothing; }
+        let at = (points_before >> (8u * k)) & 0xffu;
+        if at < MAX_POINTS { impulses[first + k] = old[at]; } else { impulses[first + k] = nothing; }
     }
     if carry.patches == 1u { impulses[first + now.point_count] = patch_impulse; }
 }

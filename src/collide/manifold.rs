@@ -50,15 +50,7 @@ impl Manifold {
     pub(super) fn new(normal: Vec3, parts: (u32, u32), candidates: &[ManifoldPoint]) -> Self {
         let mut points = [ManifoldPoint::default(); MAX_POINTS];
         let count = reduce(normal, candidates, &mut points);
-        Self {
-            normal,
-            parts,
-            radius_a: 0.0,
-            radius_b: 0.0,
-            slot: NO_SLOT,
-            points,
-            count: count as u8,
-        }
+        Self { normal, parts, radius_a: 0.0, radius_b: 0.0, slot: NO_SLOT, points, count: count as u8 }
     }
 
     /// Its points.

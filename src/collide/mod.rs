@@ -183,13 +183,7 @@ impl Detector {
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
     /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
     /// the step; without `activity` all take part.
-    pub fn detect(
-        &mut self,
-        world: &World,
-        config: &SolverConfig,
-        dt: f32,
-        activity: &[Activity],
-    ) -> DetectStats {
+    pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
         let moving = |b: &Body| Moving {
             position: b.position,
             rotation: b.rotation,

@@ -314,7 +314,6 @@ impl Pair {
             o.end();
             o
         }));
-
     }
 }
 

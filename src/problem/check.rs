@@ -96,13 +96,13 @@ impl StepProblem {
 
     fn check_order(&self) -> Result<()> {
         let (colors, order) = (&self.colors, self.order.len());
-        let first_joint = self.first_joint_color as usize;
-        if first_joint > colors.len().saturating_sub(1) {
-            return refuse(format_args!("first_joint_color = {first_joint}, but {} colors", colors.len().saturating_sub(1)));
-        }
         let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
         if ends != [0, order] || !colors.is_sorted() {
             return refuse(format_args!("colors: must ascend from 0 to {order}"));
+        }
+        let (first_joint, count) = (self.first_joint_color as usize, colors.len().saturating_sub(1));
+        if first_joint > count {
+            return refuse(format_args!("first_joint_color = {first_joint}, but {count} colors"));
         }
         for (name, rows, count) in [
             ("contact", self.rows_of(&self.contact_colors()), self.contacts.len()),

@@ -93,7 +93,8 @@ impl Writer<'_> {
         if slot.takes_part && !self.carry.on_device {
             contact.preload = self.preload(contact, points, impulses);
             let warm_start = self.carry.preload.warm_start != 0;
-            let begun = |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
+            let begun =
+                |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
             impulses.iter_mut().for_each(|i| *i = begun(i));
         }
     }
@@ -163,11 +164,11 @@ impl Writer<'_> {
         impulses.fill(ImpulseRow::default());
         for ((k, point), impulse) in manifold.points().iter().enumerate().zip(&mut *impulses) {
             if let Some(from) = point_before(write, k, point) {
-                *impulse = turned(before, now, &old[from as usize]);
+                *impulse = retangented(before, now, &old[from as usize]);
             }
         }
         if self.patches {
-            impulses[manifold.points().len()] = turned(before, now, &old[before.point_count as usize]);
+            impulses[manifold.points().len()] = retangented(before, now, &old[before.point_count as usize]);
         }
     }
 
@@ -228,7 +229,7 @@ pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Opt
 }
 
 /// An impulse along the tangents that a manifold has now. Friction that a rule no longer allows is not brought along.
-fn turned(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> ImpulseRow {
+fn retangented(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> ImpulseRow {
     let (tangent_1, tangent_2) = before.tangents();
     let friction = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
     let friction = if now.friction > 0.0 { friction } else { Vec3::ZERO };

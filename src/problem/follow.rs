@@ -97,7 +97,8 @@ impl Prepared {
         let edges: Vec<Edge> = now.iter().zip(&from).map(edge).collect();
         self.are_joints_colored &= edges == self.joint_edges;
         self.joint_edges = edges;
-        let impulse = |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
+        let impulse =
+            |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
         problem.joint_impulses = from.iter().map(impulse).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);

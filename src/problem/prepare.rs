@@ -56,16 +56,13 @@ impl Prepared {
         self.coloring = self.graph.color_members(world.bodies.len(), &mut self.slots.edges, &members, max_colors);
     }
 
-    /// Whether so many rows are new that [`Self::sort_slots`] would move them. A device that has the rows does not take part in that.
+    /// Whether so many rows are new that it pays to sort all by [`Self::sort_slots`]. A device that has rows cannot follow that.
     pub fn are_slots_unsorted(&self) -> bool {
         self.slots.are_unsorted()
     }
 
-    /// Puts the rows of contacts into the order of the sweeps, if many are new.
+    /// Puts the rows of contacts into the order of the sweeps.
     pub fn sort_slots(&mut self, detector: &mut Detector, problem: &mut StepProblem) {
-        if !self.slots.are_unsorted() {
-            return;
-        }
         let from = self.slots.sort(&self.coloring.order, detector);
         self.coloring.order = (0..self.coloring.order.len() as u32).collect();
         let stride = points_a_slot(self.patches);

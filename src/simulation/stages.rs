@@ -128,6 +128,8 @@ impl Stages {
     pub fn assemble(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, prepared, problem, .. } = self;
         let times = &mut stats.times;
+        // Decided before the detection, by what a device that has the rows was asked to leave for.
+        let are_sorted_anew = prepared.are_slots_unsorted() || problem.contacts.is_empty();
         let found = timed(&mut times.detect, || {
             let mut found = detector.detect(world, config, dt, sleep.activity());
             prepared.follow(world, detector);
@@ -142,9 +144,9 @@ impl Stages {
             found
         });
         timed(&mut times.color, || {
-            if found.reshaped || self.plan_key.is_none() {
+            if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 prepared.color(world, config.max_colors);
-                if !on_device {
+                if are_sorted_anew {
                     prepared.sort_slots(detector, problem);
                 }
             }
@@ -153,12 +155,12 @@ impl Stages {
         timed(&mut times.prepare, || {
             prepared.carry.on_device = on_device;
             prepared.prepare(world, sleep.asleep(), detector, config, dt, problem);
-            let key = Some(PlanKey::of(problem));
-            if found.computed > 0 || found.reshaped || self.plan_key != key {
+            let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
+            if found.computed > 0 || found.reshaped || !is_planned {
                 self.plan = StepPlan::new(config, problem);
                 self.points = problem.swept_contacts().map(|contact| contact.point_count as usize).sum();
                 self.bytes_moved = self.plan.bytes_moved(problem);
-                self.plan_key = key;
+                self.plan_key = Some(PlanKey::of(problem));
             }
         });
         stats.pairs = found.pairs;

@@ -80,7 +80,9 @@ pub fn has_patches(kernel: Kernel) -> bool {
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     match kernel {
         Kernel::WarmStartJoints | Kernel::SolveJoints(_) => problem.joint_colors(),
-        Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => problem.contact_colors(),
+        Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
+            problem.contact_colors()
+        }
         _ => 0..0,
     }
 }

@@ -97,7 +97,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
         problem.joint_impulses.push(impulse);
     }
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
-    problem.params = params(&problem);
+    problem.params = params(&problem, patches);
     problem
 }
 
@@ -141,7 +141,7 @@ pub fn faster(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem
 }
 
-fn params(problem: &StepProblem) -> Params {
+fn params(problem: &StepProblem, patches: bool) -> Params {
     let substep = 0.1;
     let mut params = Params::default();
     params.substep = substep;
@@ -154,6 +154,7 @@ fn params(problem: &StepProblem) -> Params {
     params.body_count = problem.bodies.len() as u32;
     params.point_count = problem.points.len() as u32;
     params.joint_count = problem.joints.len() as u32;
+    params.patches = patches.into();
     params.slop = 0.02;
     params.relaxation = 0.9;
     params.tolerance = 0.5;

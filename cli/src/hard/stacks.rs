@@ -1,7 +1,6 @@
 //! What stands, or should.
 
 use super::{Check, DT, Setup};
-use drystone::{Result, SolvedManifold};
 use drystone::config::Method;
 use drystone::load::Load;
 use drystone::residuals::Measure;
@@ -9,6 +8,7 @@ use drystone::scenes::Scene;
 use drystone::solver::{Order, Solver};
 use drystone::stats::largest;
 use drystone::world::{Body, Shape, World};
+use drystone::{Result, SolvedManifold};
 
 /// Sweeps over a saved step, a power of two.
 const SWEEPS: u32 = 4096;

@@ -1,7 +1,7 @@
 //! What the color of a body says.
 
-use drystone::{Simulation, SolvedManifold};
 use drystone::world::{BodyKind, World};
+use drystone::{Simulation, SolvedManifold};
 
 /// What bodies are colored by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]

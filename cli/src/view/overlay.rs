@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::{Simulation, SolvedManifold};
 use drystone::world::{BallJoint, BodyKind, World};
+use drystone::{Simulation, SolvedManifold};
 
 /// One end of a line, as the shader takes it.
 #[repr(C)]

@@ -31,10 +31,9 @@ fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let asleep = live.stats.asleep;
     let depth = live.simulation.solved_penetration();
     // With those of sleepers, which the last step does not count.
-    let (manifolds, points, colors) =
-        live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
-            (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
-        });
+    let (manifolds, points, colors) = live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
+        (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
+    });
     let world = &live.simulation.world;
     let total: f64 = live.stage_ms.iter().sum();
     egui::Grid::new("numbers").num_columns(2).show(ui, |ui| {

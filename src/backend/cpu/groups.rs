@@ -201,9 +201,8 @@ impl Groups {
         });
     }
 
-    /// The points of a part.
-    pub fn points_of(&self, part: usize) -> Range<usize> {
-        let groups = self.begins.of(part);
+    /// The points of some neighboring groups.
+    pub fn points_of(&self, groups: Range<usize>) -> Range<usize> {
         let first = |group: usize| self.all.get(group).map_or(self.points.len(), |group| group.first_point as usize);
         first(groups.start)..first(groups.end)
     }

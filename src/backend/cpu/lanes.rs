@@ -255,7 +255,12 @@ impl Field<'_> {
                 let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
                 integrate_spins(params, &self.inertias[first..end], &bodies, &self.free);
             }
-            Kernel::ClearImpulses => clear_impulses(&self.impulses, self.groups.points_of(part)),
+            Kernel::ClearImpulses => {
+                for color in pass.colors.clone() {
+                    let groups = self.groups.begins.of_color(part, color as usize);
+                    clear_impulses(&self.impulses, self.groups.points_of(groups));
+                }
+            }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 let (groups, points, impulses) = (&self.groups.all, &self.groups.points, self.impulses);
                 let work = ContactWork { kernel, params, bodies, groups, points, impulses, moving };

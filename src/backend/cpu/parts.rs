@@ -161,11 +161,6 @@ impl Begins {
         let cell = part * self.colors + color;
         self.begins[cell] as usize..self.begins[cell + 1] as usize
     }
-
-    /// Those of a part.
-    pub fn of(&self, part: usize) -> Range<usize> {
-        self.begins[part * self.colors] as usize..self.begins[(part + 1) * self.colors] as usize
-    }
 }
 
 /// Rows of a problem, part by part and color by color.
@@ -191,9 +186,8 @@ impl Dealt {
             self.begins.push(self.rows.len() as u32);
             return;
         }
-        let cell = |(color, row): (u32, u32)| {
-            part_of(row as usize) as usize * colors.len() + (color - colors.start) as usize
-        };
+        let cell =
+            |(color, row): (u32, u32)| part_of(row as usize) as usize * colors.len() + (color - colors.start) as usize;
         self.begins.clear();
         self.begins.resize(parts * colors.len() + 1, 0);
         rows().for_each(|row| self.begins[cell(row) + 1] += 1);

@@ -133,7 +133,6 @@ impl Buffers {
         known.clear();
         known.extend_from_slice(bytes);
     }
-
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at

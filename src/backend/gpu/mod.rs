@@ -159,9 +159,10 @@ impl Gpu {
 
     /// Refuses a problem that is too large, before anything of it is sent.
     fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
-        for (binding, bytes) in small_rows_of(problem, &problem.order).into_iter().chain(contact_rows_of(problem)) {
+        for (binding, bytes) in small_rows_of(problem, &[]).into_iter().chain(contact_rows_of(problem)) {
             self.buffers.check(binding, bytes.len())?;
         }
+        self.buffers.check(shader::COLORS, size_of::<u32>() * (problem.colors.len() + problem.order.len()))?;
         let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
         for (binding, size) in ((BINDINGS.len() - SCRATCH) as u32..).zip(scratch_sizes(problem, accelerated)) {
             self.buffers.check(binding, size)?;
