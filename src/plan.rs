@@ -190,15 +190,15 @@ impl StepPlan {
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
         let groups = |colors| color_groups(&problem.colors, colors, config.fuse_colors_below);
         let (contacts, joints) = (groups(problem.contact_colors()), groups(problem.joint_colors()));
-        let friction = if problem.has_friction() { config.friction } else { FrictionRule::None };
+        let friction = if problem.has_friction() { config.friction_rule() } else { FrictionRule::None };
         let shared = Rules {
             friction,
             patch: problem.has_patches(),
-            friction_first: config.friction_order == FrictionOrder::FrictionFirst,
-            accumulated: config.clamping == Clamping::Accumulated,
+            friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
+            accumulated: config.rules.clamping == Clamping::Accumulated,
             round: problem.has_round_shapes(),
             driven: false,
-            passes: config.manifold_passes,
+            passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
             biased: false,
         };

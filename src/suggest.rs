@@ -80,7 +80,7 @@ mod tests {
         );
         let far = message.replace("`substep`", "`zzz`");
         assert_eq!(shorten(&far, "see x"), "unknown field `zzz` at line 1 column 5; see x");
-        let short = "unknown variant `dics`, expected one of `none`, `slip`, `box`, `disc`";
+        let short = "unknown variant `dics`, expected one of `none`, `box`, `disc`";
         assert_eq!(shorten(short, "see x"), format!("{short}; did you mean \"disc\"?"));
         assert_eq!(shorten("invalid type", "see x"), "invalid type");
     }

@@ -1,6 +1,6 @@
 //! What the caller changes between two steps: the next step follows it, whatever it is, or says why not.
 
-use drystone::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization};
+use drystone::config::{Clamping, Friction, FrictionAt, FrictionOrder, FrictionSweeps, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::compare::Difference;
 use drystone::{Backend, BallJoint, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
@@ -82,10 +82,10 @@ fn other_settings() -> Vec<(&'static str, SolverConfig)> {
         ("iterations", of(&|c| c.iterations = 3)),
         ("relax", of(&|c| c.relax = 2)),
         ("method", of(&|c| (c.method, c.iterations, c.relax) = (Method::Accelerated, 6, 4))),
-        ("manifold_passes", of(&|c| c.manifold_passes = 2)),
+        ("manifold_passes", of(&|c| c.rules.manifold_passes = 2)),
         (
             "clamping",
-            of(&|c| (c.clamping, c.stabilization, c.relax) = (Clamping::PerCorrection, Stabilization::None, 0)),
+            of(&|c| (c.rules.clamping, c.stabilization, c.relax) = (Clamping::PerCorrection, Stabilization::None, 0)),
         ),
         ("stabilization", of(&|c| (c.stabilization, c.relax, c.iterations) = (Stabilization::Baumgarte, 0, 4))),
         (
@@ -100,11 +100,11 @@ fn other_settings() -> Vec<(&'static str, SolverConfig)> {
         ("fixed_contact_frequency_ratio", of(&|c| c.fixed_contact_frequency_ratio = 1.0)),
         ("preload_rate", of(&|c| c.preload_rate = 0.0)),
         ("push_limit", of(&|c| c.push_limit = 1.0)),
-        ("friction none", of(&|c| c.friction = FrictionRule::None)),
-        ("friction box", of(&|c| c.friction = FrictionRule::Box)),
-        ("friction slip", of(&|c| c.friction = FrictionRule::Slip)),
+        ("friction none", of(&|c| c.friction = Friction::None)),
+        ("friction box", of(&|c| c.friction = Friction::Box)),
+        ("friction slip", of(&|c| c.rules.slip_friction = true)),
         ("friction_at", of(&|c| c.friction_at = FrictionAt::Manifold)),
-        ("friction_order", of(&|c| c.friction_order = FrictionOrder::FrictionFirst)),
+        ("friction_order", of(&|c| c.rules.friction_order = FrictionOrder::FrictionFirst)),
         ("friction_sweeps", of(&|c| c.friction_sweeps = FrictionSweeps::All)),
         ("joint_frequency", of(&|c| c.joint_frequency = 0.1)),
         ("joint_damping", of(&|c| c.joint_damping = 5.0)),
@@ -160,7 +160,7 @@ fn every_setting_may_change_on_a_settled_world() {
 fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_holds_again_afterwards() {
     for (backend, at) in BOTH.into_iter().zip([FrictionAt::Points, FrictionAt::Manifold]) {
         let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = at);
-        let none = config.clone().with(|c| c.friction = FrictionRule::None);
+        let none = config.clone().with(|c| c.friction = Friction::None);
         let mut simulation = simulation(&standing(), &config, backend);
         run(&mut simulation, 60);
         let block = 17;
@@ -272,7 +272,7 @@ fn a_setting_that_changes_wakes_what_sleeps() {
     run(&mut simulation, 240);
     let block = 17;
     assert!(simulation.is_asleep(block));
-    let slippery = simulation.config().clone().with(|c| c.friction = FrictionRule::None);
+    let slippery = simulation.config().clone().with(|c| c.friction = Friction::None);
     simulation.set_config(slippery).expect("a setting");
     run(&mut simulation, 30);
     let slid = simulation.world.bodies[block].linear_velocity.length();

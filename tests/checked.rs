@@ -44,7 +44,7 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
         &["friction_at=manifold", "friction=none"],
         &["max_colors=1"],
         &["method=accelerated", "iterations=5", "tolerance=0.01"],
-        &["stabilization=baumgarte", "relax=0", "clamping=per-correction"],
+        &["stabilization=baumgarte", "relax=0", "rules.clamping=per-correction"],
     ];
     for name in ["pile:n=60", "drop", "bridge", "joint-grid", "drum", "slide:mu=0", "chain:worlds=3", "rolling"] {
         for rule in rules {

@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, PI};
 
-use drystone::config::FrictionRule;
+use drystone::config::Friction;
 use drystone::glam::{Quat, Vec3};
 use drystone::{BallJoint, Body, MassProperties, Shape, Simulation, SolverConfig, World};
 
@@ -62,7 +62,7 @@ fn floor(mu: f32) -> World {
 }
 
 /// Distance that a block slides down a slope of 30 degrees with mu 0.3 in 1 s, `heading` off the axes [m].
-fn slid(rule: FrictionRule, heading: f64, open: Open) -> f64 {
+fn slid(rule: Friction, heading: f64, open: Open) -> f64 {
     let mut world = slope(FRAC_PI_6, heading, 0.3);
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).friction(0.3).position(0.0, 0.2, 0.0);
     let block = world.add(block);
@@ -75,11 +75,11 @@ fn the_disc_slides_alike_in_every_direction_and_the_box_does_not(open: Open) {
     // Coulomb: a = g (sin - mu cos). A2: 0.5 %.
     let exact = 0.5 * G * (FRAC_PI_6.sin() - 0.3 * FRAC_PI_6.cos());
     for degrees in [0.0_f64, 15.0, 30.0, 45.0] {
-        holds("disc", slid(FrictionRule::Disc, degrees.to_radians(), open), exact, 5e-3);
+        holds("disc", slid(Friction::Disc, degrees.to_radians(), open), exact, 5e-3);
     }
     // The box is right along its axes and sqrt 2 too strong between them.
-    let along = slid(FrictionRule::Box, 0.0, open);
-    let between = slid(FrictionRule::Box, FRAC_PI_4, open);
+    let along = slid(Friction::Box, 0.0, open);
+    let between = slid(Friction::Box, FRAC_PI_4, open);
     let (low, high) = (along.min(between), along.max(between));
     let too_strong = 0.5 * G * (FRAC_PI_6.sin() - 0.3 * std::f64::consts::SQRT_2 * FRAC_PI_6.cos());
     holds("box along its axes", high, exact, 5e-3);
@@ -87,15 +87,15 @@ fn the_disc_slides_alike_in_every_direction_and_the_box_does_not(open: Open) {
 }
 
 fn what_lies_still_creeps_under_one_slip_direction_and_not_under_the_disc(open: Open) {
-    let creep = |rule| {
+    let creep = |slip: bool| {
         let mut world = slope(20_f64.to_radians(), 0.5, 0.5);
         let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).position(0.0, 0.2, 0.0);
         let block = world.add(block);
-        let config = SolverConfig::default().without_sleep().with(|c| c.friction = rule);
+        let config = SolverConfig::default().without_sleep().with(|c| c.rules.slip_friction = slip);
         let end = run(world, config, 10.0, 60, open).bodies[block].position;
         f64::from(end.x).hypot(f64::from(end.z))
     };
-    let (slip, disc) = (creep(FrictionRule::Slip), creep(FrictionRule::Disc));
+    let (slip, disc) = (creep(true), creep(false));
     measured!("creep in 10 s: slip {slip:.6} m, disc {disc:.6} m");
     assert!(disc < 1e-3, "disc: {disc} m");
     assert!(slip > 2.0 * disc, "slip: {slip} m, disc: {disc} m");

@@ -81,12 +81,12 @@ fn every_instruction_set_has_the_same_bits() {
 fn every_rule_has_the_same_bits() {
     let rules: [&[&str]; 11] = [
         &["friction=none"],
-        &["friction=slip"],
-        &["manifold_passes=3"],
+        &["rules.slip_friction=true"],
+        &["rules.manifold_passes=3"],
         &["friction=box"],
         &["friction_at=manifold"],
-        &["friction_order=friction-first", "friction_sweeps=all"],
-        &["stabilization=baumgarte", "relax=0", "clamping=per-correction"],
+        &["rules.friction_order=friction-first", "friction_sweeps=all"],
+        &["stabilization=baumgarte", "relax=0", "rules.clamping=per-correction"],
         &["tolerance=0.001", "iterations=8"],
         &["method=accelerated", "iterations=6", "relax=5"],
         &["method=accelerated", "tolerance=0.001", "iterations=8", "friction_at=manifold"],
@@ -144,7 +144,7 @@ fn worlds_in_parts_have_the_same_bits() {
         }
     }
     for settings in [
-        &["stabilization=baumgarte", "relax=0", "clamping=per-correction"][..],
+        &["stabilization=baumgarte", "relax=0", "rules.clamping=per-correction"][..],
         &["tolerance=0.001", "iterations=8"],
         &["method=accelerated", "iterations=6", "friction_at=manifold"],
     ] {

@@ -191,22 +191,22 @@ fn relax_sweep(config: SolverConfig) -> String {
 
 #[test]
 fn every_setting_of_a_sweep_is_in_the_plan() {
-    use drystone::config::{Clamping, FrictionAt, FrictionOrder, FrictionRule, Stabilization};
+    use drystone::config::{Clamping, Friction, FrictionAt, FrictionOrder, Stabilization};
     let default = SolverConfig::default;
     assert_eq!(relax_sweep(default()), "solve_contacts(disc friction) over colors 0");
     for (config, expected) in [
-        (default().with(|c| c.manifold_passes = 2), "disc friction, repeated"),
-        (default().with(|c| c.friction_order = FrictionOrder::FrictionFirst), "disc friction, first"),
+        (default().with(|c| c.rules.manifold_passes = 2), "disc friction, repeated"),
+        (default().with(|c| c.rules.friction_order = FrictionOrder::FrictionFirst), "disc friction, first"),
         (default().with(|c| c.friction_at = FrictionAt::Manifold), "disc friction, per manifold"),
         (default().with(|c| c.tolerance = 1e-3), "disc friction, measured"),
-        (default().with(|c| c.friction = FrictionRule::Slip), "slip friction"),
-        (default().with(|c| c.friction = FrictionRule::Box), "box friction"),
+        (default().with(|c| c.rules.slip_friction = true), "slip friction"),
+        (default().with(|c| c.friction = Friction::Box), "box friction"),
     ] {
         assert_eq!(relax_sweep(config), format!("solve_contacts({expected}) over colors 0"));
     }
     // Impulses that begin at zero are cleared, not carried over.
     let config = default().with(|c| {
-        c.clamping = Clamping::PerCorrection;
+        c.rules.clamping = Clamping::PerCorrection;
         c.stabilization = Stabilization::Baumgarte;
         c.relax = 0;
         c.substeps = 2;

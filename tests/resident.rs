@@ -5,7 +5,7 @@
 mod common;
 
 use common::gpu;
-use drystone::config::{FrictionAt, FrictionRule};
+use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::Difference;
@@ -337,6 +337,6 @@ fn a_device_takes_the_points_that_are_sent() {
     bouncing.bodies.iter_mut().for_each(|body| body.material.restitution = 0.7);
     bouncing.bodies[1].position.y += 1.0;
     same_on_a_device(bouncing, &SolverConfig::default().without_sleep(), 40, |_, _| ());
-    let config = SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Slip);
+    let config = SolverConfig::default().without_sleep().with(|c| c.rules.slip_friction = true);
     same_on_a_device(sliding(), &config, 40, |_, _| ());
 }

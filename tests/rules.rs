@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
-use drystone::config::{FrictionAt, FrictionRule};
+use drystone::config::{Friction, FrictionAt};
 use drystone::stages::problem::{ContactRow, PointRow};
 use drystone::{
     BallJoint, Body, Material, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, StepStats, World,
@@ -86,15 +86,28 @@ fn slid(config: SolverConfig, friction: [f32; 2]) -> f32 {
 /// Along a tangent a box of two directions allows as much as the disc. Measured 1.0e-3 of it: h v / 2 for substeps of 1/960 s.
 #[test]
 fn a_sliding_box_stops_where_friction_says_under_every_rule() {
+    use Friction::{Box, Disc};
     use FrictionAt::{Manifold, Points};
-    use FrictionRule::{Box, Disc, Slip};
     let expected = 16.0 / (2.0 * 0.4 * G);
-    for (friction, friction_at) in [(Slip, Points), (Box, Points), (Disc, Points), (Box, Manifold), (Disc, Manifold)] {
+    let rules = [
+        (Disc, true, Points),
+        (Box, false, Points),
+        (Disc, false, Points),
+        (Box, false, Manifold),
+        (Disc, false, Manifold),
+    ];
+    for (friction, slip, friction_at) in rules {
         let config = SolverConfig::default().without_sleep().with(|c| {
             c.friction = friction;
+            c.rules.slip_friction = slip;
             c.friction_at = friction_at;
         });
-        near(&format!("{friction:?} at {friction_at:?}"), slid(config, [0.4; 2]), expected, 0.005 * expected);
+        near(
+            &format!("{friction:?}, slip {slip}, at {friction_at:?}"),
+            slid(config, [0.4; 2]),
+            expected,
+            0.005 * expected,
+        );
     }
 }
 
@@ -315,7 +328,7 @@ fn slip_friction_acts_against_the_slip() {
     world.add(floor().friction(0.4));
     let direction = Vec3::new(0.6, 0.0, 0.8);
     world.add(cube().friction(0.4).velocity(direction * 4.0, Vec3::ZERO));
-    let config = SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Slip);
+    let config = SolverConfig::default().without_sleep().with(|c| c.rules.slip_friction = true);
     let mut simulation = simulation(world, config);
     run(&mut simulation, 120, 1.0 / 240.0);
     let velocity = simulation.world.bodies[1].linear_velocity;
@@ -612,12 +625,12 @@ fn settings_that_contradict_each_other_are_refused_together() {
     refused(hard().with(|c| c.relax = 1), ["stabilization = none", "relax = 1"]);
     let single = Clamping::PerCorrection;
     refused(
-        SolverConfig::default().without_sleep().with(|c| c.clamping = single),
-        ["clamping = per-correction", "soft"],
+        SolverConfig::default().without_sleep().with(|c| c.rules.clamping = single),
+        ["rules.clamping = per-correction", "soft"],
     );
     let both = hard().with(|c| {
-        c.clamping = single;
+        c.rules.clamping = single;
         c.method = Method::Accelerated;
     });
-    refused(both, ["clamping = per-correction", "method = accelerated"]);
+    refused(both, ["rules.clamping = per-correction", "method = accelerated"]);
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use drystone::config::SolverConfig;
 use drystone::stages::suggest::shorten;
 use drystone::{Error, Result};
+use toml::{Table, Value};
 
 /// Reads settings from a TOML file; what it leaves out takes its default.
 ///
@@ -22,16 +23,30 @@ pub fn read(path: &Path) -> Result<SolverConfig> {
 
 /// The settings that are not at their defaults, as `key=value`, but for those that are `said` otherwise.
 pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
-    let table = |config: &SolverConfig| toml::Table::try_from(config).expect("a config is a table");
-    let usual = table(&SolverConfig::default());
-    let differs = |(key, value): &(String, toml::Value)| !said.contains(&key.as_str()) && usual[key] != *value;
-    let text = |(key, value): (String, toml::Value)| match value {
-        toml::Value::String(word) => format!("{key}={word}"),
+    let usual = list(&SolverConfig::default());
+    let differs = |(key, value): &(String, Value)| {
+        !said.contains(&key.as_str()) && !usual.contains(&(key.clone(), value.clone()))
+    };
+    let text = |(key, value): (String, Value)| match value {
+        Value::String(word) => format!("{key}={word}"),
         // As it was written, without what f64 sees of its rounding.
-        toml::Value::Float(x) => format!("{key}={}", x as f32),
+        Value::Float(x) => format!("{key}={}", x as f32),
         value => format!("{key}={value}"),
     };
-    table(config).into_iter().filter(differs).map(text).collect()
+    list(config).into_iter().filter(differs).map(text).collect()
+}
+
+/// All settings by name; those of a table as `table.name`.
+fn list(config: &SolverConfig) -> Vec<(String, Value)> {
+    let settings = table(config).into_iter().flat_map(|(key, value)| match value {
+        Value::Table(inner) => inner.into_iter().map(|(name, value)| (format!("{key}.{name}"), value)).collect(),
+        value => vec![(key, value)],
+    });
+    settings.collect()
+}
+
+fn table(config: &SolverConfig) -> Table {
+    Table::try_from(config).expect("a config is a table")
 }
 
 /// Changes one setting, written `key=value` as in TOML; bare words need no quotes.
@@ -42,18 +57,21 @@ pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
     let (key, value) =
         assignment.split_once('=').ok_or_else(|| Error::input(format!("--set {assignment}: write it as key=value")))?;
     let (key, value) = (key.trim(), value.trim());
-    let mut table = toml::Table::try_from(&*config).expect("a config is a table");
-    let parse = |text: &str| toml::from_str::<toml::Table>(&format!("value = {text}")).ok();
+    let mut all = table(config);
+    let parse = |text: &str| toml::from_str::<Table>(&format!("value = {text}")).ok();
     let parsed = parse(value).or_else(|| parse(&format!("{value:?}"))).and_then(|mut t| t.remove("value"));
     let mut parsed = parsed.ok_or_else(|| Error::input(format!("--set {assignment}: cannot read the value")))?;
+    let (place, name) = match key.split_once('.').map(|(group, name)| (all.get_mut(group), name)) {
+        Some((Some(Value::Table(group)), name)) => (group, name),
+        _ => (&mut all, key),
+    };
     // A whole number is a fine value for a real setting.
-    if let (Some(toml::Value::Float(_)), toml::Value::Integer(i)) = (table.get(key), &parsed) {
-        parsed = toml::Value::Float(*i as f64);
+    if let (Some(Value::Float(_)), Value::Integer(i)) = (place.get(name), &parsed) {
+        parsed = Value::Float(*i as f64);
     }
-    table.insert(key.to_owned(), parsed);
-    let changed: SolverConfig = table
-        .try_into()
-        .map_err(|e: toml::de::Error| Error::input(format!("--set {assignment}: {}", first_line(&e))))?;
+    place.insert(name.to_owned(), parsed);
+    let changed: SolverConfig =
+        all.try_into().map_err(|e: toml::de::Error| Error::input(format!("--set {assignment}: {}", first_line(&e))))?;
     changed.check_ranges().map_err(|e| Error::input(format!("--set {assignment}: {e}")))?;
     *config = changed;
     Ok(())
@@ -62,5 +80,12 @@ pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
 /// The message of a TOML error without its drawing of the text, and without the list of all settings.
 fn first_line(e: &toml::de::Error) -> String {
     let message = e.message().lines().collect::<Vec<_>>().join(" ");
+    let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`')).map(|(name, _)| name);
+    if let Some(name) = unknown.filter(|name| table(&SolverConfig::default())["rules"].get(name).is_some()) {
+        return format!("{name}: is a rule for comparison now; set rules.{name}");
+    }
+    if message.starts_with("unknown variant `slip`") {
+        return "slip: is a rule for comparison now; set rules.slip_friction=true".into();
+    }
     shorten(&message, "`drystone settings` lists all")
 }

@@ -307,10 +307,17 @@ fn the_settings_are_listed_as_a_file_that_gives_them() {
     let of = |arguments: &str, folder: &Folder| folder.json(arguments)["config"].clone();
     let usual = of("run drop --steps 0 --no-sleep --json", &folder);
     for key in keys(&usual) {
-        let line = listed.lines().position(|l| l.starts_with(&format!("{key} = "))).unwrap_or_else(|| panic!("{key}"));
+        let is_of = |l: &str| l.starts_with(&format!("{key} = ")) || l == format!("[{key}]");
+        let line = listed.lines().position(is_of).unwrap_or_else(|| panic!("{key}"));
         assert!(listed.lines().nth(line - 1).is_some_and(|l| l.starts_with("# ") && l.len() > 10), "{key}");
     }
-    assert!(listed.contains(" One of none, slip, box, disc."), "{listed}");
+    assert!(listed.contains(" One of none, box, disc."), "{listed}");
+    // Rules for comparison come last.
+    let (settings, rules) = listed.split_once("\n[rules]\n").expect("a table of rules");
+    for key in ["clamping", "friction_order", "manifold_passes", "slip_friction"] {
+        let line = format!("\n{key} = ");
+        assert!(rules.contains(&line) && !settings.contains(&line), "{key}");
+    }
     let folder = folder.with("all.toml", &listed);
     assert_eq!(of("run drop --steps 0 --no-sleep --json --config all.toml", &folder), usual);
     assert!(folder.output("settings --preset fast").contains("\nsubsteps = 4\n"));

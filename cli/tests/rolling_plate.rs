@@ -1,7 +1,7 @@
 //! SimBenchmark's rolling test: 25 balls on a plate that is pushed. All move along the push with accelerations known on
 //! paper; published errors are the mean over 4 s of the squared velocity errors of the plate and the first ball [m²/s²].
 
-use drystone::config::FrictionRule;
+use drystone::config::Friction;
 use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};
 use drystone_cli::hard::rolling_error;
 
@@ -20,7 +20,7 @@ fn the_disc_is_right_in_every_direction() {
 
 #[test]
 fn in_box_mode_a_plate_that_is_pushed_across_its_tangents_does_not_move() {
-    let config = || SolverConfig::default().without_sleep().with(|c| c.friction = FrictionRule::Box);
+    let config = || SolverConfig::default().without_sleep().with(|c| c.friction = Friction::Box);
     let across = error(60.0, config(), Box::new(Reference::<f32>::new()));
     println!("60 degrees, box: {across:.4}");
     assert!((across - 3.145).abs() < 0.005, "{across}");

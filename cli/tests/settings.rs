@@ -1,7 +1,8 @@
 //! Settings as `--set` takes them.
 
 use drystone::SolverConfig;
-use drystone_cli::settings::set;
+use drystone::config::FrictionRule;
+use drystone_cli::settings::{read, set, unusual};
 
 #[test]
 fn settings_out_of_their_range_are_refused_by_name() {
@@ -10,7 +11,7 @@ fn settings_out_of_their_range_are_refused_by_name() {
         ("substeps", "4096", "4097"),
         ("iterations", "1", "0"),
         ("relax", "0", "4097"),
-        ("manifold_passes", "16", "17"),
+        ("rules.manifold_passes", "16", "17"),
         ("max_colors", "64", "65"),
         ("max_colors", "1", "0"),
         ("baumgarte", "1", "1.1"),
@@ -36,5 +37,37 @@ fn settings_out_of_their_range_are_refused_by_name() {
         let refusal = set(&mut config, &format!("{name}={bad}")).expect_err(name).to_string();
         assert!(refusal.contains(&format!("{name} = ")) && !refusal.contains('\n'), "{refusal}");
         assert_eq!(config, before, "what is refused changes nothing");
+    }
+}
+
+/// Settings that moved into a table, under the names that they had before.
+#[test]
+fn an_old_name_is_met_with_the_place_of_the_setting() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (key, value, place) in [
+        ("friction_order", "friction-first", "rules.friction_order"),
+        ("clamping", "per-correction", "rules.clamping"),
+        ("manifold_passes", "2", "rules.manifold_passes"),
+        ("friction", "slip", "rules.slip_friction=true"),
+    ] {
+        let refusal = set(&mut SolverConfig::default(), &format!("{key}={value}")).expect_err(key).to_string();
+        assert!(refusal.ends_with(&format!("set {place}")) && !refusal.contains('\n'), "{refusal}");
+        let path = folder.path().join("old.toml");
+        std::fs::write(&path, format!("substeps = 4\n{key} = {:?}\n", value)).expect("a file");
+        let refusal = read(&path).expect_err(key).to_string();
+        assert!(refusal.contains("old.toml: line 2: ") && refusal.ends_with(&format!("set {place}")), "{refusal}");
+    }
+}
+
+#[test]
+fn a_rule_for_comparison_is_set_and_told_by_its_place() {
+    let mut config = SolverConfig::default();
+    set(&mut config, "rules.slip_friction=true").expect("a setting");
+    set(&mut config, "rules.manifold_passes = 3").expect("a setting");
+    assert_eq!((config.friction_rule(), config.rules.manifold_passes), (FrictionRule::Slip, 3));
+    assert_eq!(unusual(&config, &[]), ["rules.manifold_passes=3", "rules.slip_friction=true"]);
+    for bad in ["rules.nothing=1", "rules=1", "nothing.clamping=accumulated", "rules.clamping.more=1"] {
+        let refusal = set(&mut config, bad).expect_err(bad).to_string();
+        assert!(refusal.starts_with(&format!("--set {bad}: ")) && !refusal.contains('\n'), "{refusal}");
     }
 }

@@ -103,7 +103,7 @@ impl Writer<'_> {
         let [a, b] = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
         let material = a.material.combine(b.material);
         *row = ContactRow {
-            friction: if self.config.friction == FrictionRule::None { 0.0 } else { material.friction },
+            friction: if self.config.friction_rule() == FrictionRule::None { 0.0 } else { material.friction },
             restitution: material.restitution,
             body_a: pair.body_a,
             body_b: pair.body_b,
@@ -127,7 +127,7 @@ impl Writer<'_> {
         let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
         let effective = EffectiveMass { inverse: &inverse, row };
         for ((p, point), computed) in manifold.points().iter().zip(&mut *points).zip(&mut *computed) {
-            let tangent_mass = match self.config.friction {
+            let tangent_mass = match self.config.friction_rule() {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
                 FrictionRule::None | FrictionRule::Slip => 0.0,
             };
@@ -208,7 +208,7 @@ impl Writer<'_> {
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
             velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
-        if self.config.friction == FrictionRule::Slip && !self.patches {
+        if self.config.friction_rule() == FrictionRule::Slip && !self.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
             let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);

@@ -14,7 +14,7 @@ use super::layout::{
 use super::slots::{Slots, Write};
 use super::softness::softness;
 use crate::collide::{Detector, MAX_POINTS};
-use crate::config::{FrictionAt, FrictionRule, SolverConfig, Stabilization};
+use crate::config::{Friction, FrictionAt, FrictionRule, SolverConfig, Stabilization};
 use crate::graph::{Coloring, ConstraintGraph, Edge};
 use crate::math::Lane;
 use crate::world::{BallJoint, Body, BodyKind, World};
@@ -100,7 +100,7 @@ impl Prepared {
     ) {
         prepare_bodies(world, asleep, config, problem);
         self.scale = Some(StepScale::new(config, dt));
-        let patches = config.friction_at == FrictionAt::Manifold && config.friction != FrictionRule::None;
+        let patches = config.friction_at == FrictionAt::Manifold && config.friction != Friction::None;
         self.lay_out(patches, problem);
         let h = dt / config.substeps as f32;
         problem.params = Params {
@@ -205,7 +205,7 @@ impl Prepared {
         problem: &mut StepProblem,
     ) {
         self.carry.approach =
-            config.friction == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
+            config.friction_rule() == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
         self.carry.preload = Preload {
             movable_compliance: problem.params.movable.compliance(),
             fixed_compliance: problem.params.fixed.compliance(),

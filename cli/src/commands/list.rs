@@ -60,26 +60,47 @@ impl SettingsArgs {
     pub fn run(&self) -> Result<()> {
         let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
         let schema = schemars::schema_for!(SolverConfig).to_value();
-        let properties = schema["properties"].as_object().expect("a struct has properties");
-        for (name, property) in properties {
-            let value = match &config[name] {
-                // As it was written, without what f64 sees of its rounding.
-                toml::Value::Float(x) => format!("{:?}", *x as f32),
-                value => value.to_string(),
-            };
-            // The first sentence: the others say why.
-            let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
-            let sentence = text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first);
-            print(format_args!("# {sentence}.{}\n{name} = {value}\n", words(&schema, property)))?;
-        }
-        Ok(())
+        print_settings(&config, &schema, &schema)
     }
+}
+
+/// Prints the settings of a table, each under the first sentence of its description; nested tables come last.
+fn print_settings(config: &toml::Table, schema: &Value, described: &Value) -> Result<()> {
+    let properties = described["properties"].as_object().expect("a struct has properties");
+    let (tables, settings): (Vec<_>, Vec<_>) = properties.iter().partition(|(name, _)| config[*name].is_table());
+    for (name, property) in settings {
+        let value = match &config[name] {
+            // As it was written, without what f64 sees of its rounding.
+            toml::Value::Float(x) => format!("{:?}", *x as f32),
+            value => value.to_string(),
+        };
+        print(format_args!("# {}.{}\n{name} = {value}\n", first_sentence(property), words(schema, property)))?;
+    }
+    for (name, property) in tables {
+        print(format_args!("# {}.\n[{name}]\n", first_sentence(property)))?;
+        let inner = config[name].as_table().expect("a table");
+        print_settings(inner, schema, definition(schema, property).expect("a struct has a definition"))?;
+    }
+    Ok(())
+}
+
+/// The first sentence of a description: the others give reasons.
+fn first_sentence(property: &Value) -> String {
+    let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+    text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first).to_owned()
+}
+
+/// The definition of a kind that a property names.
+fn definition<'a>(schema: &'a Value, property: &Value) -> Option<&'a Value> {
+    property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name])
 }
 
 /// The words that a setting takes: ` One of a, b.`, or nothing.
 fn words(schema: &Value, property: &Value) -> String {
-    let named = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name]);
-    let words = named.and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array())).into_iter().flatten();
+    let words = definition(schema, property)
+        .and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array()))
+        .into_iter()
+        .flatten();
     let words: Vec<_> = words.filter_map(|w| w["const"].as_str().or_else(|| w.as_str())).collect();
     if words.is_empty() { String::new() } else { format!(" One of {}.", words.join(", ")) }
 }

@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Check, DT, Setup, is_broken};
 use drystone::Result;
 use drystone::Simulation;
-use drystone::config::FrictionRule;
+use drystone::config::Friction;
 use drystone::metrics;
 use drystone::scenes::Scene;
 use drystone::stats::largest;
@@ -348,15 +348,15 @@ pub fn rolling_error(angle: f32, simulation: impl FnOnce(World) -> Result<Simula
 }
 
 pub(super) fn rolling(setup: &Setup) -> Result<Vec<Check>> {
-    let error = |angle: f32, friction: FrictionRule| {
+    let error = |angle: f32, friction: Friction| {
         let config = setup.config.clone().with(|c| c.friction = friction);
         rolling_error(angle, |world| Simulation::new(world, config, (setup.open)()?))
     };
-    let across = error(60.0, FrictionRule::Box)?;
+    let across = error(60.0, Friction::Box)?;
     Ok(vec![
-        Check::at_most("disc, 60 degrees: mean squared error [m²/s²]", error(60.0, FrictionRule::Disc)?, 1e-5),
-        Check::at_most("disc, 90 degrees: mean squared error [m²/s²]", error(90.0, FrictionRule::Disc)?, 1e-5),
-        Check::at_most("box, 90 degrees: mean squared error [m²/s²]", error(90.0, FrictionRule::Box)?, 1e-5),
+        Check::at_most("disc, 60 degrees: mean squared error [m²/s²]", error(60.0, Friction::Disc)?, 1e-5),
+        Check::at_most("disc, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Disc)?, 1e-5),
+        Check::at_most("box, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Box)?, 1e-5),
         // A plate that does not move: the limit of each direction alone is beyond the push.
         Check::at_most(
             "box, 60 degrees: off the error of a plate that stays, 3.145 m²/s²",

@@ -114,7 +114,7 @@ fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()>
     for n in [5, 10, 20] {
         let scene = Scene::find("misaligned", &[format!("n={n}")])?;
         for rule in ["per-correction", "accumulated"] {
-            let s = stand(&scene.world, &format!("{SHEET} clamping={rule}"), 20.0)?;
+            let s = stand(&scene.world, &format!("{SHEET} rules.clamping={rule}"), 20.0)?;
             let stands = if s.seconds > 19.99 { "20 s, to the end".into() } else { format!("{:.2} s", s.seconds) };
             let _ =
                 writeln!(page, "| {n} | {rule} | {stands} | {:.1} mm | {:.2} mm/s |", s.drift * 1e3, s.rms_speed * 1e3);
@@ -200,7 +200,8 @@ fn exit_speed(text: &str) -> Result<f64> {
 
 /// Settings of a rule, with enough substeps that the rule and not the step decides.
 fn friction_settings(rule: &str) -> String {
-    format!("substeps=8 friction={rule}")
+    let setting = if rule == "slip" { "rules.slip_friction=true".into() } else { format!("friction={rule}") };
+    format!("substeps=8 {setting}")
 }
 
 /// A block of 1 x 0.4 x 1 m on a floor, with the direction of its edges along the axes.

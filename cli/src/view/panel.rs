@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use super::colors::ColorBy;
 use super::live::Live;
 use drystone::backend::BackendChoice;
-use drystone::config::FrictionRule;
+use drystone::config::Friction;
 
 /// Fills `ui`.
 pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
@@ -88,12 +88,7 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
     ui.add(egui::Slider::new(&mut config.substeps, 1..=64).logarithmic(true).text("substeps"));
     ui.add(egui::Slider::new(&mut config.iterations, 1..=32).text("sweeps"));
     ui.add(egui::Slider::new(&mut config.relax, 0..=8).text("relax sweeps"));
-    let rules = [
-        (FrictionRule::None, "none"),
-        (FrictionRule::Slip, "slip"),
-        (FrictionRule::Box, "box"),
-        (FrictionRule::Disc, "disc"),
-    ];
+    let rules = [(Friction::None, "none"), (Friction::Box, "box"), (Friction::Disc, "disc")];
     ui.horizontal(|ui| {
         ui.label("friction");
         for (rule, name) in rules {

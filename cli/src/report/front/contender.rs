@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::settings;
 use drystone::Simulation;
 use drystone::backend::Numbers;
-use drystone::config::{FrictionRule, Method, SolverConfig};
+use drystone::config::{Friction, Method, SolverConfig};
 use drystone::scenes::Scene;
 use drystone::world::World;
 use drystone::{Error, Result};
@@ -65,7 +65,7 @@ impl Setting {
             substeps: config.substeps,
             sweeps: config.iterations,
             method: if config.method == Method::Plain { "plain" } else { "accelerated" }.into(),
-            friction: if config.friction == FrictionRule::Box { "box" } else { "disc" }.into(),
+            friction: if config.friction == Friction::Box { "box" } else { "disc" }.into(),
             more: unusual(config).join(" "),
         }
     }
@@ -140,7 +140,7 @@ mod tests {
     fn a_label_says_what_is_not_at_its_default() {
         let mut config = SolverConfig::default().without_sleep().with(|c| {
             c.substeps = 4;
-            c.friction = FrictionRule::Box;
+            c.friction = Friction::Box;
         });
         assert_eq!(Setting::drystone("cpu", &config).label(), "drystone cpu 4x1 box");
         settings::set(&mut config, "contact_frequency=0.25").unwrap();

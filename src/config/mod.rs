@@ -6,106 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::names::named;
 
-/// How friction is modelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum FrictionRule {
-    /// No tangential impulse. Taken by itself where every contact of a scene has mu = 0.
-    None,
-    /// One direction a point: that of its slip when the step begins. What lies still creeps.
-    Slip,
-    /// Two orthogonal directions, each limited by itself: up to 41 % too strong between them.
-    Box,
-    /// Tangential impulse inside the disc of radius mu times the normal impulse: Coulomb's cone, exactly.
-    #[default]
-    Disc,
-}
+mod rules;
 
-/// Where friction acts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum FrictionAt {
-    /// At every contact point, limited by that point's normal impulse.
-    #[default]
-    Points,
-    /// Once a manifold: at the middle of its points and as a twist about the normal, limited by their sum. Cheaper.
-    Manifold,
-}
-
-/// Whether a manifold solves its normals or its friction first.
-///
-/// It hardly matters: over the standing scenes overlap and speed at rest agree to a few percent. In towers normals first drift
-/// a little less (zigzag of 20: 33 against 38 mm in 10 s), in walls friction first does (3.4 against 5.7 mm).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum FrictionOrder {
-    /// Normals, then friction within the cone that they span: the order of the course sheet.
-    #[default]
-    NormalsFirst,
-    /// Friction within the cone of the sweep before, then normals, which have the last word.
-    FrictionFirst,
-}
-
-/// What is kept non-negative.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum Clamping {
-    /// Every single correction; impulses start at zero in each substep. A correction that pushed too far can never be
-    /// taken back: misaligned stacks fall.
-    PerCorrection,
-    /// The sum of the corrections.
-    #[default]
-    Accumulated,
-}
-
-/// How overlap that is there already is removed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum Stabilization {
-    /// Not at all: it drifts.
-    None,
-    /// By a target velocity, a share of the overlap a substep (Baumgarte), beyond a slop and up to a limit.
-    Baumgarte,
-    /// By a damped spring integrated implicitly; relax sweeps take its velocity out again.
-    #[default]
-    Soft,
-}
-
-named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
-
-/// Which sweeps of a substep solve friction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum FrictionSweeps {
-    /// The biased sweeps and the relax sweeps.
-    All,
-    /// The relax sweeps only: the push-out of the biased sweep then drags nothing along.
-    #[default]
-    Relax,
-}
-
-/// What is done with the sweeps of a substep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
-#[non_exhaustive]
-pub enum Method {
-    /// One after another: projected Gauss-Seidel.
-    #[default]
-    Plain,
-    /// With Nesterov's momentum, and a restart as soon as steps grow. Pays from three sweeps on: the first two are the plain
-    /// ones.
-    Accelerated,
-}
-
-named!(Method { Plain = "plain", Accelerated = "accelerated", });
+pub use rules::{
+    Clamping, ComparisonRules, Friction, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization,
+};
 
 /// Settings of one step of the solver. The defaults hold every standing scene of the catalogue.
 ///
@@ -126,12 +32,8 @@ pub struct SolverConfig {
     pub iterations: u32,
     /// Sweeps without bias a substep, after the positions moved: they take out the velocity that the bias put in.
     pub relax: u32,
-    /// What is done with these sweeps.
+    /// How these sweeps follow each other.
     pub method: Method,
-    /// How often a sweep goes over a manifold before the next one, 1 to 16. Two take fewer sweeps, each a longer one.
-    pub manifold_passes: u8,
-    /// What is kept non-negative.
-    pub clamping: Clamping,
     /// How overlap is removed.
     pub stabilization: Stabilization,
     /// Share of the overlap that Baumgarte stabilization removes in a substep, 0 to 1.
@@ -160,11 +62,9 @@ pub struct SolverConfig {
     /// Fastest that overlap is pushed out (m/s).
     pub push_limit: f32,
     /// Friction rule.
-    pub friction: FrictionRule,
+    pub friction: Friction,
     /// Where friction acts.
     pub friction_at: FrictionAt,
-    /// Whether normals or friction come first in a manifold.
-    pub friction_order: FrictionOrder,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
@@ -194,6 +94,8 @@ pub struct SolverConfig {
     /// Colors for contacts between bodies that can move, 1 to 64. A contact that finds none is solved sequentially
     /// and counted as overflow.
     pub max_colors: u32,
+    /// Rules that exist for comparison.
+    pub rules: ComparisonRules,
 }
 
 /// Colors smaller than this share a workgroup, unless told otherwise.
@@ -222,8 +124,6 @@ impl Default for SolverConfig {
             iterations: 1,
             relax: 1,
             method: Method::Plain,
-            manifold_passes: 1,
-            clamping: Clamping::Accumulated,
             stabilization: Stabilization::Soft,
             baumgarte: 0.2,
             slop: 0.001,
@@ -234,9 +134,8 @@ impl Default for SolverConfig {
             fixed_contact_frequency_ratio: 2.0,
             preload_rate: 1.0,
             push_limit: 3.0,
-            friction: FrictionRule::Disc,
+            friction: Friction::Disc,
             friction_at: FrictionAt::Points,
-            friction_order: FrictionOrder::NormalsFirst,
             friction_sweeps: FrictionSweeps::Relax,
             joint_frequency: 0.25,
             joint_damping: 2.0,
@@ -249,6 +148,7 @@ impl Default for SolverConfig {
             sleep_speed: 1e-2,
             fuse_colors_below: FUSE_BELOW,
             max_colors: 64,
+            rules: ComparisonRules::default(),
         }
     }
 }
@@ -274,6 +174,16 @@ impl SolverConfig {
         Self { sleep_after: 0.0, ..self }
     }
 
+    /// The friction rule that these settings come to.
+    pub fn friction_rule(&self) -> FrictionRule {
+        match self.friction {
+            Friction::None => FrictionRule::None,
+            _ if self.rules.slip_friction => FrictionRule::Slip,
+            Friction::Box => FrictionRule::Box,
+            Friction::Disc => FrictionRule::Disc,
+        }
+    }
+
     /// Refuses values that no step can be made of, and settings that contradict each other.
     ///
     /// # Errors
@@ -286,16 +196,16 @@ impl SolverConfig {
                 "stabilization = {rule} with relax = {relax}: relax sweeps belong to soft contacts; set relax=0"
             )));
         }
-        if self.clamping == Clamping::PerCorrection && self.stabilization == Stabilization::Soft {
-            return Err(Error::input(
-                "clamping = per-correction with stabilization = soft: a soft contact acts on the accumulated impulse; \
-                 set stabilization=baumgarte or none",
-            ));
-        }
-        if self.clamping == Clamping::PerCorrection && self.method == Method::Accelerated {
-            return Err(Error::input(
-                "clamping = per-correction with method = accelerated: momentum acts on accumulated impulses; set method=plain",
-            ));
+        if self.rules.clamping == Clamping::PerCorrection {
+            let refuse = |why: &str| Err(Error::input(format!("rules.clamping = per-correction with {why}")));
+            if self.stabilization == Stabilization::Soft {
+                return refuse(
+                    "stabilization = soft: a soft contact acts on the accumulated impulse; set stabilization=baumgarte or none",
+                );
+            }
+            if self.method == Method::Accelerated {
+                return refuse("method = accelerated: momentum acts on accumulated impulses; set method=plain");
+            }
         }
         Ok(())
     }
@@ -319,8 +229,8 @@ impl SolverConfig {
         if self.relax > 4096 {
             return refuse("relax", self.relax.into(), "0 to 4096");
         }
-        if !(1..=16).contains(&self.manifold_passes) {
-            return refuse("manifold_passes", self.manifold_passes.into(), "1 to 16");
+        if !(1..=16).contains(&self.rules.manifold_passes) {
+            return refuse("rules.manifold_passes", self.rules.manifold_passes.into(), "1 to 16");
         }
         if !(1..=64).contains(&self.max_colors) {
             return refuse("max_colors", self.max_colors.into(), "1 to 64");

@@ -1,0 +1,148 @@
+//! The kinds of settings, and the rules that exist for comparison.
+
+#[cfg(feature = "serde")]
+use schemars::JsonSchema;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use crate::names::named;
+
+/// The friction rule of a setting.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Friction {
+    /// No tangential impulse.
+    None,
+    /// Two orthogonal directions, each with its own limit: up to 41 % too strong between them.
+    Box,
+    /// The tangential impulse stays inside the disc of radius mu times the normal impulse: Coulomb's cone, exactly.
+    #[default]
+    Disc,
+}
+
+/// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison [`ComparisonRules::slip_friction`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FrictionRule {
+    /// [`Friction::None`], also where every contact of a scene has mu = 0.
+    None,
+    /// [`ComparisonRules::slip_friction`].
+    Slip,
+    /// [`Friction::Box`].
+    Box,
+    /// [`Friction::Disc`].
+    #[default]
+    Disc,
+}
+
+/// Where friction acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum FrictionAt {
+    /// At every contact point, limited by that point's normal impulse.
+    #[default]
+    Points,
+    /// Once per manifold: at the middle of its points and as a twist about the normal, limited by the sum of its normal impulses.
+    /// Cheaper.
+    Manifold,
+}
+
+/// Order of normals and friction within a manifold.
+///
+/// Over the standing scenes, overlap and speed at rest of both orders agree to a few percent. Towers drift a little less with
+/// normals first (zigzag of 20: 33 against 38 mm in 10 s), walls with friction first (3.4 against 5.7 mm).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum FrictionOrder {
+    /// Normals, then friction within the cone that they span: the order of the course sheet.
+    #[default]
+    NormalsFirst,
+    /// Friction within the cone of the sweep before, then normals.
+    FrictionFirst,
+}
+
+/// The impulse that is kept non-negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Clamping {
+    /// Every single correction; impulses start at zero in each substep. No later correction can take back one that pushed too
+    /// far: misaligned stacks fall.
+    PerCorrection,
+    /// The sum of the corrections.
+    #[default]
+    Accumulated,
+}
+
+/// How the solver removes overlap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Stabilization {
+    /// Not at all: overlap grows.
+    None,
+    /// By a target velocity, a share of the overlap a substep (Baumgarte), beyond a slop and up to a limit.
+    Baumgarte,
+    /// By a damped spring, integrated implicitly; relax sweeps remove the velocity of the spring.
+    #[default]
+    Soft,
+}
+
+named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
+
+/// Which sweeps of a substep solve friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum FrictionSweeps {
+    /// The biased sweeps and the relax sweeps.
+    All,
+    /// The relax sweeps only: the push-out of the biased sweeps then drags no body along.
+    #[default]
+    Relax,
+}
+
+/// How the sweeps of a substep follow each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Method {
+    /// One after another: projected Gauss-Seidel.
+    #[default]
+    Plain,
+    /// With Nesterov's momentum, and a restart as soon as steps grow. The first two sweeps are plain ones, so three sweeps are the
+    /// fewest that gain anything.
+    Accelerated,
+}
+
+named!(Method { Plain = "plain", Accelerated = "accelerated", });
+
+/// Rules that exist for comparison with the literature (docs/rules.md). No scene needs another value than the default.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct ComparisonRules {
+    /// Order of normals and friction within a manifold.
+    pub friction_order: FrictionOrder,
+    /// Whether friction at a point has one direction only, that of its slip when the step begins; a body at rest then creeps.
+    /// It replaces the rules box and disc.
+    pub slip_friction: bool,
+    /// Impulse that is kept non-negative: the sum of the corrections, or each correction.
+    pub clamping: Clamping,
+    /// How often a sweep visits a manifold before the next manifold, 1 to 16. With 2, fewer but longer sweeps are needed.
+    pub manifold_passes: u8,
+}
+
+impl Default for ComparisonRules {
+    fn default() -> Self {
+        Self {
+            friction_order: FrictionOrder::NormalsFirst,
+            slip_friction: false,
+            clamping: Clamping::Accumulated,
+            manifold_passes: 1,
+        }
+    }
+}
