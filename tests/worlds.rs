@@ -49,7 +49,7 @@ fn every_copy_of_a_world_goes_as_it_goes_alone() {
             let alone = end(&scene(name, parameters, 1, None), backend, &config, steps);
             let alone = bits(&alone, 0..alone.bodies.len());
             let all = end(&scene(name, parameters, 5, None), backend, &config, steps);
-            for (k, bodies) in all.parts().enumerate() {
+            for (k, bodies) in all.worlds().enumerate() {
                 assert_eq!(bits(&all, bodies), alone, "{name}: world {k}");
             }
         }
@@ -71,7 +71,7 @@ fn a_world_does_not_see_what_other_worlds_do() {
         .collect();
     let all = end(&scene("pile", &["n=60"], 4, Some("seed")), cpu, &SolverConfig::default().without_sleep(), 90);
     let whole = |world: &World| bits(world, 0..world.bodies.len());
-    for (bodies, alone) in all.parts().zip(&alone) {
+    for (bodies, alone) in all.worlds().zip(&alone) {
         assert_eq!(bits(&all, bodies), whole(alone));
     }
     assert_ne!(whole(&alone[0]), whole(&alone[1]));

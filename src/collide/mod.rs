@@ -117,7 +117,7 @@ impl Detector {
             Arena::new(bodies.flat_map(on_body).map(collider).collect())
         };
         Self {
-            arenas: world.parts().map(arena).collect(),
+            arenas: world.worlds().map(arena).collect(),
             kinds: world.bodies.iter().map(|b| b.kind).collect(),
             moving: Vec::new(),
             jointed: jointed(world),

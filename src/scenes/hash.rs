@@ -1,11 +1,11 @@
-//! A number that tells one scene from another by what is in it.
+//! A hash of the content of a scene.
 
 use std::fmt::{self, Write};
 use std::hash::Hasher;
 
 use fnv::FnvHasher;
 
-use super::Scene;
+use super::scene::Scene;
 
 /// Feeds text to a hasher.
 struct Sink(FnvHasher);

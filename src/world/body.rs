@@ -337,7 +337,7 @@ impl Body {
     }
 
     /// Refuses what no step can be made of.
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         self.check_motion()?;
         self.check_shapes()?;
         self.check_surface()
@@ -386,10 +386,11 @@ impl Body {
     pub(super) fn check_surface(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::input(what));
         let Material { friction, restitution } = self.material;
-        if !(friction >= 0.0 && friction.is_finite() && (0.0..=1.0).contains(&restitution)) {
-            return refuse(format!(
-                "friction = {friction}, restitution = {restitution}: must be 0 or more, and 0 to 1"
-            ));
+        if !(friction >= 0.0 && friction.is_finite()) {
+            return refuse(format!("friction = {friction}: must be 0 or more"));
+        }
+        if !(0.0..=1.0).contains(&restitution) {
+            return refuse(format!("restitution = {restitution}: must be 0 to 1"));
         }
         if self.kind == BodyKind::Dynamic { self.mass.check() } else { self.mass.check_frame() }
     }

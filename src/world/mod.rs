@@ -85,7 +85,7 @@ impl World {
             return Err(Error::input(format!("worlds of gravity {here} and {there}: all must have the same")));
         }
         let first = self.bodies.len();
-        self.begins.extend(other.parts().map(|part| first + part.start));
+        self.begins.extend(other.worlds().map(|bodies| first + bodies.start));
         self.bodies.extend_from_slice(&other.bodies);
         self.joints.extend(other.joints.iter().map(|j| BallJoint {
             body_a: first + j.body_a,
@@ -96,7 +96,7 @@ impl World {
     }
 
     /// The bodies of each world.
-    pub fn parts(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
+    pub fn worlds(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
         let begin = |k: usize| if k == 0 { 0 } else { self.begins[k - 1] };
         let end = move |k: usize| self.begins.get(k).copied().unwrap_or(self.bodies.len());
         (0..self.begins.len() + 1).map(move |k| begin(k)..end(k))
@@ -122,7 +122,7 @@ impl World {
     /// One line that names the body and its shape, or the joint.
     pub fn check(&self) -> Result<()> {
         self.check_gravity()?;
-        if let Some(k) = self.parts().position(|part| part.start > part.end || part.end > self.bodies.len()) {
+        if let Some(k) = self.worlds().position(|range| range.start > range.end || range.end > self.bodies.len()) {
             return Err(Error::input(format!(
                 "world {k}: begins or ends beyond the last of {} bodies",
                 self.bodies.len()

@@ -103,7 +103,7 @@ impl Shape {
         let is_height = |h: &f32| (h * scale.y).abs() <= MOST_LENGTH;
         if !(is_place(scale) && scale.min_element() > 0.0 && heights.iter().flatten().all(is_height)) {
             return Err(Error::input(format!(
-                "a height field, scaled by {scale}: must be at most {MOST_LENGTH:e} m in size"
+                "a height field, scaled by {scale}: must be more than 0 and at most {MOST_LENGTH:e} m in size"
             )));
         }
         // parry stores columns one after another.
@@ -116,7 +116,7 @@ impl Shape {
     ///
     /// # Errors
     /// One line that names the shape, the number and its range.
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         let sizes = |kind: &str, sizes: &[(&str, f32)]| match sizes.iter().find(|s| !(s.1 > 0.0 && s.1 <= MOST_LENGTH))
         {
             None => Ok(()),

@@ -179,7 +179,7 @@ impl RunReport {
             scene: scene.name.clone(),
             backend: simulation.backend().name().into(),
             adapter: simulation.backend().adapter(),
-            worlds: scene.world.parts().len(),
+            worlds: scene.world.worlds().len(),
             bodies: scene.world.dynamic_count(),
             steps: 0,
             dt: scene.dt,

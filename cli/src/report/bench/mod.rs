@@ -240,7 +240,7 @@ impl Course {
                 adapter: way.pool.install(move || backend.adapter()),
                 threads: way.pool.current_num_threads(),
                 settings: settings::unusual(config, &["sleep_after"]).join(" "),
-                worlds: world.parts().len(),
+                worlds: world.worlds().len(),
                 bodies: world.dynamic_count(),
                 manifolds: stats.manifolds,
                 points: stats.points,

@@ -1,4 +1,4 @@
-//! What many scenes are made of.
+//! Bodies and distances that many scenes share.
 
 use glam::Vec3;
 

@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
-use super::parts::{centered, floor, slope};
+use super::common::{centered, floor, slope};
 use super::stacks::stack;
+use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
 /// A ball of radius 0.5 m, its lowest point `height` above a half-space (m).
@@ -63,7 +63,7 @@ fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene
 pub(super) fn throw(n: usize, speed: f32) -> Scene {
     const DISTANCE: f32 = 20.0;
     let mut world = floor(40.0, 10.0);
-    stack(&mut world, n, |_| Vec3::ZERO);
+    stack(&mut world, n, |_| ([0.0; 2], 1000.0));
     let rise = 0.5 * -world.gravity.y * DISTANCE / speed;
     let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5)).velocity(Vec3::new(speed, rise, 0.0), Vec3::ZERO);
     world.add(ball.position(-1.0 - DISTANCE, (0.5 * n as f32).max(0.5), 0.0));

@@ -1,25 +1,25 @@
-//! What an entry of the catalogue is: a name, what should hold, parameters.
+//! An entry of the catalogue: a name, what should hold, parameters.
 
-use super::Scene;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::scenes::scene::Scene;
 use crate::suggest::hint;
 
-/// Most dynamic bodies a scene of the catalogue can be asked for.
-pub(super) const MOST_BODIES: f64 = 4e6;
+/// Most dynamic bodies of a scene of the catalogue.
+pub const MOST_BODIES: f64 = 4e6;
 
 /// A number that shapes a scene of the catalogue.
 #[derive(Clone, Debug)]
 pub struct Parameter {
     /// Name, as in `name=value`.
     pub name: &'static str,
-    /// Value unless told otherwise.
+    /// Default value.
     pub default: f64,
     /// Least and greatest value.
     pub range: (f64, f64),
     /// Whether it must be a whole number.
     pub whole: bool,
-    /// One line: what it is, and its unit.
+    /// One line: meaning and unit.
     pub summary: &'static str,
 }
 
@@ -49,11 +49,11 @@ pub struct Entry {
     pub name: &'static str,
     /// One line: what it is and what should hold.
     pub summary: &'static str,
-    /// What can be changed about it.
+    /// Its parameters.
     pub parameters: &'static [Parameter],
     /// Dynamic bodies for one value of each parameter, in their order.
     pub(super) bodies: fn(&[f64]) -> f64,
-    /// Takes the same values.
+    /// Builds the scene from the same values.
     pub(super) build: fn(&[f64]) -> Result<Scene>,
 }
 
@@ -78,17 +78,17 @@ impl Entry {
         self.values(assignments).and_then(build).map_err(|e| e.within(self.name))
     }
 
-    /// Dynamic bodies that [`Entry::build`] makes, known before.
+    /// Number of dynamic bodies of the scene that [`Entry::build`] makes.
     ///
     /// # Errors
-    /// As there, but for values that contradict each other.
+    /// As [`Entry::build`], except for values that contradict each other.
     pub fn body_count(&self, assignments: &[String]) -> Result<u64> {
         let values = self.values(assignments).map_err(|e| e.within(self.name))?;
         Ok((self.bodies)(&values) as u64)
     }
 
     /// One value for each parameter, in their order.
-    pub(super) fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
+    pub(in crate::scenes) fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
         let mut values: Vec<f64> = self.parameters.iter().map(|p| p.default).collect();
         for assignment in assignments {
             let (key, value) = assignment

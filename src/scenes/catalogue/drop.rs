@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
 use crate::error::Result;
+use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
 /// Distance between neighbors in the row (m).

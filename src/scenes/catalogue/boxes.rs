@@ -1,10 +1,10 @@
-//! Scenes of boxes: piles, pyramids, towers, walls.
+//! Scenes of boxes: piles, pyramids, walls.
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
-use super::parts::{centered, floor, unit_box};
+use super::common::{centered, floor, unit_box};
 use crate::random::SplitMix64;
+use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
 /// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls; every other
@@ -89,17 +89,6 @@ fn add_pyramid(world: &mut World, base: usize, x: f64, z: f64) {
     }
 }
 
-/// A stack of `n` boxes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
-pub(super) fn tower(n: usize, offset: f32, top_ratio: f32) -> Scene {
-    let mut world = floor(20.0, 20.0);
-    for i in 0..n {
-        let x = if i % 2 == 0 { offset } else { -offset };
-        let density = if i + 1 == n { 1000.0 * top_ratio } else { 1000.0 };
-        world.add(unit_box().density(density).position(x, i as f32 + 0.5, 0.0));
-    }
-    Scene::new("tower", world, 600).standing()
-}
-
 /// Rows of bricks of 1 x 0.5 x 0.5 m with 0.05 m between neighbors. Every other row is shifted by half a brick and ends
 /// flush in half bricks, so that every brick is held on both sides.
 pub(super) fn wall(rows: usize, columns: usize) -> Scene {
@@ -149,14 +138,7 @@ mod tests {
 
     #[test]
     fn no_two_bodies_overlap_at_the_start() {
-        for scene in [
-            pile(1000, 0.03, 1, 1.0),
-            pile(500, 0.04, 7, 1.0),
-            pyramid(6),
-            many_pyramids(5, 3),
-            tower(5, 0.2, 1.0),
-            wall(6, 4),
-        ] {
+        for scene in [pile(1000, 0.03, 1, 1.0), pile(500, 0.04, 7, 1.0), pyramid(6), many_pyramids(5, 3), wall(6, 4)] {
             no_two_overlap(&scene);
         }
     }

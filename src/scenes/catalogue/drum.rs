@@ -4,8 +4,8 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
-use super::parts::centered;
+use super::common::centered;
+use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
 /// Side of a box (m).

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
-use super::parts::{centered, floor, unit_box};
+use super::common::{centered, floor, unit_box};
 use crate::error::Result;
+use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
 /// Distance between neighboring stones at the start (m): of hulls that touch exactly, nothing says which way they touch.

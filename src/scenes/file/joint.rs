@@ -1,44 +1,11 @@
-//! Joints of a scene file: what the file says, and from there to joints of the world.
+//! From a joint of a scene file to a joint of the world.
 
 use std::fmt;
 
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-use super::check;
+use super::numbers::lengths;
+use super::schema::{BodyRef, JointFile};
 use crate::error::{Error, Result};
 use crate::world::{BallJoint, BodyKind, World};
-
-/// A joint of a scene file.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-#[schemars(title = "Joint")]
-#[non_exhaustive]
-pub enum JointFile {
-    /// Keeps a point of one body together with a point of another, or of the world. Needs an anchor or anchors.
-    Ball {
-        /// One body, which is tied to the world, or two; at least one of them dynamic.
-        #[schemars(length(min = 1, max = 2))]
-        bodies: Vec<BodyRef>,
-        /// The point where the bodies are tied as they stand, in the world (m).
-        anchor: Option<[f64; 3]>,
-        /// The point in the frame of each body (m); with one body, the second is in the world.
-        anchors: Option<[[f64; 3]; 2]>,
-        /// Whether the two bodies still collide with each other.
-        #[serde(default)]
-        collide: bool,
-    },
-}
-
-/// Which body of the scene.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "a body is named by its index from 0 or by its name")]
-pub enum BodyRef {
-    /// Its index, counted from 0.
-    Index(usize),
-    /// Its name, which no other body may have.
-    Name(String),
-}
 
 impl fmt::Display for BodyRef {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -87,13 +54,11 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
     }
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
-            let point = check::lengths("anchor", *point)?.into();
+            let point = lengths("anchor", *point)?.into();
             let in_frame = |i: usize| world.bodies[i].rotation.inverse() * (point - world.bodies[i].position);
             (in_frame(a), b.map_or(point, in_frame))
         }
-        (None, Some([on_a, on_b])) => {
-            (check::lengths("anchors[0]", *on_a)?.into(), check::lengths("anchors[1]", *on_b)?.into())
-        }
+        (None, Some([on_a, on_b])) => (lengths("anchors[0]", *on_a)?.into(), lengths("anchors[1]", *on_b)?.into()),
         _ => return Err(Error::input("anchor and anchors: give one of them")),
     };
     Ok(BallJoint { body_a: a, body_b: b, anchor_a, anchor_b, collide: *collide })

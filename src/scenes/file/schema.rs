@@ -1,21 +1,13 @@
-//! Scene files: JSON, version 1. What each field means is in the types below, and in the JSON Schema made from them.
-
-use std::path::Path;
+//! The types of a scene file: version 1 of the format, and the source of its JSON Schema.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::Value;
-use serde_path_to_error::Segment;
 
-use super::joint::JointFile;
-use super::{Scene, check};
-use crate::error::{Error, Result};
-use crate::suggest::shorten;
 use crate::world::BodyKind;
 
-/// A scene as a file says it, before anything but its form is checked: version 1 of the format.
+/// The content of a scene file, of which only the form is checked: version 1 of the format.
 ///
-/// SI units, right-handed. Numbers are stored in single precision; lengths may be up to 1e9 m. What is left out takes
+/// SI units, right-handed. Numbers are stored in single precision; lengths may be up to 1e9 m. A key that is left out takes
 /// its default; a key that is not listed is refused.
 ///
 /// ```
@@ -182,20 +174,51 @@ pub enum Geometry {
         /// Points out of the solid; of length 1 within 0.001.
         normal: [f64; 3],
     },
-    /// A triangle mesh; on fixed bodies only.
+    /// A triangle mesh; not on dynamic bodies.
     Mesh {
         /// The vertices.
         vertices: Vec<[f64; 3]>,
         /// Three indices of vertices each, counted from 0, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
     },
-    /// Heights over a rectangle of the xz plane around the origin; on fixed bodies only.
+    /// Heights over a rectangle of the xz plane around the origin; not on dynamic bodies.
     HeightField {
         /// Rows along z of heights along x, in units of the scale's y.
         heights: Vec<Vec<f64>>,
         /// Length along x, unit of the heights, length along z.
         scale: [f64; 3],
     },
+}
+
+/// A joint of a scene file.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(title = "Joint")]
+#[non_exhaustive]
+pub enum JointFile {
+    /// Keeps a point of one body together with a point of another, or of the world. Needs an anchor or anchors.
+    Ball {
+        /// One body, which is tied to the world, or two; at least one of them dynamic.
+        #[schemars(length(min = 1, max = 2))]
+        bodies: Vec<BodyRef>,
+        /// The point where the bodies are tied as they stand, in the world (m).
+        anchor: Option<[f64; 3]>,
+        /// The point in the frame of each body (m); with one body, the second is in the world.
+        anchors: Option<[[f64; 3]; 2]>,
+        /// Whether the two bodies still collide with each other.
+        #[serde(default)]
+        collide: bool,
+    },
+}
+
+/// Which body of the scene.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a body is named by its index from 0 or by its name")]
+pub enum BodyRef {
+    /// Its index, counted from 0.
+    Index(usize),
+    /// Its name, which no other body may have.
+    Name(String),
 }
 
 mod defaults {
@@ -214,64 +237,4 @@ mod defaults {
     pub(super) fn rotation() -> [f64; 4] {
         [0.0, 0.0, 0.0, 1.0]
     }
-}
-
-impl SceneFile {
-    /// Reads the text of a scene file.
-    ///
-    /// # Errors
-    /// Not JSON, another version, an unknown or missing key, a value of the wrong type: one line that says where.
-    pub fn parse(text: &str) -> Result<Self> {
-        let mut json = serde_json::Deserializer::from_str(text);
-        let parsed = serde_path_to_error::deserialize(&mut json).map_err(|e| explain(text, &e));
-        parsed.and_then(|file| json.end().map(|()| file).map_err(Error::input))
-    }
-
-    /// Checks every value and builds the scene, which takes `name` if the file gives it none.
-    ///
-    /// # Errors
-    /// A value that no scene can be made of: one line with the body, the value and what it must be.
-    pub fn into_scene(self, name: &str) -> Result<Scene> {
-        check::scene(self, name)
-    }
-}
-
-/// Reads the scene file `path`.
-///
-/// # Errors
-/// The file cannot be read, or says something that no scene can be made of: one line that names the file and the place.
-pub fn load(path: &Path) -> Result<Scene> {
-    let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    SceneFile::parse(&text).and_then(|file| file.into_scene(&name)).map_err(|e| e.within(path.display()))
-}
-
-/// The JSON Schema of scene files.
-pub fn schema() -> Value {
-    schemars::schema_for!(SceneFile).to_value()
-}
-
-/// One line for what serde found: where it is, with the body's name, and what.
-fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
-    // Only now is the text worth a second look; malformed text has no more to say.
-    let value: Value = serde_json::from_str(text).unwrap_or_default();
-    if let Some(version) = value.get("version").filter(|&v| *v != 1) {
-        return check::unknown_version(version);
-    }
-    let message = error.inner().to_string().replace(char::is_control, " ");
-    let message = shorten(&message, "`drystone scenes --schema` lists all");
-    let mut segments = error.path().iter();
-    let place = match (segments.next(), segments.next()) {
-        (Some(Segment::Map { key }), Some(&Segment::Seq { index })) if key == "bodies" => {
-            let body = check::body_label(index, value["bodies"][index]["name"].as_str());
-            let path = error.path().to_string();
-            match path.split_once("].") {
-                Some((_, rest)) => format!("{body}: {rest}"),
-                None => body,
-            }
-        }
-        (None | Some(Segment::Unknown), _) => return Error::input(message),
-        _ => error.path().to_string(),
-    };
-    Error::input(message).within(place.replace(char::is_control, " "))
 }

@@ -1,16 +1,36 @@
 //! The catalogue: every scene that comes with the crate, by name and parameters.
 
-use super::catalogue::{Entry, MOST_BODIES, Parameter};
-use super::{basics, boxes, drop, drum, jointed, masonry, stacks};
-use crate::error::Error;
+mod basics;
+mod boxes;
+mod common;
+mod drop;
+mod drum;
+mod entry;
+mod jointed;
+mod masonry;
+mod stacks;
+
+pub use entry::{Entry, MOST_BODIES, Parameter};
+
+use crate::error::{Error, Result};
 
 const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of the slope [degrees]");
+const CUBES: Parameter = Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes");
 const MU: Parameter = Parameter::real("mu", 0.5, (0.0, 10.0), "friction of all bodies");
 const LIFTED: Parameter = Parameter::real("angle", 90.0, (0.0, 180.0), "start, lifted from where it hangs [degrees]");
 
 /// 1 + 2 + ... + n.
 fn triangle(n: f64) -> f64 {
     n * (n + 1.0) / 2.0
+}
+
+/// Refuses a parameter that is larger than another one.
+fn at_most([name, limit]: [&str; 2], value: f64, most: f64) -> Result<()> {
+    if value <= most {
+        Ok(())
+    } else {
+        Err(Error::input(format!("{name} = {value}: must be at most {limit} = {most}")))
+    }
 }
 
 /// Every scene that comes with the crate.
@@ -53,7 +73,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
         ],
         bodies: |v| v[0],
-        build: |v| Ok(boxes::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
+        build: |v| Ok(stacks::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
     },
     Entry {
         name: "wall",
@@ -82,17 +102,14 @@ pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "stack",
         summary: "a straight stack of cubes: it stands",
-        parameters: &[Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes")],
+        parameters: &[CUBES],
         bodies: |v| v[0],
         build: |v| Ok(stacks::aligned(v[0] as usize)),
     },
     Entry {
         name: "misaligned",
         summary: "a stack of cubes, each off the axis by a fixed random shift: it stands",
-        parameters: &[
-            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
-            Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]"),
-        ],
+        parameters: &[CUBES, Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]")],
         bodies: |v| v[0],
         build: |v| Ok(stacks::misaligned(v[0] as usize, v[1])),
     },
@@ -120,10 +137,7 @@ pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "throw",
         summary: "a ball is thrown at a stack of cubes: the stack stands until it is hit, then it falls",
-        parameters: &[
-            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
-            Parameter::real("speed", 20.0, (5.0, 100.0), "horizontal speed of the ball [m/s]"),
-        ],
+        parameters: &[CUBES, Parameter::real("speed", 20.0, (5.0, 100.0), "horizontal speed of the ball [m/s]")],
         bodies: |v| v[0] + 1.0,
         build: |v| Ok(basics::throw(v[0] as usize, v[1] as f32)),
     },
@@ -136,9 +150,7 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[1] * triangle((v[0] / v[1]).floor()),
         build: |v| {
-            if v[1] > v[0] {
-                return Err(Error::input(format!("step = {}: must be at most n = {}", v[1], v[0])));
-            }
+            at_most(["step", "n"], v[1], v[0])?;
             Ok(stacks::tallest(v[0] as usize, v[1] as usize))
         },
     },
@@ -146,7 +158,7 @@ pub static CATALOGUE: &[Entry] = &[
         name: "mass-ratio",
         summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 1.5 mm deep, or 0.01 with substeps=32",
         parameters: &[
-            Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes"),
+            CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
         ],
         bodies: |v| v[0],
@@ -182,9 +194,7 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[0] + v[1],
         build: |v| {
-            if v[1] > v[0] {
-                return Err(Error::input(format!("boxes = {}: must be at most planks = {}", v[1], v[0])));
-            }
+            at_most(["boxes", "planks"], v[1], v[0])?;
             Ok(jointed::bridge(v[0] as usize, v[1] as usize))
         },
     },

@@ -1,18 +1,34 @@
-//! Many worlds of one scene beside each other.
+//! A scene by the name of a catalogue entry or of a file, and many worlds of it.
 
-use super::catalogue::MOST_BODIES;
-use super::{CATALOGUE, Group, Scene};
+use std::path::Path;
+
+use super::catalogue::{CATALOGUE, MOST_BODIES};
+#[cfg(feature = "serde")]
+use super::file::load;
+use super::scene::{Group, Scene};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::suggest::hint;
 
 impl Scene {
+    /// Finds a scene by its catalogue name, else reads the file of that name, for which the feature `serde` is needed.
+    /// `parameters` are `key=value`.
+    ///
+    /// # Errors
+    /// Neither a known name nor a readable scene file; an unknown parameter or an impossible value.
+    pub fn find(name_or_path: &str, parameters: &[String]) -> Result<Self> {
+        match CATALOGUE.iter().find(|e| e.name == name_or_path) {
+            Some(entry) => entry.build(parameters),
+            None => load_or_suggest(name_or_path, parameters),
+        }
+    }
+
     /// `count` worlds of a scene as one, whose bodies never meet: see [`World::beside`](crate::World::beside). All are the
     /// same, or, with `vary`, each has one more of that parameter than the one before.
     ///
     /// ```
     /// let towers = drystone::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;
-    /// let bodies: Vec<_> = towers.world.parts().map(|bodies| bodies.len()).collect();
+    /// let bodies: Vec<_> = towers.world.worlds().map(|bodies| bodies.len()).collect();
     /// assert_eq!(bodies, [5, 6, 7]);
     /// # Ok::<(), drystone::Error>(())
     /// ```
@@ -76,7 +92,7 @@ impl Scene {
         Self::find_worlds(name, &own, count, vary)
     }
 
-    /// Sets the world of another scene beside this one's. What both say holds for both.
+    /// Sets the world of another scene beside the world of this scene. A container or a promise to stand remains if both scenes have it.
     fn beside(&mut self, other: &Self) -> Result<()> {
         let first = self.world.bodies.len();
         self.world.beside(&other.world)?;
@@ -86,6 +102,27 @@ impl Scene {
         self.stands &= other.stands;
         Ok(())
     }
+}
+
+/// Reads a scene file, or says that there is neither a scene nor a file of that name.
+fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
+    let path = Path::new(name_or_path);
+    if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
+        let hint = hint(name_or_path, CATALOGUE.iter().map(|e| e.name), "`drystone scenes` lists the scenes");
+        return Err(Error::input(format!("{name_or_path:?} is neither a scene nor a scene file{hint}")));
+    }
+    match parameters.first() {
+        Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
+        None => load(path),
+    }
+}
+
+#[cfg(not(feature = "serde"))]
+fn load(path: &Path) -> Result<Scene> {
+    Err(Error::input(format!(
+        "{}: a scene file: drystone was built without the feature serde, which reads it",
+        path.display()
+    )))
 }
 
 /// The value of a parameter that is a whole number.

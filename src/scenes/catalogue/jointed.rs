@@ -2,8 +2,8 @@
 
 use glam::{Quat, Vec3};
 
-use super::Scene;
-use super::parts::centered;
+use super::common::centered;
+use crate::scenes::scene::Scene;
 use crate::world::{BallJoint, Body, Shape, World};
 
 /// A ball at the end of `length` (m), lifted by `degrees` from where it would hang. Its radius is a tenth of the length,

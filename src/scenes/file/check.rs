@@ -1,0 +1,159 @@
+//! From a scene file to a scene. The checks of the world check ranges; here is what only a file can get wrong.
+
+use std::fmt::Display;
+
+use glam::{Quat, Vec3};
+
+use super::joint::joint;
+use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
+use super::schema::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
+use crate::config::check_step_length;
+use crate::error::{Error, Result};
+use crate::scenes::scene::Scene;
+use crate::world::{Body, BodyKind, MassProperties, Shape, World};
+
+/// The scene that a file describes, named `name` if the file gives it none.
+pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
+    if file.version != 1 {
+        return Err(unknown_version(file.version));
+    }
+    let [dt] = finite("dt", [file.dt])?;
+    check_step_length(dt)?;
+    let mut world = World { gravity: finite("gravity", file.gravity)?.into(), ..World::new() };
+    world.check_gravity()?;
+    let container = file.container.map(container).transpose()?;
+    for (index, body_file) in file.bodies.into_iter().enumerate() {
+        let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;
+        world.add(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
+    }
+    for (index, joint_file) in file.joints.iter().enumerate() {
+        let joint = joint(joint_file, &world).map_err(|e| e.within(format_args!("joints[{index}]")))?;
+        world.join(joint);
+    }
+    Ok(Scene { dt, container, ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps) })
+}
+
+pub(super) fn unknown_version(version: impl Display) -> Error {
+    Error::input(format!("version = {version}: only version 1 is known"))
+}
+
+/// What a message calls a body: its index and, if it has one, its name.
+pub(super) fn body_label(index: usize, name: Option<&str>) -> String {
+    name.map_or_else(|| format!("body {index}"), |name| format!("body {index} {name:?}"))
+}
+
+fn container(corners: [[f64; 3]; 2]) -> Result<(Vec3, Vec3)> {
+    let low: Vec3 = lengths("container[0]", corners[0])?.into();
+    let high: Vec3 = lengths("container[1]", corners[1])?.into();
+    if !low.cmplt(high).all() {
+        return Err(refusal("container[1]", &corners[1], "above container[0] along every axis"));
+    }
+    Ok((low, high))
+}
+
+fn body(file: &BodyFile) -> Result<Body> {
+    let mut body = match file.kind {
+        BodyKind::Fixed => Body::fixed(),
+        BodyKind::Kinematic => Body::kinematic(),
+        BodyKind::Dynamic => Body::dynamic(),
+    };
+    let [x, y, z] = finite("position", file.position)?;
+    let velocity = |name, v| if file.kind == BodyKind::Fixed { zero(name, v) } else { finite(name, v) };
+    let linear = velocity("linear_velocity", file.linear_velocity)?;
+    let angular = velocity("angular_velocity", file.angular_velocity)?;
+    let pushed = |x: f32| x == 0.0 || file.kind == BodyKind::Dynamic;
+    let force = checked("force", file.force, "zero unless the body is dynamic", pushed)?;
+    body.force = force.into();
+    let ([friction], [restitution]) =
+        (finite("friction", [file.friction])?, finite("restitution", [file.restitution])?);
+    let mut body = body
+        .position(x, y, z)
+        .rotation(rotation("rotation", file.rotation)?)
+        .velocity(linear.into(), angular.into())
+        .friction(friction)
+        .restitution(restitution);
+    for (k, shape_file) in file.shapes.iter().enumerate() {
+        let (shape, at, turned) = shape(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?;
+        body = body.shape_at(shape, at, turned);
+    }
+    let body = with_mass(body, file)?;
+    body.check().map(|()| body)
+}
+
+/// The body with the mass that the file gives it.
+fn with_mass(mut body: Body, file: &BodyFile) -> Result<Body> {
+    let dynamic = file.kind == BodyKind::Dynamic;
+    match (file.density, file.mass, &file.mass_properties) {
+        (None, None, None) => {}
+        (Some(density), None, None) => {
+            let [density] = positive("density", [density])?;
+            body = body.density(density);
+        }
+        (None, Some(mass), None) => {
+            let [mass] = positive("mass", [mass])?;
+            if dynamic && !file.shapes.is_empty() {
+                body = body.total_mass(mass);
+            }
+        }
+        (None, None, Some(mass)) => {
+            let mass = mass_properties(mass).map_err(|e| e.within("mass_properties"))?;
+            if dynamic {
+                body = body.mass_properties(mass);
+            }
+        }
+        _ => return Err(Error::input("density, mass and mass_properties: give only one of them")),
+    }
+    if dynamic && file.mass_properties.is_none() && file.shapes.is_empty() {
+        return Err(Error::input("a dynamic body without shapes needs mass_properties"));
+    }
+    Ok(body)
+}
+
+fn mass_properties(file: &MassFile) -> Result<MassProperties> {
+    let [mass] = positive("mass", [file.mass])?;
+    Ok(MassProperties {
+        mass,
+        center: lengths("center", file.center)?.into(),
+        principal_inertia: positive("principal_inertia", file.principal_inertia)?.into(),
+        principal_frame: rotation("principal_frame", file.principal_frame)?,
+    })
+}
+
+/// The shape, its position and its rotation. The world checks its extents before mass is computed from them.
+fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
+    let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
+    let shape = match &file.geometry {
+        Geometry::Ball { radius } => Shape::ball(extent("radius", *radius)?),
+        Geometry::Cuboid { half_extents } => {
+            let [x, y, z] = finite("half_extents", *half_extents)?;
+            Shape::cuboid(x, y, z)
+        }
+        Geometry::Capsule { half_height, radius } => {
+            Shape::capsule(extent("half_height", *half_height)?, extent("radius", *radius)?)
+        }
+        Geometry::Cylinder { half_height, radius } => {
+            Shape::cylinder(extent("half_height", *half_height)?, extent("radius", *radius)?)
+        }
+        Geometry::Cone { half_height, radius } => {
+            Shape::cone(extent("half_height", *half_height)?, extent("radius", *radius)?)
+        }
+        Geometry::ConvexHull { points } => Shape::convex_hull(&vertices("points", points)?)?,
+        Geometry::HalfSpace { normal } => Shape::half_space(unit("normal", *normal)?.into()),
+        Geometry::Mesh { vertices: corners, triangles } => {
+            Shape::mesh(vertices("vertices", corners)?, triangles.clone())?
+        }
+        Geometry::HeightField { heights, scale } => {
+            let height = |(k, row): (usize, &Vec<f64>)| {
+                row.iter().map(|&h| extent(&format!("heights[{k}]"), h)).collect::<Result<Vec<f32>>>()
+            };
+            let heights = heights.iter().enumerate().map(height).collect::<Result<Vec<_>>>()?;
+            Shape::height_field(&heights, finite("scale", *scale)?.into())?
+        }
+    };
+    shape.check()?;
+    Ok((shape, finite("position", file.position)?.into(), rotation("rotation", file.rotation)?))
+}
+
+fn vertices(name: &str, points: &[[f64; 3]]) -> Result<Vec<Vec3>> {
+    points.iter().enumerate().map(|(k, &p)| lengths(format_args!("{name}[{k}]"), p).map(Vec3::from)).collect()
+}

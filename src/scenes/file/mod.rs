@@ -1,0 +1,77 @@
+//! Scene files: JSON, version 1.
+
+mod check;
+mod joint;
+mod numbers;
+mod schema;
+
+pub use schema::{BodyFile, BodyRef, Geometry, JointFile, MassFile, SceneFile, ShapeFile};
+
+use std::path::Path;
+
+use serde_json::Value;
+use serde_path_to_error::Segment;
+
+use super::scene::Scene;
+use crate::error::{Error, Result};
+use crate::suggest::shorten;
+
+impl SceneFile {
+    /// Reads the text of a scene file.
+    ///
+    /// # Errors
+    /// Not JSON, another version, an unknown or missing key, a value of the wrong type: one line that says where.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut json = serde_json::Deserializer::from_str(text);
+        let parsed = serde_path_to_error::deserialize(&mut json).map_err(|e| explain(text, &e));
+        parsed.and_then(|file| json.end().map(|()| file).map_err(Error::input))
+    }
+
+    /// Checks every value and builds the scene, which takes `name` if the file gives it none.
+    ///
+    /// # Errors
+    /// A value that no scene can be made of: one line with the body, the value and what it must be.
+    pub fn into_scene(self, name: &str) -> Result<Scene> {
+        check::scene(self, name)
+    }
+}
+
+/// Reads the scene file `path`.
+///
+/// # Errors
+/// The file cannot be read, or says something that no scene can be made of: one line that names the file and the place.
+pub fn load(path: &Path) -> Result<Scene> {
+    let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    SceneFile::parse(&text).and_then(|file| file.into_scene(&name)).map_err(|e| e.within(path.display()))
+}
+
+/// The JSON Schema of scene files.
+pub fn schema() -> Value {
+    schemars::schema_for!(SceneFile).to_value()
+}
+
+/// One line for what serde found: where it is, with the body's name, and what.
+fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
+    // Only now is the text worth a second look; malformed text has no more to say.
+    let value: Value = serde_json::from_str(text).unwrap_or_default();
+    if let Some(version) = value.get("version").filter(|&v| *v != 1) {
+        return check::unknown_version(version);
+    }
+    let message = error.inner().to_string().replace(char::is_control, " ");
+    let message = shorten(&message, "`drystone scenes --schema` lists all");
+    let mut segments = error.path().iter();
+    let place = match (segments.next(), segments.next()) {
+        (Some(Segment::Map { key }), Some(&Segment::Seq { index })) if key == "bodies" => {
+            let body = check::body_label(index, value["bodies"][index]["name"].as_str());
+            let path = error.path().to_string();
+            match path.split_once("].") {
+                Some((_, rest)) => format!("{body}: {rest}"),
+                None => body,
+            }
+        }
+        (None | Some(Segment::Unknown), _) => return Error::input(message),
+        _ => error.path().to_string(),
+    };
+    Error::input(message).within(place.replace(char::is_control, " "))
+}

@@ -1,0 +1,55 @@
+//! A scene: a world, the length of a step, and what should hold at the end.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use crate::world::{BodyKind, World};
+
+/// A world, with what a run needs to know about it.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name of the catalogue entry, or of the file.
+    pub name: String,
+    /// The bodies.
+    pub world: World,
+    /// Length of a step (s).
+    pub dt: f32,
+    /// Steps of a run that asks for none.
+    pub steps: u32,
+    /// Lower and upper corner of the space that no dynamic body should leave (m), if the scene has one.
+    pub container: Option<(Vec3, Vec3)>,
+    /// Whether every dynamic body should still be in place at the end.
+    pub stands: bool,
+    /// Bodies that stand or fall together; empty if the scene names none.
+    pub groups: Vec<Group>,
+}
+
+/// Bodies that stand or fall together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Name for people.
+    pub name: String,
+    /// Their indices.
+    pub bodies: Range<usize>,
+}
+
+impl Scene {
+    /// A scene at 60 steps a second, without a container, whose bodies need not stand.
+    pub fn new(name: impl Into<String>, world: World, steps: u32) -> Self {
+        Self { name: name.into(), world, dt: 1.0 / 60.0, steps, container: None, stands: false, groups: Vec::new() }
+    }
+
+    /// Says that every dynamic body should still be in place at the end.
+    pub fn standing(mut self) -> Self {
+        self.stands = true;
+        self
+    }
+
+    /// Dynamic bodies whose center of mass is outside the container.
+    pub fn escaped(&self, world: &World) -> usize {
+        let Some((low, high)) = self.container else { return 0 };
+        let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
+        dynamic.map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
+    }
+}
