@@ -1,9 +1,11 @@
 //! How hard a constraint is to move: entries of S = G M⁻¹ Gᵀ at one contact point. Derivation: docs/derivation.md.
 
+use std::ops::Div;
+
 use glam::{Mat3, Vec3};
 
 use super::layout::{ContactRow, MassRow};
-use crate::math::Lane;
+use crate::math::Scalar;
 
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
@@ -46,12 +48,8 @@ impl EffectiveMass<'_> {
     /// One over the largest eigenvalue of the tangential block.
     pub fn tangent(&self, r_a: Vec3, r_b: Vec3) -> f32 {
         let (t_1, t_2) = self.row.tangents();
-        let (s_11, s_22, s_12) =
-            (self.entry(r_a, r_b, t_1, t_1), self.entry(r_a, r_b, t_2, t_2), self.entry(r_a, r_b, t_1, t_2));
-        // Squares of a light body's entries would leave single precision.
-        let scale = (s_11 + s_22).inverse_power();
-        let (s_11, s_22, s_12) = (s_11 * scale, s_22 * scale, s_12 * scale);
-        scale * inverse_or_zero(0.5 * (s_11 + s_22 + ((s_11 - s_22).powi(2) + 4.0 * s_12 * s_12).sqrt()))
+        let entry = |d, e| self.entry(r_a, r_b, d, e);
+        tangent_mass([entry(t_1, t_1), entry(t_2, t_2), entry(t_1, t_2)], f32::sqrt)
     }
 
     /// One over the entry of the tangential direction `d`.
@@ -72,6 +70,16 @@ impl EffectiveMass<'_> {
     }
 }
 
-fn inverse_or_zero(x: f32) -> f32 {
-    if x > 0.0 { 1.0 / x } else { 0.0 }
+/// One over the largest eigenvalue of the tangential block with the entries s_11, s_22 and s_12; 0 for no block.
+pub fn tangent_mass<S: Scalar + Div<Output = S>>([s_11, s_22, s_12]: [S; 3], sqrt: fn(S) -> S) -> S {
+    // Squares of a light body's entries would leave single precision.
+    let scale = (s_11 + s_22).inverse_power();
+    let (s_11, s_22, s_12) = (s_11 * scale, s_22 * scale, s_12 * scale);
+    let apart = s_11 - s_22;
+    let root = sqrt(apart * apart + S::constant(4.0) * s_12 * s_12);
+    scale * inverse_or_zero(S::constant(0.5) * (s_11 + s_22 + root))
+}
+
+fn inverse_or_zero<S: Scalar + Div<Output = S>>(x: S) -> S {
+    if x > S::default() { S::constant(1.0) / x } else { S::default() }
 }

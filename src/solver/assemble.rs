@@ -7,6 +7,7 @@ use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
 use crate::error::{Error, Result};
 use crate::kernels::{Body, Contact, Impulse, Mass, Point, Rows, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
+use crate::problem::effective::tangent_mass;
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem};
 
 /// A contact problem as a step without time.
@@ -104,14 +105,12 @@ fn hand(index: usize, contact: &PointContact) -> Result<f64> {
 fn point(operator: &Operator, index: usize, hand: f64) -> Point<f64> {
     let contact = &operator.problem().contacts[index];
     let w = operator.block(index);
-    let (w_11, w_22, w_12) = (w.y_axis.y, w.z_axis.z, w.y_axis.z);
-    let largest = 0.5 * (w_11 + w_22 + ((w_11 - w_22).powi(2) + 4.0 * w_12 * w_12).sqrt());
     Point {
         r_a: wide(contact.r_a),
         r_b: wide(contact.r_b),
         separation: contact.offset.x,
         normal_mass: 1.0 / w.x_axis.x,
-        tangent_mass: 1.0 / largest,
+        tangent_mass: tangent_mass([w.y_axis.y, w.z_axis.z, w.y_axis.z], f64::sqrt),
         approach_velocity: 0.0,
         slip_1: contact.offset.y,
         slip_2: contact.offset.z * hand,
