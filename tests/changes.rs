@@ -638,13 +638,13 @@ type Change = fn(&mut World);
 #[test]
 fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
     let cases: [(&str, Change); 10] = [
-        ("the world has 25 bodies", |w| {
+        ("there are 25 bodies", |w| {
             w.add(cube(0.0, 20.0, 0.0));
         }),
-        ("the world has 23 bodies", |w| {
+        ("there are 23 bodies", |w| {
             w.bodies.pop();
         }),
-        ("the world has 24 bodies in 2 parts", |w| w.begins.push(5)),
+        ("there are 24 bodies in 2 worlds", |w| w.begins.push(5)),
         ("body 3 \"\" changed", |w| w.bodies[3].kind = drystone::BodyKind::Fixed),
         ("body 3 \"\" changed", |w| w.bodies[3] = cube(0.0, 2.5, 0.0).shape(Shape::ball(0.5))),
         ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].shape = Shape::ball(0.5)),

@@ -6,8 +6,8 @@ use parry3d::math::Pose;
 use parry3d::shape::{SharedShape, SupportMap, Triangle};
 
 use super::facet::{half_space_contact, triangle_contact};
-use super::query::{Found, convex_contact};
-use super::solid::{Cutting, Search, Solid};
+use super::query::convex_contact;
+use super::solid::{ClipBuffers, ContactQuery, ParryManifold, Solid};
 use crate::random::mixed;
 
 struct Random(u64);
@@ -76,14 +76,14 @@ fn true_distance(along: impl Fn(Vec3) -> f32) -> f32 {
     refined.fold(f32::NEG_INFINITY, f32::max)
 }
 
-fn deepest(found: &Found) -> f32 {
+fn deepest(found: &ParryManifold) -> f32 {
     found.points.iter().map(|p| p.dist).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether a contact is as far apart as the shapes are; none where these are further apart than a tenth of `look` or deeper than
+/// Whether a contact is as far apart as the shapes are; none where these are further apart than a tenth of `prediction` or deeper than
 /// a tenth of their size.
-fn is_true(what: &str, found: &Found, distance: f32, look: f32) -> Option<bool> {
-    if !(-0.1 * SIZE..0.1 * look).contains(&distance) {
+fn is_true(what: &str, found: &ParryManifold, distance: f32, prediction: f32) -> Option<bool> {
+    if !(-0.1 * SIZE..0.1 * prediction).contains(&distance) {
         return None;
     }
     let claimed = deepest(found);
@@ -97,7 +97,7 @@ fn is_true(what: &str, found: &Found, distance: f32, look: f32) -> Option<bool> 
 #[test]
 fn a_triangle_is_as_far_from_a_solid_as_the_contact_says() {
     let (mut random, mut compared) = (Random(1), Vec::new());
-    let search = Search { look: 0.02, size: SIZE };
+    let search = ContactQuery { prediction: 0.02, size: SIZE };
     for (name, shape) in solids() {
         for case in 0..1500 {
             let corners = [0; 3].map(|_| 0.3 * random.vector());
@@ -108,11 +108,11 @@ fn a_triangle_is_as_far_from_a_solid_as_the_contact_says() {
                 continue;
             }
             let along = |d: Vec3| d.dot(solid.furthest(-d) - triangle.local_support_point(d)) - solid.radius;
-            let near = shape.compute_aabb(&pose).loosened(search.look + search.size);
-            let mut found = Found::new();
-            triangle_contact(corners, &|| None, &solid, &near, search, &mut Cutting::default(), &mut found);
+            let near = shape.compute_aabb(&pose).loosened(search.prediction + search.size);
+            let mut found = ParryManifold::new();
+            triangle_contact(corners, &|| None, &solid, &near, search, &mut ClipBuffers::default(), &mut found);
             let distance = true_distance(along);
-            compared.extend(is_true(&format!("{name} {case}"), &found, distance, search.look));
+            compared.extend(is_true(&format!("{name} {case}"), &found, distance, search.prediction));
         }
     }
     assert!(compared.len() > 250 && compared.iter().all(|is_true| *is_true), "{} compared", compared.len());
@@ -123,7 +123,7 @@ fn two_solids_are_as_far_apart_as_the_contact_says() {
     // Pairs without a round rim, and with one.
     let (mut random, mut compared) = (Random(2), [Vec::new(), Vec::new()]);
     let has_rim = |name: &str| ["cylinder", "cone"].contains(&name);
-    let search = Search { look: 0.02, size: SIZE };
+    let search = ContactQuery { prediction: 0.02, size: SIZE };
     let mut others = solids();
     others.push(("block", SharedShape::cuboid(0.4, 0.2, 0.4)));
     for (name, a) in &others {
@@ -143,12 +143,12 @@ fn two_solids_are_as_far_apart_as_the_contact_says() {
                         pos12 * map_b.local_support_point(pos12.rotation.inverse() * -d) - map_a.local_support_point(d),
                     )
                 };
-                let mut found = Found::new();
-                convex_contact((a, b), &pos12, search, &mut Cutting::default(), &mut found);
+                let mut found = ParryManifold::new();
+                convex_contact((a, b), &pos12, search, &mut ClipBuffers::default(), &mut found);
                 let distance = true_distance(along);
                 let what = format!("{name} and {name_b} {case}");
                 let rims = usize::from(has_rim(name) || has_rim(name_b));
-                compared[rims].extend(is_true(&what, &found, distance, search.look));
+                compared[rims].extend(is_true(&what, &found, distance, search.prediction));
             }
         }
     }
@@ -162,7 +162,7 @@ fn two_solids_are_as_far_apart_as_the_contact_says() {
 /// The contact of a cone or cylinder that lies on its side reaches from one end to the other.
 #[test]
 fn what_lies_on_its_side_touches_with_both_ends() {
-    let search = Search { look: 0.02, size: SIZE };
+    let search = ContactQuery { prediction: 0.02, size: SIZE };
     // The side of the cone lies level if its axis is turned by the half angle at its tip.
     let level = std::f32::consts::FRAC_PI_2 + (0.1_f32 / 0.2).atan();
     for (name, shape, tilt) in [
@@ -174,12 +174,12 @@ fn what_lies_on_its_side_touches_with_both_ends() {
             let lowest = shape.as_support_map().expect("convex").local_support_point(rotation.inverse() * Vec3::NEG_Y);
             let height = -(rotation * lowest).y - 1e-4;
             let pose = Pose::from_parts(Vec3::Y * height, rotation);
-            let (mut plane, mut face) = (Found::new(), Found::new());
-            half_space_contact(Vec3::Y, &*shape, &pose, &mut Cutting::default(), &mut plane).expect("no ball");
+            let (mut plane, mut face) = (ParryManifold::new(), ParryManifold::new());
+            half_space_contact(Vec3::Y, &*shape, &pose, &mut ClipBuffers::default(), &mut plane).expect("no ball");
             let solid = Solid::new(&*shape, pose).expect("no ball");
             let corners = [Vec3::new(-3.0, 0.0, -3.0), Vec3::new(0.0, 0.0, 3.0), Vec3::new(3.0, 0.0, -3.0)];
-            let near = shape.compute_aabb(&pose).loosened(search.look + search.size);
-            triangle_contact(corners, &|| None, &solid, &near, search, &mut Cutting::default(), &mut face);
+            let near = shape.compute_aabb(&pose).loosened(search.prediction + search.size);
+            triangle_contact(corners, &|| None, &solid, &near, search, &mut ClipBuffers::default(), &mut face);
             for (floor, found) in [("half-space", plane), ("triangle", face)] {
                 let touching: Vec<Vec3> =
                     found.points.iter().filter(|p| p.dist < 2e-3).map(|p| pose * p.local_p2).collect();

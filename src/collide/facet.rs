@@ -13,19 +13,18 @@ use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
-use super::query::{DEEP, Found};
-use super::solid::{Cutting, EXACT, Patch, Search, Solid, add_above, cut, cut_to};
+use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, ParryManifold, Patch, Solid, add_above, clip, clip_to};
 
 /// The contact of a half-space with a convex shape at `pos12`; none for a ball.
 pub(super) fn half_space_contact(
     normal: Vec3,
     shape: &dyn Shape,
     pos12: &Pose,
-    cutting: &mut Cutting,
-    found: &mut Found,
+    buffers: &mut ClipBuffers,
+    found: &mut ParryManifold,
 ) -> Option<()> {
     let convex = Solid::new(shape, *pos12)?;
-    let Cutting { polygon, corners, .. } = cutting;
+    let ClipBuffers { polygon, corners, .. } = buffers;
     convex.feature(-normal, polygon);
     convex.corners(-normal, corners);
     add_above(polygon, corners, &[], normal);
@@ -40,19 +39,19 @@ pub(super) fn composite_contacts(
     composite: &dyn Shape,
     shape: &dyn Shape,
     pos12: &Pose,
-    search: Search,
-    cutting: &mut Cutting,
-    many: &mut Vec<Found>,
+    search: ContactQuery,
+    buffers: &mut ClipBuffers,
+    many: &mut Vec<ParryManifold>,
 ) {
-    let around = shape.compute_aabb(pos12).loosened(search.look);
+    let around = shape.compute_aabb(pos12).loosened(search.prediction);
     // As seen from the shape's middle: numbers as small as the shape is.
     let convex = Solid::new(shape, Pose::from_parts(Vec3::ZERO, pos12.rotation));
     let near = Aabb::new(around.mins - pos12.translation, around.maxs - pos12.translation).loosened(search.size);
     let mut with = |i: u32, triangle: &Triangle, cone: &dyn Fn() -> Option<TrianglePseudoNormals>| {
-        let mut found = Found::with_data(i, 0, ());
+        let mut found = ParryManifold::with_data(i, 0, ());
         if let Some(convex) = &convex {
             let corners = triangle.vertices().map(|corner| corner - pos12.translation);
-            if triangle_contact(corners, cone, convex, &near, search, cutting, &mut found).is_some() {
+            if triangle_contact(corners, cone, convex, &near, search, buffers, &mut found).is_some() {
                 found.points.iter_mut().for_each(|point| point.local_p1 += pos12.translation);
             }
         } else {
@@ -65,7 +64,7 @@ pub(super) fn composite_contacts(
                 shape,
                 cone,
                 None,
-                search.look,
+                search.prediction,
                 &mut found,
             );
         }
@@ -83,7 +82,7 @@ pub(super) fn composite_contacts(
     }
 }
 
-/// The contact of a triangle with a convex shape, where it is nearer than `look` and on the triangle's side. Only what is in the
+/// The contact of a triangle with a convex shape, where it is nearer than `prediction` and on the triangle's side. Only what is in the
 /// box `near` counts. Normals stay within `cone`, so that nothing stumbles over edges between triangles; without one the triangle
 /// has two sides.
 pub(super) fn triangle_contact(
@@ -91,14 +90,14 @@ pub(super) fn triangle_contact(
     cone: &dyn Fn() -> Option<TrianglePseudoNormals>,
     convex: &Solid,
     near: &Aabb,
-    Search { look, size }: Search,
-    Cutting { polygon, uncut, patch, corners }: &mut Cutting,
-    found: &mut Found,
+    ContactQuery { prediction, size }: ContactQuery,
+    ClipBuffers { polygon, unclipped, patch, corners }: &mut ClipBuffers,
+    found: &mut ParryManifold,
 ) -> Option<()> {
     let mut face = (b - a).cross(c - a).try_normalize()?;
     let height = |face: Vec3| face.dot(convex.furthest(-face) - a) - convex.radius;
     let (mut above, mut below) = (height(face), height(-face));
-    if above.max(below) > look {
+    if above.max(below) > prediction {
         return None;
     }
     let cone = cone();
@@ -109,7 +108,7 @@ pub(super) fn triangle_contact(
     let is_flat = cone.as_ref().is_some_and(|cone| cone.edges.iter().all(|edge| edge.dot(cone.face) > 0.999_999));
     let base = [a, b, c].map(|at| (at, 0));
     convex.feature(-face, polygon);
-    cut_to(polygon, uncut, &base, face);
+    clip_to(polygon, unclipped, &base, face);
     let lowest = polygon.iter().map(|corner| face.dot(corner.0 - a)).fold(f32::INFINITY, f32::min) - convex.radius;
     let mut best = (above, face);
     let mut closest = None;
@@ -118,8 +117,8 @@ pub(super) fn triangle_contact(
         patch.clear();
         patch.extend(base);
         for axis in Vec3::AXES {
-            cut(patch, uncut, axis, axis.dot(near.maxs), 0);
-            cut(patch, uncut, -axis, -axis.dot(near.mins), 0);
+            clip(patch, unclipped, axis, axis.dot(near.maxs), 0);
+            clip(patch, unclipped, -axis, -axis.dot(near.mins), 0);
         }
         if patch.is_empty() {
             return None;
@@ -142,7 +141,7 @@ pub(super) fn triangle_contact(
         if !is_flat {
             let simplex = &mut VoronoiSimplex::new();
             let (pose, solid) = (&convex.pose, convex.map);
-            let most = look + convex.radius;
+            let most = prediction + convex.radius;
             match contact_support_map_support_map_with_params(pose, &patch, solid, most, simplex, Some(face)) {
                 GJKResult::ClosestPoints(on_patch, on_solid, d) => {
                     let distance = along(d);
@@ -159,7 +158,7 @@ pub(super) fn triangle_contact(
         }
     }
     let (distance, direction) = best;
-    if distance > look {
+    if distance > prediction {
         return None;
     }
     let mut normal = direction;
@@ -168,7 +167,7 @@ pub(super) fn triangle_contact(
     }
     if normal != face {
         convex.feature(-normal, polygon);
-        cut_to(polygon, uncut, &base, normal);
+        clip_to(polygon, unclipped, &base, normal);
     }
     found.local_n1 = normal;
     found.local_n2 = convex.pose.rotation.inverse() * -normal;
@@ -178,7 +177,7 @@ pub(super) fn triangle_contact(
         convex.corners(-normal, corners);
         add_above(polygon, corners, &base, normal);
         let contacts = convex.contacts(polygon, [normal, face, a]);
-        found.points.extend(contacts.filter(|contact| contact.dist <= look && contact.dist >= least));
+        found.points.extend(contacts.filter(|contact| contact.dist <= prediction && contact.dist >= least));
     }
     let mut closest = closest.filter(|closest| closest.0 == normal);
     if closest.is_none() && found.points.is_empty() && normal == direction {

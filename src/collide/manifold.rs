@@ -27,13 +27,13 @@ pub struct ManifoldPoint {
 /// The slot of a manifold that has none yet.
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// The contact of two bodies over one pair of convex parts: where they touch. A manifold without points has ended.
+/// The contact of two bodies over one pair of convex subshapes: where they touch. A manifold without points has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifold {
     /// Unit normal from a to b, world axes.
     pub normal: Vec3,
-    /// Which triangles or cells of a composite shape; (0, 0) for convex shapes.
-    pub parts: (u32, u32),
+    /// Triangles or cells of composite shapes; (0, 0) for convex shapes.
+    pub subshapes: (u32, u32),
     /// Radius of curvature of a's surface where it touches, 0 if flat or sharp (m).
     pub radius_a: f32,
     /// Radius of curvature of b's surface where it touches (m).
@@ -47,10 +47,10 @@ pub struct Manifold {
 
 impl Manifold {
     /// A manifold of at most four of the `candidates`.
-    pub(super) fn new(normal: Vec3, parts: (u32, u32), candidates: &[ManifoldPoint]) -> Self {
+    pub(super) fn new(normal: Vec3, subshapes: (u32, u32), candidates: &[ManifoldPoint]) -> Self {
         let mut points = [ManifoldPoint::default(); MAX_POINTS];
         let count = reduce(normal, candidates, &mut points);
-        Self { normal, parts, radius_a: 0.0, radius_b: 0.0, slot: NO_SLOT, points, count: count as u8 }
+        Self { normal, subshapes, radius_a: 0.0, radius_b: 0.0, slot: NO_SLOT, points, count: count as u8 }
     }
 
     /// Its points.

@@ -1,206 +1,23 @@
 //! Collision detection: parry's tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
 //!
-//! The tree holds fattened boxes and is touched only where a collider left its own; pairs live in slots, in the order
-//! in which they were found, so that every later stage is deterministic for any number of threads. Worlds that stand
-//! beside each other have a tree and pairs each, so that what one finds does not depend on the others.
+//! The tree holds fattened boxes, and only a collider that left its fattened box changes the tree. Pairs live in slots, in the
+//! order in which they were found, so that every later stage is deterministic for any number of threads. Each of several worlds
+//! beside each other has its own tree and pairs, so that the pairs of a world do not depend on the other worlds.
 
-mod arena;
+mod collider;
+mod detector;
 #[cfg(test)]
 mod distances;
 mod facet;
 mod manifold;
-mod narrow;
+mod pair;
 mod query;
+mod report;
 mod solid;
+mod world_contacts;
 
+pub use detector::Detector;
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
-pub use narrow::{Motion, Pair};
-
-use std::collections::HashSet;
-use std::ops::Range;
-
-use parry3d::math::Pose;
-use rayon::prelude::*;
-
-use crate::config::SolverConfig;
-use crate::error::{Error, Result};
-use crate::world::{Body, BodyKind, Collider, World};
-use arena::{Arena, Now, key};
-use narrow::{ColliderInfo, Margins, Moving};
-
-/// What a body is to the detection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Activity {
-    /// Does not move, and nothing is solved for it.
-    Still,
-    /// Moves by itself: cannot be pushed, but may wake what it touches.
-    Moving,
-    /// Can be pushed.
-    Awake,
-}
-
-/// One thing that a detection changed.
-pub(crate) enum Change<'a> {
-    /// A pair with a manifold in this slot came apart.
-    Ended(u32),
-    /// A pair is new or in another place, takes part or no longer takes part, or its manifolds were computed.
-    Pair {
-        /// Its world, and its place there.
-        place: [u32; 2],
-        pair: &'a mut Pair,
-        /// Whether its manifolds were computed.
-        computed: bool,
-    },
-}
-
-/// What one detection did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct DetectStats {
-    /// Pairs whose boxes overlap.
-    pub pairs: usize,
-    /// Pairs whose manifolds were computed; the others were reused.
-    pub computed: usize,
-    /// Whether what touches, or with how many points, is other than before.
-    pub reshaped: bool,
-}
-
-impl DetectStats {
-    /// Both together.
-    fn and(self, other: Self) -> Self {
-        Self {
-            pairs: self.pairs + other.pairs,
-            computed: self.computed + other.computed,
-            reshaped: self.reshaped | other.reshaped,
-        }
-    }
-}
-
-/// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
-#[derive(Clone)]
-pub struct Detector {
-    arenas: Vec<Arena>,
-    kinds: Vec<BodyKind>,
-    moving: Vec<Moving>,
-    /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
-    jointed: HashSet<(u32, u32)>,
-    /// First body of each world but the first.
-    begins: Vec<usize>,
-}
-
-/// What to do about bodies that came, went or changed.
-const ANEW: &str = "bodies cannot come, go or change kind or shape yet; make a new simulation of this world";
-
-/// Pairs of bodies that a joint keeps from colliding, the smaller index first.
-fn jointed(world: &World) -> HashSet<(u32, u32)> {
-    let apart = world.joints.iter().filter(|joint| !joint.collide);
-    apart.filter_map(|joint| Some(key(joint.body_a as u32, joint.body_b? as u32))).collect()
-}
-
-impl Detector {
-    /// A detector for the bodies of `world`, whose number, shapes and kinds stay as they are.
-    pub fn new(world: &World) -> Self {
-        let collider = |(body, c): (usize, &Collider)| {
-            let bounding = c.shape.bounding_radius();
-            ColliderInfo {
-                body: body as u32,
-                shape: c.shape.0.clone(),
-                local: Pose::from_parts(c.position, c.rotation),
-                cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
-                size: c.shape.smallest_half_extent(),
-                reach: c.position.length() + bounding,
-                unbounded: c.shape.0.as_halfspace().is_some(),
-            }
-        };
-        let arena = |bodies: Range<usize>| {
-            let on_body = |i: usize| world.bodies[i].colliders.iter().map(move |c| (i, c));
-            Arena::new(bodies.flat_map(on_body).map(collider).collect())
-        };
-        Self {
-            arenas: world.worlds().map(arena).collect(),
-            kinds: world.bodies.iter().map(|b| b.kind).collect(),
-            moving: Vec::new(),
-            jointed: jointed(world),
-            begins: world.begins.clone(),
-        }
-    }
-
-    /// Refuses a world whose bodies are not those that this detector was made for.
-    ///
-    /// # Errors
-    /// One line that names the first body that came, went, or changed kind or shape.
-    pub fn check_bodies(&self, world: &World) -> Result<()> {
-        let (had, has) = (self.kinds.len(), world.bodies.len());
-        if had != has || world.begins != self.begins {
-            return Err(Error::input(format!(
-                "the world has {has} bodies in {} parts, and had {had} in {} when its simulation began: {ANEW}",
-                world.begins.len() + 1,
-                self.begins.len() + 1
-            )));
-        }
-        let mut colliders = self.arenas.iter().flat_map(Arena::colliders).peekable();
-        for (i, (body, kind)) in world.bodies.iter().zip(&self.kinds).enumerate() {
-            let same = |c: &Collider| colliders.next().is_some_and(|known| known.is(i, c));
-            let all = body.kind == *kind && body.colliders.iter().all(same);
-            if !all || colliders.peek().is_some_and(|next| next.body as usize == i) {
-                let name = &body.name;
-                return Err(Error::input(format!("body {i} {name:?} changed its kind or shapes: {ANEW}")));
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes over which bodies joints keep from colliding.
-    pub fn follow_joints(&mut self, world: &World) {
-        let jointed = jointed(world);
-        if jointed != self.jointed {
-            self.jointed = jointed;
-            self.arenas.iter_mut().for_each(Arena::look_again);
-        }
-    }
-
-    /// The pairs whose boxes overlap, with the manifolds they touch with, world by world. The order is the same for any
-    /// thread count, and within a world whatever stands beside it.
-    pub fn pairs(&self) -> impl Iterator<Item = &Pair> + Clone {
-        self.arenas.iter().flat_map(|arena| &arena.pairs)
-    }
-
-    /// Tells what changed since the last call. The listener gives slots to manifolds that have none, and removes manifolds that ended.
-    pub(crate) fn take_changes(&mut self, tell: &mut dyn FnMut(Change)) {
-        (0..).zip(&mut self.arenas).for_each(|(world, arena)| arena.take_changes(world, tell));
-    }
-
-    /// A pair by its world and its place there.
-    pub fn pair(&self, world: u32, pair: u32) -> &Pair {
-        &self.arenas[world as usize].pairs[pair as usize]
-    }
-
-    /// The same, to give slots to its manifolds.
-    pub(crate) fn pair_mut(&mut self, world: u32, pair: u32) -> &mut Pair {
-        &mut self.arenas[world as usize].pairs[pair as usize]
-    }
-
-    /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
-    /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
-    /// the step; without `activity` all take part.
-    pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
-        let moving = |b: &Body| Moving {
-            position: b.position,
-            rotation: b.rotation,
-            center: b.center_of_mass(),
-            v: b.linear_velocity,
-            w: b.angular_velocity,
-            kinematic: b.kind == BodyKind::Kinematic,
-        };
-        world.bodies.par_iter().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        let margins = Margins {
-            speculative: config.speculative_margin,
-            recycle: config.recycle_distance,
-            fall: world.gravity.length() * dt * dt,
-            dt,
-        };
-        let now = Now { margins, kinds: &self.kinds, moving: &self.moving, activity, jointed: &self.jointed };
-        let detected = self.arenas.par_iter_mut().map(|arena| arena.detect(&now));
-        detected.reduce(DetectStats::default, DetectStats::and)
-    }
-}
+pub use pair::{Motion, Pair};
+pub(crate) use report::Change;
+pub use report::{Activity, DetectStats};

@@ -3,25 +3,20 @@
 use glam::Vec3;
 use parry3d::math::Pose;
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
-use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d::shape::SharedShape;
 
 use super::facet::half_space_contact;
-use super::solid::{Cutting, Search, Solid, add_above, cut_to};
+use super::solid::{ClipBuffers, ContactQuery, DEEP, ParryManifold, Solid, add_above, clip_to};
 
-/// parry's manifold, with nothing of ours in it.
-pub(super) type Found = ContactManifold<(), ()>;
-
-/// Overlap from which an answer is checked, relative to the thinner shape's smallest half extent.
-pub(super) const DEEP: f32 = 0.05;
-/// How far a distance may be from that along its normal, likewise.
+/// How far a distance may be from that along its normal, relative to the thinner shape's smallest half extent.
 const TRUE: f32 = 0.01;
 /// Cosine of the angle up to which two directions are the same, short of 1: 0.6 degrees.
 const SAME: f32 = 5e-5;
 /// How far the shapes are pushed apart for the second opinion, likewise.
 const PUSH: f32 = 0.02;
 
-/// Finds the contact of two convex shapes up to the distance `look`; b's pose is `pos12` as seen from a.
+/// Finds the contact of two convex shapes up to the distance `prediction`; b's pose is `pos12` as seen from a.
 ///
 /// Hulls that touch exactly, as the stones of an arch do, leave parry's search without a direction, and it can answer with
 /// any: overlaps of a meter between stones that only touch. A cone that lies on a cuboid may get the direction to the cuboid's
@@ -31,49 +26,49 @@ const PUSH: f32 = 0.02;
 pub(super) fn convex_contact(
     (a, b): (&SharedShape, &SharedShape),
     pos12: &Pose,
-    search: Search,
-    cutting: &mut Cutting,
-    found: &mut Found,
+    search: ContactQuery,
+    buffers: &mut ClipBuffers,
+    found: &mut ParryManifold,
 ) {
     empty(found);
     if let (Some(box_a), Some(box_b)) = (a.as_cuboid(), b.as_cuboid()) {
-        return contact_manifold_cuboid_cuboid(pos12, box_a, box_b, search.look, found);
+        return contact_manifold_cuboid_cuboid(pos12, box_a, box_b, search.prediction, found);
     }
-    *found = searched_contact((a, b), pos12, search, cutting);
+    *found = searched_contact((a, b), pos12, search, buffers);
 }
 
 /// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
 /// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
-fn empty(manifold: &mut Found) {
+fn empty(manifold: &mut ParryManifold) {
     let mut points = std::mem::take(&mut manifold.points);
     points.clear();
-    *manifold = Found { points, ..Found::new() };
+    *manifold = ParryManifold { points, ..ParryManifold::new() };
 }
 
 /// The contact of two shapes that are not both cuboids.
 fn searched_contact(
     (a, b): (&SharedShape, &SharedShape),
     pos12: &Pose,
-    search: Search,
-    cutting: &mut Cutting,
-) -> Found {
-    let Search { look, size } = search;
-    let mut found = Found::new();
+    search: ContactQuery,
+    buffers: &mut ClipBuffers,
+) -> ParryManifold {
+    let ContactQuery { prediction, size } = search;
+    let mut found = ParryManifold::new();
     // A half-space reaches further than any other shape.
     if let Some(plane) = a.as_halfspace() {
-        if half_space_contact(plane.normal, &**b, pos12, cutting, &mut found).is_none() {
-            ask((a, b), pos12, look, &mut found);
+        if half_space_contact(plane.normal, &**b, pos12, buffers, &mut found).is_none() {
+            ask((a, b), pos12, prediction, &mut found);
         }
         return found;
     }
-    ask((a, b), pos12, look, &mut found);
+    ask((a, b), pos12, prediction, &mut found);
     let (Some(map_a), Some(map_b)) = (a.as_support_map(), b.as_support_map()) else { return found };
     let along = |d: Vec3| {
         let own = pos12.rotation.inverse() * -d;
         d.dot(*pos12 * map_b.local_support_point(own) - map_a.local_support_point(d))
     };
-    let is_true = |found: &Found, distance: f32| {
-        if found.points.is_empty() { distance > look } else { (deepest(found) - distance).abs() < TRUE * size }
+    let is_true = |found: &ParryManifold, distance: f32| {
+        if found.points.is_empty() { distance > prediction } else { (deepest(found) - distance).abs() < TRUE * size }
     };
     let mut best = along(found.local_n1);
     let mut found_is_true = is_true(&found, best);
@@ -92,8 +87,8 @@ fn searched_contact(
         let push = PUSH * size;
         let mut apart = *pos12;
         apart.translation += away * push;
-        let mut again = Found::new();
-        ask((a, b), &apart, look + push, &mut again);
+        let mut again = ParryManifold::new();
+        ask((a, b), &apart, prediction + push, &mut again);
         let (distance, pushed) = (along(again.local_n1), push * again.local_n1.dot(away));
         again.points.iter_mut().for_each(|p| p.dist -= pushed);
         if is_better(distance, best, found_is_true) && is_true(&again, distance) {
@@ -114,9 +109,9 @@ fn searched_contact(
     solid_a.each_normal(|normal| consider(normal, false));
     solid_b.each_normal(|normal| consider(-normal, true));
     match across {
-        Some((d, false)) => found = face_contact(&solid_a, &solid_b, d, search, cutting),
+        Some((d, false)) => found = face_contact(&solid_a, &solid_b, d, search, buffers),
         Some((d, true)) => {
-            found = face_contact(&solid_b, &solid_a, -d, search, cutting);
+            found = face_contact(&solid_b, &solid_a, -d, search, buffers);
             flip(&mut found);
         }
         None => {}
@@ -125,33 +120,39 @@ fn searched_contact(
 }
 
 /// parry's answer. Every pair of convex shapes is supported.
-fn ask((a, b): (&SharedShape, &SharedShape), pos12: &Pose, look: f32, found: &mut Found) {
-    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, &**a, &**b, None, None, look, found);
+fn ask((a, b): (&SharedShape, &SharedShape), pos12: &Pose, prediction: f32, found: &mut ParryManifold) {
+    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, &**a, &**b, None, None, prediction, found);
 }
 
 /// The contact of `other` across the face of `solid` with the unit normal `face`.
-fn face_contact(solid: &Solid, other: &Solid, face: Vec3, search: Search, cutting: &mut Cutting) -> Found {
-    let Cutting { polygon, patch, uncut, corners } = cutting;
+fn face_contact(
+    solid: &Solid,
+    other: &Solid,
+    face: Vec3,
+    search: ContactQuery,
+    buffers: &mut ClipBuffers,
+) -> ParryManifold {
+    let ClipBuffers { polygon, patch, unclipped, corners } = buffers;
     solid.feature(face, patch);
     other.feature(-face, polygon);
-    cut_to(polygon, uncut, patch, face);
+    clip_to(polygon, unclipped, patch, face);
     other.corners(-face, corners);
     add_above(polygon, corners, patch, face);
     let origin = solid.furthest(face);
-    if polygon.iter().all(|corner| face.dot(corner.0 - origin) - other.radius > search.look) {
+    if polygon.iter().all(|corner| face.dot(corner.0 - origin) - other.radius > search.prediction) {
         polygon.push((other.furthest(-face), 0));
     }
-    let mut found = Found::new();
+    let mut found = ParryManifold::new();
     found.local_n1 = solid.pose.rotation.inverse() * face;
     found.local_n2 = other.pose.rotation.inverse() * -face;
     let contacts = other.contacts(polygon, [face, face, origin]);
-    found.points.extend(contacts.filter(|contact| contact.dist <= search.look));
+    found.points.extend(contacts.filter(|contact| contact.dist <= search.prediction));
     found.points.iter_mut().for_each(|point| point.local_p1 = solid.pose.inverse_transform_point(point.local_p1));
     found
 }
 
 /// Exchanges the two shapes.
-pub(super) fn flip(found: &mut Found) {
+pub(super) fn flip(found: &mut ParryManifold) {
     std::mem::swap(&mut found.local_n1, &mut found.local_n2);
     std::mem::swap(&mut found.subshape1, &mut found.subshape2);
     for point in &mut found.points {
@@ -161,7 +162,7 @@ pub(super) fn flip(found: &mut Found) {
 }
 
 /// Separation of the deepest point; infinite without points.
-fn deepest(manifold: &Found) -> f32 {
+fn deepest(manifold: &ParryManifold) -> f32 {
     manifold.points.iter().map(|p| p.dist).fold(f32::INFINITY, f32::min)
 }
 
@@ -190,9 +191,9 @@ mod tests {
             for i in 0..count - 1 {
                 let angle = |k: i32| width * k as f32;
                 let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
-                let search = Search { look: 0.002, size: 0.05 };
-                let mut found = Found::new();
-                convex_contact((&a, &b), &Pose::IDENTITY, search, &mut Cutting::default(), &mut found);
+                let search = ContactQuery { prediction: 0.002, size: 0.05 };
+                let mut found = ParryManifold::new();
+                convex_contact((&a, &b), &Pose::IDENTITY, search, &mut ClipBuffers::default(), &mut found);
                 let depth = deepest(&found);
                 assert!(depth.is_finite(), "{count} stones, joint {i}: no contact");
                 worst = worst.max(-depth);
@@ -207,16 +208,16 @@ mod tests {
     fn an_answer_does_not_depend_on_the_pair_before_it() {
         let width = std::f32::consts::PI / 17.0;
         let angle = |k: i32| width * k as f32;
-        let answer = |cutting: &mut Cutting, found: &mut Found, i: i32| {
+        let answer = |buffers: &mut ClipBuffers, found: &mut ParryManifold, i: i32| {
             let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
-            convex_contact((&a, &b), &Pose::IDENTITY, Search { look: 0.002, size: 0.05 }, cutting, found);
+            convex_contact((&a, &b), &Pose::IDENTITY, ContactQuery { prediction: 0.002, size: 0.05 }, buffers, found);
             let points = found.points.iter().map(|p| (p.local_p1, p.local_p2, p.dist, p.fid1, p.fid2));
             (found.local_n1, found.local_n2, points.collect::<Vec<_>>())
         };
-        let (mut cutting, mut found) = (Cutting::default(), Found::new());
+        let (mut buffers, mut found) = (ClipBuffers::default(), ParryManifold::new());
         for i in 0..15 {
-            let after_another = answer(&mut cutting, &mut found, i);
-            assert_eq!(after_another, answer(&mut Cutting::default(), &mut Found::new(), i), "joint {i}");
+            let after_another = answer(&mut buffers, &mut found, i);
+            assert_eq!(after_another, answer(&mut ClipBuffers::default(), &mut ParryManifold::new(), i), "joint {i}");
         }
     }
 
@@ -224,9 +225,9 @@ mod tests {
     fn true_overlap_stays_as_deep_as_it_is() {
         let (a, b) = (SharedShape::cylinder(0.5, 0.5), SharedShape::cylinder(0.5, 0.5));
         let pos12 = Pose::translation(0.0, 0.8, 0.0);
-        let search = Search { look: 0.02, size: 0.5 };
-        let mut found = Found::new();
-        convex_contact((&a, &b), &pos12, search, &mut Cutting::default(), &mut found);
+        let search = ContactQuery { prediction: 0.02, size: 0.5 };
+        let mut found = ParryManifold::new();
+        convex_contact((&a, &b), &pos12, search, &mut ClipBuffers::default(), &mut found);
         assert!((deepest(&found) + 0.2).abs() < 1e-3, "{} m", deepest(&found));
     }
 }

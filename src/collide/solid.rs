@@ -2,17 +2,22 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::TrackedContact;
+use parry3d::query::{ContactManifold, TrackedContact};
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
 
+/// parry's manifold, without data of drystone.
+pub(super) type ParryManifold = ContactManifold<(), ()>;
+
+/// Overlap from which an answer is checked, relative to the thinner shape's smallest half extent.
+pub(super) const DEEP: f32 = 0.05;
 /// How exactly a distance is known, relative to the thinner shape's smallest half extent.
 pub(super) const EXACT: f32 = 1e-3;
 
-/// Settings of one search.
+/// Range of one query.
 #[derive(Clone, Copy)]
-pub(super) struct Search {
+pub(super) struct ContactQuery {
     /// Distance up to which contacts are sought (m).
-    pub look: f32,
+    pub prediction: f32,
     /// Smallest half extent of the thinner shape (m).
     pub size: f32,
 }
@@ -20,22 +25,22 @@ pub(super) struct Search {
 /// A corner of a polygon, and the number that marks it from step to step.
 pub(super) type Corner = (Vec3, u32);
 
-/// Memory that polygons are cut in.
+/// Memory for polygons that are clipped.
 #[derive(Default)]
-pub(super) struct Cutting {
+pub(super) struct ClipBuffers {
     pub polygon: Vec<Corner>,
     pub patch: Vec<Corner>,
-    pub uncut: Vec<Corner>,
+    pub unclipped: Vec<Corner>,
     pub corners: Vec<Corner>,
 }
 
 /// Keeps the part of `polygon` with n · x <= `limit`. Corners that the cut adds are numbered by their edge and by `cut`.
-pub(super) fn cut(polygon: &mut Vec<Corner>, uncut: &mut Vec<Corner>, normal: Vec3, limit: f32, cut: u32) {
-    std::mem::swap(polygon, uncut);
+pub(super) fn clip(polygon: &mut Vec<Corner>, unclipped: &mut Vec<Corner>, normal: Vec3, limit: f32, cut: u32) {
+    std::mem::swap(polygon, unclipped);
     polygon.clear();
     let beyond = |corner: Corner| normal.dot(corner.0) - limit;
-    for (i, &from) in uncut.iter().enumerate() {
-        let to = uncut[(i + 1) % uncut.len()];
+    for (i, &from) in unclipped.iter().enumerate() {
+        let to = unclipped[(i + 1) % unclipped.len()];
         if beyond(from) <= 0.0 {
             polygon.push(from);
         }
@@ -54,8 +59,8 @@ pub(super) fn cut(polygon: &mut Vec<Corner>, uncut: &mut Vec<Corner>, normal: Ve
 }
 
 /// Keeps the part of `polygon` that lies above or below the polygon `base`, as seen along `normal`.
-pub(super) fn cut_to(polygon: &mut Vec<Corner>, uncut: &mut Vec<Corner>, base: &[Corner], normal: Vec3) {
-    each_side(base, normal, |i, out, limit| cut(polygon, uncut, out, limit, i));
+pub(super) fn clip_to(polygon: &mut Vec<Corner>, unclipped: &mut Vec<Corner>, base: &[Corner], normal: Vec3) {
+    each_side(base, normal, |i, out, limit| clip(polygon, unclipped, out, limit, i));
 }
 
 /// Calls `with` on the number and the half-space n · x <= limit of each side of the prism over `base` along `normal`.

@@ -8,15 +8,17 @@ use parry3d::math::Pose;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
-use super::narrow::{ColliderInfo, FARTHEST, Margins, Moving, Pair, Scratch, Update};
-use super::{Activity, Change, DetectStats, NO_SLOT};
+use super::collider::{BodyState, ColliderInfo, FARTHEST, Margins};
+use super::manifold::NO_SLOT;
+use super::pair::{Pair, Scratch, Update};
+use super::report::{Activity, Change, DetectStats};
 use crate::world::BodyKind;
 
-/// What all worlds are told about one detection; bodies are counted over all of them.
-pub(super) struct Now<'a> {
+/// The input of one detection, for all worlds; body indices count over all worlds.
+pub(super) struct DetectionInput<'a> {
     pub margins: Margins,
     pub kinds: &'a [BodyKind],
-    pub moving: &'a [Moving],
+    pub moving: &'a [BodyState],
     pub activity: &'a [Activity],
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     pub jointed: &'a HashSet<(u32, u32)>,
@@ -24,7 +26,7 @@ pub(super) struct Now<'a> {
 
 /// The colliders of one world, which meet no others.
 #[derive(Clone)]
-pub(super) struct Arena {
+pub(super) struct WorldContacts {
     colliders: Vec<ColliderInfo>,
     unbounded: Vec<u32>,
     tree: Bvh,
@@ -39,16 +41,16 @@ pub(super) struct Arena {
     pub pairs: Vec<Pair>,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
-    /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`Arena::take_changes`] last told of them.
+    /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`WorldContacts::take_changes`] last told of them.
     ended: Vec<u32>,
-    changed: Vec<Changed>,
-    /// Whether other pairs may meet than before, so that all are looked for.
+    changed: Vec<PairChange>,
+    /// Whether other pairs may meet than before, so that all are predicted for.
     look_again: bool,
 }
 
 /// A pair, by its place, that is not as it was.
 #[derive(Clone, Copy)]
-struct Changed {
+struct PairChange {
     pair: u32,
     computed: bool,
 }
@@ -56,7 +58,7 @@ struct Changed {
 /// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
 const FAT: f32 = 0.1;
 
-impl Arena {
+impl WorldContacts {
     pub fn new(colliders: Vec<ColliderInfo>) -> Self {
         let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
         Self {
@@ -86,10 +88,10 @@ impl Arena {
         self.look_again = true;
     }
 
-    /// Tells what changed since the last call; this is the arena number `world`.
+    /// Tells what changed since the last call; this is the world number `world`.
     pub fn take_changes(&mut self, world: u32, tell: &mut dyn FnMut(Change)) {
         self.ended.drain(..).for_each(|slot| tell(Change::Ended(slot)));
-        for Changed { pair: i, computed } in self.changed.drain(..) {
+        for PairChange { pair: i, computed } in self.changed.drain(..) {
             if let Some(pair) = self.pairs.get_mut(i as usize) {
                 tell(Change::Pair { place: [world, i], pair, computed });
             }
@@ -97,25 +99,25 @@ impl Arena {
     }
 
     /// Brings the pairs to where the bodies are.
-    pub fn detect(&mut self, now: &Now) -> DetectStats {
-        let parted = self.broad_phase(now);
-        let stats = self.narrow_phase(now);
+    pub fn detect(&mut self, input: &DetectionInput) -> DetectStats {
+        let parted = self.broad_phase(input);
+        let stats = self.narrow_phase(input);
         DetectStats { reshaped: stats.reshaped | parted, ..stats }
     }
 
     /// Finds new pairs and ends parted ones; returns whether it ended any.
-    fn broad_phase(&mut self, now: &Now) -> bool {
+    fn broad_phase(&mut self, input: &DetectionInput) -> bool {
         let mut parted = false;
         // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
         let tight = |c: &ColliderInfo| {
-            let body = &now.moving[c.body as usize];
+            let body = &input.moving[c.body as usize];
             let pose = Pose::from_parts(body.position, body.rotation);
-            let mut aabb = c.aabb(pose).loosened(now.margins.speculative * c.size + now.margins.fall);
-            let sweep = body.v * now.margins.dt;
+            let mut aabb = c.aabb(pose).loosened(input.margins.speculative * c.size + input.margins.fall);
+            let sweep = body.v * input.margins.dt;
             // What turns reaches no further out than from one side of the body to the other, and its box no further than its
             // longest half diagonal.
             let most = c.reach - c.size + c.local.translation.length();
-            aabb = aabb.loosened((c.reach * body.w.length() * now.margins.dt).min(most).max(0.0));
+            aabb = aabb.loosened((c.reach * body.w.length() * input.margins.dt).min(most).max(0.0));
             aabb.mins += sweep.min(glam::Vec3::ZERO);
             aabb.maxs += sweep.max(glam::Vec3::ZERO);
             aabb
@@ -134,11 +136,11 @@ impl Arena {
             found.iter_mut().for_each(|pair| *pair = key(pair.0, pair.1));
             found.sort_unstable();
             self.moved.extend(0..self.colliders.len() as u32);
-            self.find_unbounded(now);
+            self.find_unbounded(input);
         } else {
             let left = |(c, fat): (&ColliderInfo, &Aabb)| {
-                let still = now.activity.get(c.body as usize) == Some(&Activity::Still);
-                if now.kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
+                let still = input.activity.get(c.body as usize) == Some(&Activity::Still);
+                if input.kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
                     return None;
                 }
                 let aabb = tight(c);
@@ -168,44 +170,44 @@ impl Arena {
                 self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
             }
             if !self.moved.is_empty() {
-                self.find_unbounded(now);
-                parted = self.drop_parted(now);
+                self.find_unbounded(input);
+                parted = self.drop_parted(input);
             }
         }
-        self.add_found(now);
+        self.add_found(input);
         self.look_again = false;
         parted
     }
 
     /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
-    fn find_unbounded(&mut self, now: &Now) {
+    fn find_unbounded(&mut self, input: &DetectionInput) {
         let mut found = std::mem::take(&mut self.found);
         for &plane in &self.unbounded {
-            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(now, plane, c));
+            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(input, plane, c));
             found.extend(near.map(|&c| (plane, c)));
         }
         self.found = found;
     }
 
     /// Whether the fattened boxes of two colliders still overlap.
-    fn touches(&self, now: &Now, a: u32, b: u32) -> bool {
+    fn touches(&self, input: &DetectionInput, a: u32, b: u32) -> bool {
         let (ca, cb) = (&self.colliders[a as usize], &self.colliders[b as usize]);
         match (ca.unbounded, cb.unbounded) {
             (false, false) => self.fat[a as usize].intersects(&self.fat[b as usize]),
             (true, true) => false,
-            (true, false) => box_reaches_plane(now, ca, &self.fat[b as usize]),
-            (false, true) => box_reaches_plane(now, cb, &self.fat[a as usize]),
+            (true, false) => box_reaches_plane(input, ca, &self.fat[b as usize]),
+            (false, true) => box_reaches_plane(input, cb, &self.fat[a as usize]),
         }
     }
 
     /// Ends the pairs whose boxes came apart or whose bodies a joint holds; the last pair takes an ended one's slot. Returns
     /// whether it ended any.
-    fn drop_parted(&mut self, now: &Now) -> bool {
+    fn drop_parted(&mut self, input: &DetectionInput) -> bool {
         let (mut slot, before) = (0, self.pairs.len());
         while slot < self.pairs.len() {
             let pair = &self.pairs[slot];
-            let jointed = self.look_again && now.jointed.contains(&key(pair.body_a, pair.body_b));
-            if !jointed && self.touches(now, pair.collider_a, pair.collider_b) {
+            let jointed = self.look_again && input.jointed.contains(&key(pair.body_a, pair.body_b));
+            if !jointed && self.touches(input, pair.collider_a, pair.collider_b) {
                 slot += 1;
                 continue;
             }
@@ -214,18 +216,18 @@ impl Arena {
             self.ended.extend(ended.manifolds.iter().map(|m| m.slot).filter(|&slot| slot != NO_SLOT));
             if let Some(moved) = self.pairs.get(slot) {
                 self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
-                self.changed.push(Changed { pair: slot as u32, computed: false });
+                self.changed.push(PairChange { pair: slot as u32, computed: false });
             }
         }
         self.pairs.len() < before
     }
 
     /// Begins the pairs that are new, of different bodies of which one can be pushed, the further reaching first.
-    fn add_found(&mut self, now: &Now) {
+    fn add_found(&mut self, input: &DetectionInput) {
         for &(i, j) in &self.found {
             let (ci, cj) = (&self.colliders[i as usize], &self.colliders[j as usize]);
-            let dynamic = |c: &ColliderInfo| now.kinds[c.body as usize] == BodyKind::Dynamic;
-            let apart = ci.body == cj.body || now.jointed.contains(&key(ci.body, cj.body));
+            let dynamic = |c: &ColliderInfo| input.kinds[c.body as usize] == BodyKind::Dynamic;
+            let apart = ci.body == cj.body || input.jointed.contains(&key(ci.body, cj.body));
             if apart || !(dynamic(ci) || dynamic(cj)) {
                 continue;
             }
@@ -240,11 +242,11 @@ impl Arena {
         }
     }
 
-    fn narrow_phase(&mut self, now: &Now) -> DetectStats {
-        let (colliders, moving, margins) = (&self.colliders, now.moving, now.margins);
+    fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
+        let (colliders, moving, margins) = (&self.colliders, input.moving, input.margins);
         let update = |scratch: &mut Scratch, (i, pair): (usize, &mut Pair)| {
             let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
-            let of = |body: u32| now.activity.get(body as usize).copied().unwrap_or(Activity::Awake);
+            let of = |body: u32| input.activity.get(body as usize).copied().unwrap_or(Activity::Awake);
             let both = [of(pair.body_a), of(pair.body_b)];
             let mut update = Update::Reused;
             if both != [Activity::Still; 2] {
@@ -254,7 +256,7 @@ impl Arena {
             let takes_part = both.contains(&Activity::Awake);
             let changes = pair.takes_part != takes_part;
             pair.takes_part = takes_part;
-            let changed = Changed { pair: i as u32, computed };
+            let changed = PairChange { pair: i as u32, computed };
             let reshaped = update == Update::Reshaped || changes && pair.is_touching();
             (computed || changes).then_some((changed, reshaped))
         };
@@ -271,8 +273,8 @@ impl Arena {
 }
 
 /// Whether a box reaches a half-space, by its corner that lies deepest.
-fn box_reaches_plane(now: &Now, plane: &ColliderInfo, aabb: &Aabb) -> bool {
-    let body = &now.moving[plane.body as usize];
+fn box_reaches_plane(input: &DetectionInput, plane: &ColliderInfo, aabb: &Aabb) -> bool {
+    let body = &input.moving[plane.body as usize];
     let pose = Pose::from_parts(body.position, body.rotation) * plane.local;
     let Some(half_space) = plane.shape.as_halfspace() else { return false };
     let normal = pose.rotation * half_space.normal;

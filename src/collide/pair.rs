@@ -1,56 +1,17 @@
 //! The contact of one pair of colliders: reused while they hardly moved, else asked of parry.
 
 use glam::{Quat, Vec3};
-use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::query::TrackedContact;
-use parry3d::shape::{SharedShape, TypedShape};
+use parry3d::shape::TypedShape;
 
+use super::collider::{BodyState, ColliderInfo, Margins};
 use super::facet::composite_contacts;
 use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
-use super::query::{Found, convex_contact, flip};
-use super::solid::{Cutting, Search};
+use super::query::{convex_contact, flip};
+use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::math::{self, NormalMovement};
 use crate::random::mixed;
-use crate::world::Collider;
-
-/// A collider with what the detection asks of it all the time.
-#[derive(Clone)]
-pub(super) struct ColliderInfo {
-    pub body: u32,
-    pub shape: SharedShape,
-    /// Place in the body's frame.
-    pub local: Pose,
-    /// Half extents of a cuboid (m).
-    pub cuboid: Option<Vec3>,
-    /// Half of the smallest side (m).
-    pub size: f32,
-    /// Radius around the body's origin that holds the collider (m).
-    pub reach: f32,
-    /// Half-spaces have no box to put into the tree.
-    pub unbounded: bool,
-}
-
-impl ColliderInfo {
-    /// The box around it when its body is at `pose`. That of a cuboid needs nothing from elsewhere in memory.
-    pub fn aabb(&self, pose: Pose) -> Aabb {
-        let pose = pose * self.local;
-        let Some(half) = self.cuboid else { return self.shape.compute_aabb(&pose) };
-        let axes = glam::Mat3::from_quat(pose.rotation);
-        Aabb::from_half_extents(pose.translation, axes.abs() * half)
-    }
-
-    /// Whether this is still the collider of a body.
-    pub fn is(&self, body: usize, collider: &Collider) -> bool {
-        self.body as usize == body
-            && std::sync::Arc::ptr_eq(&self.shape.0, &collider.shape.0.0)
-            && self.local == Pose::from_parts(collider.position, collider.rotation)
-    }
-
-    fn is_composite(&self) -> bool {
-        self.shape.as_trimesh().is_some() || self.shape.as_heightfield().is_some()
-    }
-}
 
 /// Two colliders whose boxes overlap.
 #[derive(Clone, Debug)]
@@ -67,8 +28,8 @@ pub struct Pair {
     size: f32,
     /// Radius around the origin of body b that holds its collider (m).
     reach_b: f32,
-    /// Distance up to which the last computation looked (m).
-    looked: f32,
+    /// Distance up to which the last computation predicted (m).
+    predicted: f32,
     /// Where the bodies were when the manifolds were computed; none if they never were.
     computed_at: Option<[Placed; 2]>,
     /// How they moved since.
@@ -104,7 +65,7 @@ struct Placed {
 }
 
 impl Placed {
-    fn of(body: &Moving) -> Self {
+    fn of(body: &BodyState) -> Self {
         Self { center: body.center, rotation: body.rotation }
     }
 
@@ -115,44 +76,12 @@ impl Placed {
     }
 }
 
-/// Pose and velocity of a body, as far as the detection needs it.
-#[derive(Clone, Copy)]
-pub(super) struct Moving {
-    pub position: Vec3,
-    pub rotation: Quat,
-    pub center: Vec3,
-    pub v: Vec3,
-    pub w: Vec3,
-    pub kinematic: bool,
-}
-
-impl Moving {
-    /// Whether contacts can be computed: parry squares lengths, and takes rotations for unit quaternions.
-    fn is_in_range(&self) -> bool {
-        let near = self.position.abs().cmple(Vec3::splat(FARTHEST)).all();
-        near && (self.rotation.length_squared() - 1.0).abs() < 0.1 && self.v.is_finite() && self.w.is_finite()
-    }
-}
-
-/// Farthest that something is from the origin and still touches anything (m): the square is far inside of single precision.
-pub(super) const FARTHEST: f32 = 1e15;
-
-/// Settings of the detection, as lengths relative to the thinner shape.
-#[derive(Clone, Copy)]
-pub(super) struct Margins {
-    pub speculative: f32,
-    pub recycle: f32,
-    /// How far gravity moves a body in one step (m).
-    pub fall: f32,
-    pub dt: f32,
-}
-
 /// Memory that one thread reuses from pair to pair.
 #[derive(Default)]
 pub(super) struct Scratch {
-    cutting: Cutting,
-    one: Found,
-    many: Vec<Found>,
+    buffers: ClipBuffers,
+    one: ParryManifold,
+    many: Vec<ParryManifold>,
     candidates: Vec<ManifoldPoint>,
     old: Vec<Manifold>,
 }
@@ -186,7 +115,7 @@ impl Pair {
             collider_b,
             size: a.size.min(b.size),
             reach_b: b.reach,
-            looked: 0.0,
+            predicted: 0.0,
             computed_at: None,
             motion: Motion::default(),
             takes_part: true,
@@ -215,8 +144,8 @@ impl Pair {
     pub(super) fn update(
         &mut self,
         colliders: &[ColliderInfo],
-        a: &Moving,
-        b: &Moving,
+        a: &BodyState,
+        b: &BodyState,
         margins: Margins,
         scratch: &mut Scratch,
     ) -> Update {
@@ -229,7 +158,7 @@ impl Pair {
         let size = self.size;
         let approach = (b.v - a.v).length() + self.reach_b * (b.w - a.w).length();
         let base = margins.speculative * size + margins.fall;
-        let look = base + (approach * margins.dt).min(2.0 * size);
+        let prediction = base + (approach * margins.dt).min(2.0 * size);
 
         if let Some([a_then, b_then]) = &self.computed_at {
             let (a_now, b_now) = (Placed::of(a), Placed::of(b));
@@ -241,17 +170,17 @@ impl Pair {
             let moved = shift.length() + 2.0 * turn.xyz().length() * self.reach_b;
             let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
             let most = if a.kinematic || b.kinematic { RECYCLE_TURN_KINEMATIC } else { RECYCLE_TURN };
-            if moved < margins.recycle * size && turned < most && look <= self.looked + 0.5 * base {
+            if moved < margins.recycle * size && turned < most && prediction <= self.predicted + 0.5 * base {
                 self.motion = Motion { drift: (b_now.center - a_now.center) - carried, turn_a, turn_b };
                 return Update::Reused;
             }
         }
         self.computed_at = Some([Placed::of(a), Placed::of(b)]);
         self.motion = Motion::default();
-        self.looked = look;
+        self.predicted = prediction;
         let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
         let before = self.manifolds.len();
-        self.compute(ca, cb, a, b, look, size, scratch);
+        self.compute(ca, cb, a, b, prediction, size, scratch);
         let same = |(now, then): (&Manifold, &Manifold)| now.points().len() == then.points().len();
         let all_same = self.manifolds.len() == before && self.manifolds.iter().zip(&scratch.old).all(same);
         if all_same { Update::Computed } else { Update::Reshaped }
@@ -262,27 +191,27 @@ impl Pair {
         &mut self,
         ca: &ColliderInfo,
         cb: &ColliderInfo,
-        a: &Moving,
-        b: &Moving,
-        look: f32,
+        a: &BodyState,
+        b: &BodyState,
+        prediction: f32,
         size: f32,
         scratch: &mut Scratch,
     ) {
         let pose_a = Pose::from_parts(a.position, a.rotation) * ca.local;
         let pose_b = Pose::from_parts(b.position, b.rotation) * cb.local;
         let pos12 = pose_a.inv_mul(&pose_b);
-        let Scratch { cutting, one, many, candidates, old } = scratch;
-        let search = Search { look, size };
+        let Scratch { buffers, one, many, candidates, old } = scratch;
+        let search = ContactQuery { prediction, size };
         many.clear();
-        let found: &[Found] = if ca.is_composite() {
-            composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, cutting, many);
+        let found: &[ParryManifold] = if ca.is_composite() {
+            composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, buffers, many);
             many
         } else if cb.is_composite() {
-            composite_contacts(&*cb.shape, &*ca.shape, &pos12.inverse(), search, cutting, many);
+            composite_contacts(&*cb.shape, &*ca.shape, &pos12.inverse(), search, buffers, many);
             many.iter_mut().for_each(flip);
             many
         } else {
-            convex_contact((&ca.shape, &cb.shape), &pos12, search, cutting, one);
+            convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers, one);
             std::slice::from_ref(one)
         };
 
@@ -292,7 +221,7 @@ impl Pair {
         self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
-            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], look)));
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], prediction)));
             if candidates.is_empty() {
                 continue;
             }
@@ -302,7 +231,7 @@ impl Pair {
             let mut manifold = Manifold::new(normal, (m.subshape1, m.subshape2), candidates);
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
             manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
-            if let Some(o) = old.iter_mut().find(|o| o.parts == manifold.parts && !o.has_ended()) {
+            if let Some(o) = old.iter_mut().find(|o| o.subshapes == manifold.subshapes && !o.has_ended()) {
                 manifold.succeed(o, 0.1 * size);
                 o.slot = NO_SLOT;
             }
@@ -319,10 +248,10 @@ impl Pair {
 
 /// A point of parry's as one of ours; none if it is not finite or too far away.
 fn candidate(
-    m: &Found,
+    m: &ParryManifold,
     p: &TrackedContact<()>,
-    [(ca, a), (cb, b)]: [(&ColliderInfo, &Moving); 2],
-    look: f32,
+    [(ca, a), (cb, b)]: [(&ColliderInfo, &BodyState); 2],
+    prediction: f32,
 ) -> Option<ManifoldPoint> {
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
@@ -331,7 +260,7 @@ fn candidate(
     let on_a = a.rotation * anchor_a - (a.center - a.position);
     let on_b = b.rotation * anchor_b - (b.center - b.position);
     let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a);
-    let usable = p.dist <= look && p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
+    let usable = p.dist <= prediction && p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
     usable.then(|| ManifoldPoint {
         anchor_a,
         anchor_b,
