@@ -96,7 +96,7 @@ impl Simulation {
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         check_step_length(dt)?;
         let changes = timed(&mut stats.times.detect, || self.stages.changes(&self.world, &self.config, dt))?;
-        if changes.all_rows() || self.stages.prepared.are_slots_unsorted() {
+        if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.leave_device();
         }
         self.stages.follow(&self.world, &self.config, dt, changes);
@@ -110,7 +110,7 @@ impl Simulation {
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         let stages = &mut self.stages;
-        let (carry, passes) = (&stages.prepared.carry, &stages.plan.passes);
+        let (carry, passes) = (&stages.contacts.carry, &stages.plan.passes);
         let step = CheckedStep::built(&mut stages.problem, passes);
         let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
         if let Err(error) = ran {
@@ -180,7 +180,7 @@ impl Simulation {
     /// What touched in the last step, with the impulses that the step left.
     pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
         self.fetch();
-        manifolds::of(&self.stages.detector, &self.stages.prepared, &self.stages.problem)
+        manifolds::of(&self.stages.detector, &self.stages.contacts, &self.stages.problem)
     }
 
     /// Overlap when the last step began, from the contacts that it went by.

@@ -1,7 +1,7 @@
 //! Which manifold has which rows: a slot, from its first step until it ends.
 //!
 //! Rows stay where they are. What a step changes is which slots take part, and in which order they are swept. Backends are fastest where
-//! slots stand in that order: where many are new, all are sorted ([`super::Prepared::sort_slots`]). A step of a pyramid of 125,000
+//! slots stand in that order: where many are new, all are sorted ([`super::ContactRows::sort`]). A step of a pyramid of 125,000
 //! boxes takes 1.12 of the time if slots stay in the order of the pairs.
 
 use crate::collide::{Change, Detector, NO_SLOT, Pair};
