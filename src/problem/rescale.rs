@@ -1,11 +1,11 @@
-//! What impulses and preloads are proportional to: they follow where the length of a substep or the stiffness of contacts changes.
+//! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
 
 use super::StepProblem;
 use super::softness::contact_softness;
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
 
-/// What the impulses and preloads of a step are proportional to.
+/// The quantities that the impulses and preloads of a step are proportional to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepScale {
     /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.

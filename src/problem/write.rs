@@ -1,4 +1,4 @@
-//! What stands in the rows of contacts: written from a manifold when it is computed, and kept from step to step while it is reused.
+//! The content of the rows of contacts: written from a manifold when it is computed, and kept from step to step while it is reused.
 //!
 //! Normal, tangents, arms and effective masses of a reused manifold stay, and so do its impulses; only the separations
 //! follow the bodies. The bodies of a reused manifold turned by 0.03 rad at most, and unequal moments of inertia turned with
@@ -16,7 +16,7 @@ use crate::config::{FrictionRule, SolverConfig};
 use crate::math;
 use crate::world::World;
 
-/// What the rows of contacts are written from.
+/// The sources of the rows of contacts.
 pub(super) struct Writer<'a> {
     pub world: &'a World,
     pub detector: &'a Detector,
@@ -25,7 +25,7 @@ pub(super) struct Writer<'a> {
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
-    /// What preloads follow from, and whether a device sees to them and to the impulses.
+    /// The coefficients of the preloads, and whether a device computes preloads and impulses.
     pub carry: &'a Carry,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
@@ -193,7 +193,7 @@ impl Writer<'_> {
         preloaded(&self.carry.preload, row.preload, both, pressed, mass)
     }
 
-    /// What a row knows of the velocities when the step begins: that of the approach where it may bounce, and the direction
+    /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction
     /// of the slip where friction has one only.
     fn approach(&self, row: &ContactRow, point: &mut PointRow) {
         if !self.carry.approach {

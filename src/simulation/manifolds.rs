@@ -1,4 +1,4 @@
-//! What touches, for people and programs to read.
+//! The manifolds of a step for callers to read, with impulses in world axes.
 
 use glam::Vec3;
 

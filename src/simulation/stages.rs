@@ -1,4 +1,4 @@
-//! What lasts from step to step on this side of the backend, and the stages that a step goes through before and after it.
+//! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
 use crate::collide::Detector;
 use crate::config::SolverConfig;
@@ -19,24 +19,25 @@ pub(super) struct Stages {
     pub joints: JointRows,
     pub problem: StepProblem,
     pub plan: StepPlan,
-    /// What the plan was made for; none if a plan has to be made anew.
+    /// The key of the plan; none if the next step has to make a plan.
     plan_key: Option<PlanKey>,
     /// Points of the contacts that take part, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
 }
 
-/// What all rows are laid out for. Where the caller changed it, and only there, all that lasts is brought along.
+/// The settings and the properties of bodies that all rows were written for. A change of this value, and nothing else, brings all state
+/// along.
 #[derive(Clone)]
 struct Key {
     config: SolverConfig,
     /// Body by body.
     surfaces: Vec<(MassProperties, Material)>,
-    /// What impulses and preloads are proportional to; none before the first step.
+    /// Scale of impulses and preloads; none before the first step.
     scale: Option<StepScale>,
 }
 
-/// What the caller changed since the last step, as far as something that lasts between steps follows from it.
+/// The changes of the caller since the last step that concern state between steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Changes {
     settings: bool,
@@ -71,7 +72,7 @@ impl Stages {
         }
     }
 
-    /// What the caller changed since the last step.
+    /// The changes of the caller since the last step.
     ///
     /// # Errors
     /// Bodies came, went, or changed kind or shape; a joint or a mass is not fit to be simulated.
