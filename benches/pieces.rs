@@ -6,7 +6,7 @@ use drystone::config::FrictionAt;
 use drystone::stages::collide::Detector;
 use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::Prepared;
+use drystone::stages::problem::{ContactRows, begin};
 use drystone::{Backend, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.
@@ -50,17 +50,18 @@ fn stages(c: &mut Criterion) {
     group.bench_function("color, kept", |b| b.iter(|| graph.color(bodies, &mut edges, config.max_colors)));
 
     let mut problem = StepProblem::default();
-    let mut prepared = Prepared::default();
-    prepared.follow(&world, &mut detector);
-    prepared.color(&world, config.max_colors);
+    let mut contacts = ContactRows::default();
+    begin(&world, &[], &config, dt, &mut problem);
+    contacts.follow(&world, &mut detector);
+    contacts.color(&world, config.max_colors);
     group.bench_function("rows, written again", |b| {
         b.iter(|| {
-            prepared.write_again();
-            prepared.prepare(&world, &[], &detector, &config, dt, &mut problem);
+            contacts.write_again();
+            contacts.write(&world, &detector, &config, dt, &mut problem);
         });
     });
     group.bench_function("rows, carried", |b| {
-        b.iter(|| prepared.prepare(&world, &[], &detector, &config, dt, &mut problem));
+        b.iter(|| contacts.write(&world, &detector, &config, dt, &mut problem));
     });
     group.bench_function("plan", |b| b.iter(|| StepPlan::new(&config, &problem)));
 }

@@ -60,7 +60,7 @@ impl ConstraintGraph {
     }
 
     /// Gives the edges that take part, `members` by their indices, a color each among at most `max_colors` (1 to 64) a kind, and lays
-    /// them out for sweeping. An edge that takes no part keeps the color that it had, and holds it for nobody.
+    /// them out for sweeping. An edge that takes no part keeps the number of its color, but another edge may take the place.
     pub fn color_members(
         &mut self,
         body_count: usize,

@@ -38,7 +38,7 @@ pub struct Simulation {
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
-    /// What lasts from step to step on this side of the backend.
+    /// All state that lasts from step to step, except the copy of a device.
     stages: Stages,
     /// Whether the backend keeps the rows of the last step on a device.
     on_device: bool,
@@ -96,7 +96,7 @@ impl Simulation {
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         check_step_length(dt)?;
         let changes = timed(&mut stats.times.detect, || self.stages.changes(&self.world, &self.config, dt))?;
-        if changes.all_rows() || self.stages.prepared.are_slots_unsorted() {
+        if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.leave_device();
         }
         self.stages.follow(&self.world, &self.config, dt, changes);
@@ -110,7 +110,7 @@ impl Simulation {
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         let stages = &mut self.stages;
-        let (carry, passes) = (&stages.prepared.carry, &stages.plan.passes);
+        let (carry, passes) = (&stages.contacts.carry, &stages.plan.passes);
         let step = CheckedStep::built(&mut stages.problem, passes);
         let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
         if let Err(error) = ran {
@@ -146,7 +146,7 @@ impl Simulation {
         Ok((next.problem, next.plan))
     }
 
-    /// Brings what only the backend has of the last step to the problem. What a lost device had is forgotten.
+    /// Brings impulses and preloads that only the backend has to the problem. The problem forgets those of a lost device.
     fn fetch(&mut self) {
         if self.on_device && self.backend.fetch(&mut self.stages.problem).is_err() {
             self.on_device = false;
@@ -165,22 +165,22 @@ impl Simulation {
         self.stages.sleep.asleep().get(body) == Some(&true)
     }
 
-    /// Wakes a body, if it sleeps, and all that lies still with it. What changes of a sleeping body itself, of gravity or of a
+    /// Wakes the island of a body, if the body sleeps. A change of a sleeping body itself, of gravity or of a
     /// joint wakes it anyway.
     pub fn wake(&mut self, body: usize) {
         self.stages.sleep.wake(body);
     }
 
-    /// Overlap of the world as it is now, from contacts computed anew. The next step is as if nobody had asked: towers of 60
+    /// Overlap of the world as it is now, from contacts computed anew. The call does not change the next step: towers of 60
     /// that stand for 20 s fall if their contacts are recomputed now and then, since reused contacts do not creep.
     pub fn penetration(&self) -> Penetration {
         Penetration::of_world(&self.world, &self.config)
     }
 
-    /// What touched in the last step, with the impulses that the step left.
+    /// The manifolds of the last step, with their impulses.
     pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
         self.fetch();
-        manifolds::of(&self.stages.detector, &self.stages.prepared, &self.stages.problem)
+        manifolds::of(&self.stages.detector, &self.stages.contacts, &self.stages.problem)
     }
 
     /// Overlap when the last step began, from the contacts that it went by.
@@ -226,7 +226,7 @@ impl Simulation {
         &self.stages.plan
     }
 
-    /// What runs the steps.
+    /// The backend.
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }

@@ -3,7 +3,7 @@
 //! Bodies that touch, or that a joint holds together, form an island. An island whose bodies were all slow for a while falls
 //! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
 //! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it, or when
-//! somebody changes the pose, velocity or force of one of its bodies, the pose of what it lies on, or gravity. A body that
+//! the caller changes the pose, velocity or force of one of its bodies, the pose of a body under it, or gravity. A body that
 //! touches nothing never sleeps. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
@@ -13,9 +13,9 @@ use crate::config::SolverConfig;
 use crate::graph::Islands;
 use crate::world::{Body, BodyKind, World};
 
-/// What somebody may change between two steps.
+/// The state of a body that a caller may change between two steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Known {
+struct Snapshot {
     position: Vec3,
     rotation: Quat,
     linear_velocity: Vec3,
@@ -23,7 +23,7 @@ struct Known {
     force: Vec3,
 }
 
-impl Known {
+impl Snapshot {
     fn of(body: &Body) -> Self {
         Self {
             position: body.position,
@@ -44,14 +44,14 @@ pub struct Sleep {
     gravity: Vec3,
     /// Whether each body sleeps; empty if nothing ever does.
     asleep: Vec<bool>,
-    /// What each body is to the detection; empty likewise.
+    /// The activity of each body for the detection; empty likewise.
     activity: Vec<Activity>,
     /// How long each body has been slow (s).
     slow_for: Vec<f32>,
     /// Radius around the origin of each body that holds its shapes (m).
     reach: Vec<f32>,
     /// Bodies that sleep, and those that cannot be pushed, as they were left.
-    known: Vec<Known>,
+    left: Vec<Snapshot>,
     islands: Islands,
     /// The next body of the island, around; of bodies that sleep.
     next: Vec<u32>,
@@ -79,7 +79,7 @@ impl Sleep {
             activity: vec![Activity::Awake; bodies],
             slow_for: vec![0.0; bodies],
             reach: world.bodies.iter().map(reach).collect(),
-            known: world.bodies.iter().map(Known::of).collect(),
+            left: world.bodies.iter().map(Snapshot::of).collect(),
             islands: Islands::default(),
             next: (0..bodies as u32).collect(),
             count: 0,
@@ -106,7 +106,7 @@ impl Sleep {
         &self.asleep
     }
 
-    /// What each body is to the detection; empty if nothing ever sleeps.
+    /// The activity of each body for the detection; empty if nothing ever sleeps.
     pub fn activity(&self) -> &[Activity] {
         &self.activity
     }
@@ -126,7 +126,7 @@ impl Sleep {
         let everything = std::mem::replace(&mut self.gravity, world.gravity) != world.gravity;
         for i in 0..self.asleep.len() {
             let body = &world.bodies[i];
-            let changed = || everything || self.known[i] != Known::of(body);
+            let changed = || everything || self.left[i] != Snapshot::of(body);
             if self.asleep[i] && changed() {
                 self.wake(i);
             }
@@ -136,7 +136,7 @@ impl Sleep {
                 BodyKind::Kinematic if body.linear_velocity != Vec3::ZERO || body.angular_velocity != Vec3::ZERO => {
                     Activity::Moving
                 }
-                _ if self.known[i] != Known::of(body) => Activity::Moving,
+                _ if self.left[i] != Snapshot::of(body) => Activity::Moving,
                 _ => Activity::Still,
             };
         }
@@ -174,9 +174,9 @@ impl Sleep {
     /// Wakes a body that the caller changed. A body that never sleeps wakes what touches it in the next step.
     pub fn disturb(&mut self, body: usize) {
         self.wake(body);
-        if let Some(known) = self.known.get_mut(body) {
+        if let Some(left) = self.left.get_mut(body) {
             // Equal to nothing.
-            known.force = Vec3::NAN;
+            left.force = Vec3::NAN;
         }
     }
 
@@ -185,7 +185,7 @@ impl Sleep {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
             if body.kind != BodyKind::Dynamic {
-                self.known[i] = Known::of(body);
+                self.left[i] = Snapshot::of(body);
             } else if !self.asleep[i] {
                 let speed = body.linear_velocity.length() + self.reach[i] * body.angular_velocity.length();
                 self.slow_for[i] = if speed < self.speed { self.slow_for[i] + dt } else { 0.0 };
@@ -199,7 +199,7 @@ impl Sleep {
     }
 
     fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector) {
-        // Islands of those awake; and who is held by anything, and by nothing that moves by itself.
+        // Islands of bodies that are awake; bodies that something holds; bodies that touch a driven body.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];
@@ -229,7 +229,7 @@ impl Sleep {
             }
             let body = &mut world.bodies[i];
             (body.linear_velocity, body.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
-            self.known[i] = Known::of(body);
+            self.left[i] = Snapshot::of(body);
             self.asleep[i] = true;
             self.activity[i] = Activity::Still;
             self.count += 1;

@@ -151,6 +151,7 @@ impl Pair {
     ) -> Update {
         // A body that left the range touches nothing, so that the trouble does not spread.
         if !(a.is_in_range() && b.is_in_range()) {
+            self.manifolds.retain(|manifold| manifold.slot != NO_SLOT);
             self.manifolds.iter_mut().for_each(Manifold::end);
             self.computed_at = None;
             return Update::Reshaped;

@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::math::{reciprocal, smaller};
 
-/// What a backend has to know to go on from its own rows.
+/// The changes since the last step, for a backend that has the rows of that step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Carry {
     /// Whether the device has the rows of the step before, and they alone have its impulses and preloads. Else the problem
@@ -18,7 +18,7 @@ pub struct Carry {
     pub written: Vec<Written>,
     /// Whether more than the separations of reused points follows the bodies: the velocity of an approach, the slip.
     pub approach: bool,
-    /// What preloads follow from.
+    /// The coefficients of the preloads.
     pub preload: Preload,
 }
 
@@ -40,7 +40,7 @@ impl Written {
     pub const NEW: [u8; 4] = [u8::MAX; 4];
 }
 
-/// What the preloads of a step follow from, 16 B.
+/// The coefficients of the preloads of a step, 16 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Preload {
@@ -67,7 +67,7 @@ const LARGEST_PRELOAD: f32 = 2.0;
 pub(super) fn preloaded(by: &Preload, before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = if both_movable { by.movable_compliance } else { by.fixed_compliance };
     let sag = pressed * compliance * reciprocal(mass);
-    // What is borne no more is not held up either.
+    // Where the load ends, the preload ends too.
     smaller(before + by.share * (sag - before), LARGEST_PRELOAD * sag)
 }
 

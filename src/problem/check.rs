@@ -12,7 +12,7 @@ fn refuse(what: impl Display) -> Result<()> {
 
 impl StepProblem {
     /// Refuses a problem with an index that names no row, with rows of unequal number, or with a color in which a body that can move
-    /// occurs twice. What the numbers are is not looked at: trouble in the numbers is data.
+    /// occurs twice. The check reads no other numbers: numbers that are not finite are data.
     ///
     /// # Errors
     /// One line that names the row and the field.

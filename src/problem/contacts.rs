@@ -1,273 +1,151 @@
-//! The rows of contacts: written from a manifold when it is computed, and kept from step to step while it is reused.
-//!
-//! Normal, tangents, arms and effective masses of a reused manifold stay, and so do its impulses; only the separations
-//! follow the bodies. The bodies of a reused manifold turned by 0.03 rad at most, and unequal moments of inertia turned with
-//! them: what that changes in the masses is left out, as it is in the arms.
+//! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
-use glam::{Vec2, Vec3};
-use rayon::prelude::*;
-
-use super::carry::{Carry, preloaded};
-use super::effective::{EffectiveMass, InverseMass};
-use super::layout::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow, points_a_slot};
-use super::slots::{Slot, Write};
-use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
-use crate::config::{FrictionRule, SolverConfig};
-use crate::math;
+use super::StepProblem;
+use super::carry::{Carry, NO_POINT, Preload, Written};
+use super::rows::{ContactRow, ImpulseRow, PointRow, points_a_slot};
+use super::slots::{Slots, Write};
+use super::write::{Writer, point_before};
+use crate::collide::{Detector, MAX_POINTS};
+use crate::config::{FrictionAt, FrictionRule, SolverConfig};
+use crate::graph::{Coloring, ConstraintGraph};
 use crate::world::World;
 
-/// What the rows of contacts are written from.
-pub(super) struct Writer<'a> {
-    pub world: &'a World,
-    pub detector: &'a Detector,
-    pub config: &'a SolverConfig,
-    /// Length of a substep (s).
-    pub substep: f32,
-    pub bodies: &'a [BodyRow],
-    pub masses: &'a [MassRow],
-    /// What preloads follow from, and whether a device sees to them and to the impulses.
-    pub carry: &'a Carry,
-    /// Whether a patch follows the points of every contact.
-    pub patches: bool,
+/// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
+#[derive(Clone, Debug, Default)]
+pub struct ContactRows {
+    slots: Slots,
+    graph: ConstraintGraph,
+    /// The coloring of this step's contacts.
+    pub coloring: Coloring,
+    /// Whether every manifold has a row for friction of its own.
+    patches: bool,
+    /// Separation of each point when its manifold was computed, [`MAX_POINTS`] a slot (m).
+    computed: Vec<f32>,
+    /// How the rows follow from those of the step before.
+    pub carry: Carry,
 }
 
-/// The rows of one slot.
-struct SlotRows<'a> {
-    contact: &'a mut ContactRow,
-    points: &'a mut [PointRow],
-    impulses: &'a mut [ImpulseRow],
-    /// Separation of each point when its manifold was computed (m).
-    computed: &'a mut [f32],
-}
+impl ContactRows {
+    /// Gives rows to manifolds that began since, and takes those of manifolds that ended.
+    pub fn follow(&mut self, world: &World, detector: &mut Detector) {
+        self.slots.follow(world, detector);
+    }
 
-/// Slots that one task writes.
-const CHUNK: usize = 256;
+    /// Lets the next step write all rows again.
+    pub fn write_again(&mut self) {
+        self.slots.write_again();
+    }
 
-impl Writer<'_> {
-    /// Writes the rows of all slots, on all threads.
-    pub fn write(
-        &self,
-        slots: &[Slot],
-        contacts: &mut [ContactRow],
-        points: &mut [PointRow],
-        impulses: &mut [ImpulseRow],
-        computed: &mut [f32],
-    ) {
+    /// Gives every manifold that takes part a color; one that has a color keeps it.
+    pub fn color(&mut self, world: &World, max_colors: u32) {
+        let members: Vec<u32> = self.slots.taking_part().collect();
+        self.coloring = self.graph.color_members(world.bodies.len(), &mut self.slots.edges, &members, max_colors);
+    }
+
+    /// The color of the contact in a row.
+    pub fn color_of(&self, row: u32) -> Option<u8> {
+        self.slots.edges[row as usize].color
+    }
+
+    /// Whether so many rows are new that it pays to sort all. A device that has rows cannot follow that.
+    pub fn are_unsorted(&self) -> bool {
+        self.slots.are_unsorted()
+    }
+
+    /// Puts the rows of contacts into the order of the sweeps.
+    pub fn sort(&mut self, detector: &mut Detector, problem: &mut StepProblem) {
+        let from = self.slots.sort(&self.coloring.order, detector);
+        self.coloring.order = (0..self.coloring.order.len() as u32).collect();
         let stride = points_a_slot(self.patches);
-        let points = points.par_chunks_mut(CHUNK * stride).zip(impulses.par_chunks_mut(CHUNK * stride));
-        let rows = contacts.par_chunks_mut(CHUNK).zip(points).zip(computed.par_chunks_mut(CHUNK * MAX_POINTS));
-        slots.par_chunks(CHUNK).zip(rows).enumerate().for_each(
-            |(chunk, (slots, ((contacts, (points, impulses)), computed)))| {
-                // Far away in memory: these reads come first, so that none waits for another.
-                let mut motions = [Motion::default(); CHUNK];
-                for (motion, slot) in motions.iter_mut().zip(slots).filter(|(_, slot)| slot.takes_part) {
-                    *motion = *self.detector.pair(slot.world, slot.pair).motion();
-                }
-                let points = points.chunks_mut(stride).zip(impulses.chunks_mut(stride));
-                let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS));
-                for (i, ((slot, motion), ((contact, (points, impulses)), computed))) in
-                    slots.iter().zip(&motions).zip(rows).enumerate()
-                {
-                    contact.first_point = ((chunk * CHUNK + i) * stride) as u32;
-                    self.write_slot(slot, motion, SlotRows { contact, points, impulses, computed });
-                }
-            },
-        );
-    }
-
-    fn write_slot(&self, slot: &Slot, motion: &Motion, rows: SlotRows) {
-        let SlotRows { contact, points, impulses, computed } = rows;
-        if slot.write != Write::Separations {
-            let pair = self.detector.pair(slot.world, slot.pair);
-            let manifold = &pair.manifolds[slot.manifold as usize];
-            let before = *contact;
-            self.write_header(contact, slot.write, pair, manifold);
-            self.write_points(contact, manifold, motion, points, computed);
-            if !self.carry.on_device {
-                self.bring_impulses(slot.write, &before, contact, manifold, impulses);
-            }
-        } else if slot.takes_part {
-            self.refresh_points(contact, motion, points, computed);
-        }
-        // Where the rows are on a device, the kernel begin_contacts does this.
-        if slot.takes_part && !self.carry.on_device {
-            contact.preload = self.preload(contact, points, impulses);
-            let warm_start = self.carry.preload.warm_start != 0;
-            let begun =
-                |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
-            impulses.iter_mut().for_each(|i| *i = begun(i));
+        if !problem.contacts.is_empty() {
+            problem.contacts = moved(&problem.contacts, &from, 1);
+            (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
+            problem.points = moved(&problem.points, &from, stride);
+            problem.impulses = moved(&problem.impulses, &from, stride);
+            self.computed = moved(&self.computed, &from, MAX_POINTS);
         }
     }
 
-    fn write_header(&self, row: &mut ContactRow, write: Write, pair: &Pair, manifold: &Manifold) {
-        let [a, b] = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
-        let material = a.material.combine(b.material);
-        *row = ContactRow {
-            friction: if self.config.friction_rule() == FrictionRule::None { 0.0 } else { material.friction },
-            restitution: material.restitution,
-            body_a: pair.body_a,
-            body_b: pair.body_b,
-            first_point: row.first_point,
-            point_count: manifold.points().len() as u32,
-            radius_a: manifold.radius_a,
-            radius_b: manifold.radius_b,
-            preload: if write == Write::New { 0.0 } else { row.preload },
-            ..ContactRow::framed(manifold.normal)
+    /// Writes the rows of a step of `dt` seconds, after those of bodies.
+    pub fn write(
+        &mut self,
+        world: &World,
+        detector: &Detector,
+        config: &SolverConfig,
+        dt: f32,
+        problem: &mut StepProblem,
+    ) {
+        let patches = config.friction_at == FrictionAt::Manifold && config.friction_rule() != FrictionRule::None;
+        self.lay_out(patches, problem);
+        problem.params.point_count = problem.points.len() as u32;
+        problem.params.patches = patches.into();
+        problem.order.clone_from(&self.coloring.order);
+        problem.colors.clone_from(&self.coloring.offsets);
+        problem.first_joint_color = self.coloring.color_count() as u32;
+        self.carry.approach =
+            config.friction_rule() == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
+        self.carry.preload = Preload {
+            movable_compliance: problem.params.movable.compliance(),
+            fixed_compliance: problem.params.fixed.compliance(),
+            share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
+            warm_start: config.warm_start.into(),
         };
+        self.note_written(detector);
+        let StepProblem { bodies, masses, contacts, points, impulses, params, .. } = problem;
+        let Self { slots, carry, patches, computed, .. } = self;
+        let (substep, patches) = (params.substep, *patches);
+        let writer = Writer { world, detector, config, substep, bodies, masses, carry, patches };
+        writer.write(&slots.all, contacts, points, impulses, computed);
+        slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
     }
 
-    fn write_points(
-        &self,
-        row: &ContactRow,
-        manifold: &Manifold,
-        motion: &Motion,
-        points: &mut [PointRow],
-        computed: &mut [f32],
-    ) {
-        let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
-        let effective = EffectiveMass { inverse: &inverse, row };
-        for ((p, point), computed) in manifold.points().iter().zip(&mut *points).zip(&mut *computed) {
-            let tangent_mass = match self.config.friction_rule() {
-                FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
-                FrictionRule::None | FrictionRule::Slip => 0.0,
-            };
-            *computed = p.separation;
-            *point = PointRow {
-                r_a: p.r_a.to_array(),
-                r_b: p.r_b.to_array(),
-                normal_mass: effective.normal(p.r_a, p.r_b),
-                tangent_mass,
-                ..PointRow::default()
-            };
-        }
-        self.refresh_points(row, motion, points, computed);
-        if self.patches {
-            let (points, patch) = points.split_at_mut(manifold.points().len());
-            patch[0] = patch_of(&effective, points);
-        }
-    }
-
-    /// Brings the impulses of a slot to the points that its manifold has now, and to its tangents. Double of the function of the same
-    /// name in `shaders/carry/write_contacts.wgsl`.
-    fn bring_impulses(
-        &self,
-        write: Write,
-        before: &ContactRow,
-        now: &ContactRow,
-        manifold: &Manifold,
-        impulses: &mut [ImpulseRow],
-    ) {
-        let mut old = [ImpulseRow::default(); MAX_POINTS + 1];
-        if write != Write::New {
-            old[..impulses.len()].copy_from_slice(impulses);
-        }
-        impulses.fill(ImpulseRow::default());
-        for ((k, point), impulse) in manifold.points().iter().enumerate().zip(&mut *impulses) {
-            if let Some(from) = point_before(write, k, point) {
-                *impulse = retangented(before, now, &old[from as usize]);
+    /// Makes room for the rows of all slots. Where friction acts at other places than before, it begins without impulses.
+    fn lay_out(&mut self, patches: bool, problem: &mut StepProblem) {
+        let (count, stride) = (self.slots.all.len(), points_a_slot(patches));
+        if patches != self.patches {
+            let before = std::mem::take(&mut problem.impulses);
+            problem.impulses.resize(problem.contacts.len() * stride, ImpulseRow::default());
+            for (now, before) in problem.impulses.chunks_mut(stride).zip(before.chunks(points_a_slot(self.patches))) {
+                for (now, before) in now.iter_mut().zip(&before[..MAX_POINTS]) {
+                    now.normal = before.normal;
+                }
             }
+            for (now, contact) in problem.impulses.chunks_mut(stride).zip(&problem.contacts) {
+                now[contact.point_count as usize..].fill(ImpulseRow::default());
+            }
+            self.patches = patches;
         }
-        if self.patches {
-            impulses[manifold.points().len()] = retangented(before, now, &old[before.point_count as usize]);
-        }
+        problem.contacts.resize(count, ContactRow::default());
+        problem.points.resize(count * stride, PointRow::default());
+        problem.impulses.resize(count * stride, ImpulseRow::default());
+        self.computed.resize(count * MAX_POINTS, 0.0);
     }
 
-    /// Brings the separations of a manifold to where the bodies are, from those that were computed.
-    fn refresh_points(&self, row: &ContactRow, motion: &Motion, points: &mut [PointRow], computed: &[f32]) {
-        let movement = motion.along(row.normal, [row.radius_a, row.radius_b]);
-        for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {
-            point.separation = computed + movement.between(math::Vec3::load(point.r_a), math::Vec3::load(point.r_b));
-            self.approach(row, point);
-        }
-    }
-
-    /// How much a contact is preloaded in this step, by the impulses that it bore in the step before.
-    fn preload(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
-        let both = [row.body_a, row.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
-        let (mut pressed, mut mass) = (0.0, 0.0);
-        for (point, impulse) in points[..row.point_count as usize].iter().zip(impulses) {
-            pressed += impulse.normal;
-            mass += point.normal_mass;
-        }
-        preloaded(&self.carry.preload, row.preload, both, pressed, mass)
-    }
-
-    /// What a row knows of the velocities when the step begins: that of the approach where it may bounce, and the direction
-    /// of the slip where friction has one only.
-    fn approach(&self, row: &ContactRow, point: &mut PointRow) {
-        if !self.carry.approach {
+    /// Notes which rows are written again, for a device that has the others.
+    fn note_written(&mut self, detector: &Detector) {
+        self.carry.written.clear();
+        if !self.carry.on_device {
             return;
         }
-        let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
-        let [a, b] = [row.body_a, row.body_b].map(|i| &self.bodies[i as usize]);
-        let masses = [row.body_a, row.body_b].map(|i| &self.masses[i as usize]);
-        let velocity = |body: &BodyRow, r: Vec3| Vec3::from_array(body.v) + Vec3::from_array(body.w).cross(r);
-        let u = velocity(b, r_b) - velocity(a, r_a);
-        let normal = Vec3::from_array(row.normal);
-        let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
-        let pull = (pull_b - pull_a).dot(normal);
-        point.approach_velocity =
-            velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
-        if self.config.friction_rule() == FrictionRule::Slip && !self.patches {
-            let (tangent_1, tangent_2) = row.tangents();
-            // A point that does not slip yet takes the first tangent.
-            let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
-            [point.slip_1, point.slip_2] = slip.to_array();
-            let effective = EffectiveMass { inverse: &masses.map(InverseMass::of), row };
-            point.tangent_mass = effective.along(r_a, r_b, tangent_1 * slip.x + tangent_2 * slip.y);
+        let again = (0..).zip(&self.slots.all).filter(|(_, slot)| slot.write != Write::Separations);
+        self.carry.written.extend(again.map(|(row, slot)| {
+            let manifold = &detector.pair(slot.world, slot.pair).manifolds[slot.manifold as usize];
+            let mut points_before = if slot.write == Write::New { Written::NEW } else { [NO_POINT; MAX_POINTS] };
+            for ((k, point), before) in manifold.points().iter().enumerate().zip(&mut points_before) {
+                *before = point_before(slot.write, k, point).unwrap_or(*before);
+            }
+            Written { row, points_before }
+        }));
+    }
+}
+
+/// The rows of slots, `stride` each, that were at these places; those of slots without rows are left as they come.
+fn moved<T: Copy + Default>(rows: &[T], from: &[u32], stride: usize) -> Vec<T> {
+    let mut moved = vec![T::default(); from.len() * stride];
+    for (to, &from) in moved.chunks_mut(stride).zip(from) {
+        if let Some(rows) = rows.chunks(stride).nth(from as usize) {
+            to.copy_from_slice(rows);
         }
     }
-}
-
-/// Which of the points that a slot had is this one, the point `k` of its manifold.
-pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Option<u8> {
-    match write {
-        Write::Separations | Write::Rows => Some(k as u8),
-        Write::Computed => point.before,
-        Write::New => None,
-    }
-}
-
-/// An impulse along the tangents that a manifold has now. Friction that a rule no longer allows is not brought along.
-fn retangented(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> ImpulseRow {
-    let (tangent_1, tangent_2) = before.tangents();
-    let friction = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-    let friction = if now.friction > 0.0 { friction } else { Vec3::ZERO };
-    let (tangent_1, tangent_2) = now.tangents();
-    let [tangent_1, tangent_2] = [tangent_1, tangent_2].map(|tangent| friction.dot(tangent));
-    ImpulseRow { normal: impulse.normal, tangent_1, tangent_2, peak: 0.0 }
-}
-
-/// Normal velocity whose opposite, times the restitution `e`, gives back the energy of the approach.
-///
-/// `vn` is the normal velocity when the step begins, `pull` the relative acceleration along the normal, `gap` the distance
-/// still to go and `h` the substep. Two corrections: what the surfaces gain on the way, and that the velocities of the
-/// integrator stand half a substep ahead of the parabola that its positions lie on, before the bounce and after it.
-/// Without them a perfectly elastic ball that fell 5 m lost 2.3 % of its energy in 20 s at steps of 1 ms.
-fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
-    if vn >= 0.0 || e == 0.0 {
-        return vn;
-    }
-    let ahead = 0.5 * pull * h;
-    let approach = (vn + ahead).min(0.0);
-    let meeting = (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt();
-    -(meeting - ahead / e)
-}
-
-/// The row that stands for the friction of all `points`, which learn how far from it they are.
-fn patch_of(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
-    let middle = |arm: fn(&PointRow) -> [f32; 3]| {
-        points.iter().map(|p| Vec3::from_array(arm(p))).sum::<Vec3>() / points.len() as f32
-    };
-    let (r_a, r_b) = (middle(|p| p.r_a), middle(|p| p.r_b));
-    for p in points {
-        p.slip_1 = Vec3::from_array(p.r_a).distance(r_a);
-    }
-    PointRow {
-        r_a: r_a.to_array(),
-        r_b: r_b.to_array(),
-        normal_mass: effective.twist(),
-        tangent_mass: effective.tangent(r_a, r_b),
-        ..PointRow::default()
-    }
+    moved
 }

@@ -4,7 +4,7 @@ use std::ops::Div;
 
 use glam::{Mat3, Vec3};
 
-use super::layout::{ContactRow, MassRow};
+use super::rows::{ContactRow, MassRow};
 use crate::math::Scalar;
 
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.

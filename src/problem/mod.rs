@@ -1,22 +1,25 @@
 //! One step as a value: plain rows, whose names are the names of the WGSL bindings.
 
+mod bodies;
 pub mod carry;
 mod check;
 mod contacts;
 pub mod effective;
-mod follow;
-mod layout;
-mod prepare;
+mod joints;
+mod rescale;
+mod rows;
 mod slots;
 pub mod softness;
-mod store;
+mod write;
 
-pub use layout::{
+pub use bodies::{begin, store};
+pub use contacts::ContactRows;
+pub use joints::JointRows;
+pub use rescale::StepScale;
+pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
     MomentumRow, Params, PassColors, PointRow, Softness,
 };
-pub use prepare::Prepared;
-pub use store::store;
 
 use std::ops::Range;
 

@@ -12,7 +12,8 @@
 //! and w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²): the law
 //! that `tests/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
 
-use super::layout::Softness;
+use super::rows::Softness;
+use crate::config::{SolverConfig, Stabilization};
 
 /// Coefficients of a contact with `frequency` (Hz) and `damping_ratio` over a substep of `h` seconds.
 pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> Softness {
@@ -21,4 +22,22 @@ pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> 
     let a2 = h * omega * a1;
     let a3 = 1.0 / (1.0 + a2);
     Softness { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3, push_limit }
+}
+
+/// How overlap is removed, for contacts of `ratio` times the frequency.
+pub(super) fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
+    match config.stabilization {
+        Stabilization::Soft => {
+            softness(config.contact_frequency / h * ratio, config.contact_damping, h, config.push_limit)
+        }
+        Stabilization::Baumgarte => Softness::rigid(config.baumgarte / h, config.push_limit),
+        Stabilization::None => Softness::rigid(0.0, config.push_limit),
+    }
+}
+
+pub(super) fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
+    match config.stabilization {
+        Stabilization::Soft => softness(config.joint_frequency / h, config.joint_damping, h, config.push_limit),
+        _ => contact_softness(config, h, 1.0),
+    }
 }

@@ -1,9 +1,9 @@
-//! What touches, for people and programs to read.
+//! The manifolds of a step for callers to read, with impulses in world axes.
 
 use glam::Vec3;
 
 use crate::collide::{Detector, MAX_POINTS, Manifold, NO_SLOT, Pair};
-use crate::problem::{ImpulseRow, Prepared, StepProblem};
+use crate::problem::{ContactRows, ImpulseRow, StepProblem};
 
 /// The contact of two bodies over one pair of convex parts, as the last step left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,15 +60,15 @@ impl SolvedManifold {
 /// All manifolds that have rows, in the order of their pairs.
 pub(super) fn of(
     detector: &Detector,
-    prepared: &Prepared,
+    contacts: &ContactRows,
     problem: &StepProblem,
 ) -> impl Iterator<Item = SolvedManifold> + Clone {
     let all = detector.pairs().flat_map(|pair| pair.manifolds.iter().map(move |manifold| (pair, manifold)));
     let written = all.filter(|(_, manifold)| manifold.slot != NO_SLOT && !manifold.has_ended());
-    written.map(|(pair, manifold)| solved(pair, manifold, prepared, problem))
+    written.map(|(pair, manifold)| solved(pair, manifold, contacts, problem))
 }
 
-fn solved(pair: &Pair, manifold: &Manifold, prepared: &Prepared, problem: &StepProblem) -> SolvedManifold {
+fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &StepProblem) -> SolvedManifold {
     let contact = &problem.contacts[manifold.slot as usize];
     let (tangent_1, tangent_2) = contact.tangents();
     let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
@@ -92,7 +92,7 @@ fn solved(pair: &Pair, manifold: &Manifold, prepared: &Prepared, problem: &StepP
         body_a: pair.body_a as usize,
         body_b: pair.body_b as usize,
         normal: manifold.normal,
-        color: prepared.color_of(manifold.slot),
+        color: contacts.color_of(manifold.slot),
         preload: contact.preload,
         twist_impulse: patch.normal,
         friction_impulse: friction(&patch),

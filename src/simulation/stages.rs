@@ -1,10 +1,10 @@
-//! What lasts from step to step on this side of the backend, and the stages that a step goes through before and after it.
+//! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
 use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{Prepared, StepProblem, store};
+use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::{MassProperties, Material, World};
@@ -15,25 +15,29 @@ pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
     key: Key,
-    pub prepared: Prepared,
+    pub contacts: ContactRows,
+    pub joints: JointRows,
     pub problem: StepProblem,
     pub plan: StepPlan,
-    /// What the plan was made for; none if a plan has to be made anew.
+    /// The key of the plan; none if the next step has to make a plan.
     plan_key: Option<PlanKey>,
     /// Points of the contacts that take part, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
 }
 
-/// What all rows are laid out for. Where the caller changed it, and only there, all that lasts is brought along.
+/// The settings and the properties of bodies that all rows were written for. A change of this value, and nothing else, brings all state
+/// along.
 #[derive(Clone)]
 struct Key {
     config: SolverConfig,
     /// Body by body.
     surfaces: Vec<(MassProperties, Material)>,
+    /// Scale of impulses and preloads; none before the first step.
+    scale: Option<StepScale>,
 }
 
-/// What the caller changed since the last step, as far as something that lasts between steps follows from it.
+/// The changes of the caller since the last step that concern state between steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Changes {
     settings: bool,
@@ -57,8 +61,9 @@ impl Stages {
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
-            key: Key { config: config.clone(), surfaces },
-            prepared: Prepared::default(),
+            key: Key { config: config.clone(), surfaces, scale: None },
+            contacts: ContactRows::default(),
+            joints: JointRows::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
             plan_key: None,
@@ -67,14 +72,14 @@ impl Stages {
         }
     }
 
-    /// What the caller changed since the last step.
+    /// The changes of the caller since the last step.
     ///
     /// # Errors
     /// Bodies came, went, or changed kind or shape; a joint or a mass is not fit to be simulated.
     pub fn changes(&self, world: &World, config: &SolverConfig, dt: f32) -> Result<Changes> {
         self.detector.check_bodies(world)?;
         let surfaces = world.bodies.iter().zip(&self.key.surfaces).any(|(b, known)| (b.mass, b.material) != *known);
-        let joints = self.prepared.joints() != world.joints;
+        let joints = self.joints.joints() != world.joints;
         world.check_gravity()?;
         if surfaces {
             world.check_surfaces()?;
@@ -82,14 +87,14 @@ impl Stages {
         if joints {
             world.check_joints()?;
         }
-        let step = self.prepared.is_step_new(config, dt);
+        let step = self.key.scale.is_some_and(|scale| scale != StepScale::new(config, dt));
         Ok(Changes { settings: self.key.config != *config, surfaces, joints, step })
     }
 
     /// Brings all that lasts to what the caller changed.
     pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: Changes) {
         if changes.settings {
-            self.prepared.forget_joint_colors();
+            self.joints.forget_colors();
             self.sleep.change_settings(world, &self.key.config, config);
             self.key.config = config.clone();
         }
@@ -102,17 +107,18 @@ impl Stages {
             }
         }
         if changes.joints {
-            for joint in self.prepared.follow_joints(world, &mut self.problem) {
+            for joint in self.joints.follow(world, &mut self.problem) {
                 self.sleep.disturb(joint.body_a);
                 joint.body_b.iter().for_each(|&b| self.sleep.disturb(b));
             }
             self.detector.follow_joints(world);
         }
-        if changes.step {
-            self.prepared.change_step(world, config, dt, &mut self.problem);
+        let scale = StepScale::new(config, dt);
+        if let Some(before) = self.key.scale.replace(scale).filter(|_| changes.step) {
+            scale.rescale(&before, world, &mut self.problem);
         }
         if changes.settings || changes.surfaces {
-            self.prepared.write_again();
+            self.contacts.write_again();
             self.plan_key = None;
         }
     }
@@ -126,18 +132,18 @@ impl Stages {
 
     /// Detects, colors, prepares and plans. `on_device`: the device goes on from its own rows.
     pub fn assemble(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
-        let Self { detector, sleep, prepared, problem, .. } = self;
+        let Self { detector, sleep, contacts, joints, problem, .. } = self;
         let times = &mut stats.times;
         // Decided before the detection, by what a device that has the rows was asked to leave for.
-        let are_sorted_anew = prepared.are_slots_unsorted() || problem.contacts.is_empty();
+        let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         let found = timed(&mut times.detect, || {
             let mut found = detector.detect(world, config, dt, sleep.activity());
-            prepared.follow(world, detector);
+            contacts.follow(world, detector);
             // A body that wakes takes part in this step already.
             while sleep.wake_touched(detector) {
                 let before = found;
                 found = detector.detect(world, config, dt, sleep.activity());
-                prepared.follow(world, detector);
+                contacts.follow(world, detector);
                 found.computed += before.computed;
                 found.reshaped |= before.reshaped;
             }
@@ -145,16 +151,18 @@ impl Stages {
         });
         timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
-                prepared.color(world, config.max_colors);
+                contacts.color(world, config.max_colors);
                 if are_sorted_anew {
-                    prepared.sort_slots(detector, problem);
+                    contacts.sort(detector, problem);
                 }
             }
-            prepared.color_joints(world, config.max_colors);
+            joints.color(world, config.max_colors);
         });
         timed(&mut times.prepare, || {
-            prepared.carry.on_device = on_device;
-            prepared.prepare(world, sleep.asleep(), detector, config, dt, problem);
+            problem::begin(world, sleep.asleep(), config, dt, problem);
+            contacts.carry.on_device = on_device;
+            contacts.write(world, detector, config, dt, problem);
+            joints.write(world, sleep.asleep(), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
                 self.plan = StepPlan::new(config, problem);
@@ -165,18 +173,18 @@ impl Stages {
         });
         stats.pairs = found.pairs;
         stats.computed = found.computed;
-        stats.manifolds = prepared.coloring.order.len();
+        stats.manifolds = contacts.coloring.order.len();
         stats.points = self.points;
         stats.joints = problem.rows_of(&problem.joint_colors()).len();
-        stats.colors = prepared.coloring.color_count();
-        stats.overflow = prepared.coloring.overflow as usize;
+        stats.colors = contacts.coloring.color_count();
+        stats.overflow = contacts.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();
         stats.bytes_moved = self.bytes_moved;
     }
 
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
-        store(&self.problem, self.sleep.asleep(), world);
+        problem::store(&self.problem, self.sleep.asleep(), world);
         self.sleep.after_step(world, &self.detector, dt);
     }
 }

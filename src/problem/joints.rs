@@ -1,102 +1,54 @@
-//! How what lasts between steps follows what the caller changes between them: the length of a step, settings, joints.
+//! The rows of joints: one for each joint of the world, in its order. An impulse stays in its row.
 
 use std::collections::{HashMap, VecDeque};
 
+use glam::Vec3;
+
 use super::StepProblem;
-use super::prepare::{Prepared, contact_softness};
-use crate::config::SolverConfig;
-use crate::graph::{Edge, IMMOVABLE};
+use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow};
+use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use crate::world::{BallJoint, BodyKind, World};
 
-/// What the impulses and preloads of a step are proportional to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct StepScale {
-    /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.
-    substep: f32,
-    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move (s).
-    movable_compliance: f32,
-    /// The same of contacts with bodies that cannot (s).
-    fixed_compliance: f32,
+/// The joints that have rows, and their colors.
+#[derive(Clone, Debug, Default)]
+pub struct JointRows {
+    joints: Vec<BallJoint>,
+    /// The joints as edges of their graph.
+    edges: Vec<Edge>,
+    graph: ConstraintGraph,
+    coloring: Coloring,
+    is_colored: bool,
 }
 
-impl StepScale {
-    pub fn new(config: &SolverConfig, dt: f32) -> Self {
-        let substep = dt / config.substeps as f32;
-        let compliance = |ratio| contact_softness(config, substep, ratio).compliance();
-        Self {
-            substep,
-            movable_compliance: compliance(1.0),
-            fixed_compliance: compliance(config.fixed_contact_frequency_ratio),
-        }
-    }
-}
-
-/// The quotient, or 1 where nothing is to be divided by.
-fn ratio(now: f32, before: f32) -> f32 {
-    if before > 0.0 { now / before } else { 1.0 }
-}
-
-impl Prepared {
-    /// Whether impulses and preloads of the last step belong to substeps of another length or to contacts of another stiffness.
-    pub fn is_step_new(&self, config: &SolverConfig, dt: f32) -> bool {
-        self.scale.is_some_and(|scale| scale != StepScale::new(config, dt))
-    }
-
-    /// Rescales impulses and preloads, so that all contacts and joints bear the same forces in a step of `dt` seconds as in the step
-    /// before. A pile that came to rest with 32 substeps rattled at 0.8 m/s without this when it went on with 8.
-    pub fn change_step(&mut self, world: &World, config: &SolverConfig, dt: f32, problem: &mut StepProblem) {
-        let now = StepScale::new(config, dt);
-        let Some(before) = self.scale.replace(now) else { return };
-        let forces = ratio(now.substep, before.substep);
-        let movable = forces * ratio(now.movable_compliance, before.movable_compliance);
-        let fixed = forces * ratio(now.fixed_compliance, before.fixed_compliance);
-        let is_dynamic = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
-        for contact in &mut problem.contacts {
-            contact.preload *= if is_dynamic(contact.body_a) && is_dynamic(contact.body_b) { movable } else { fixed };
-        }
-        for impulse in &mut problem.impulses {
-            impulse.normal *= forces;
-            impulse.tangent_1 *= forces;
-            impulse.tangent_2 *= forces;
-        }
-        for impulse in &mut problem.joint_impulses {
-            impulse.linear = impulse.linear.map(|x| x * forces);
-        }
-    }
-
-    /// Lets the next step write all rows again.
-    pub fn write_again(&mut self) {
-        self.slots.write_again();
-    }
-
-    /// The joints that the rows are of.
+impl JointRows {
+    /// The joints that have rows.
     pub fn joints(&self) -> &[BallJoint] {
         &self.joints
     }
 
     /// Lets all joints choose their colors anew.
-    pub fn forget_joint_colors(&mut self) {
-        self.joint_edges.iter_mut().for_each(|edge| edge.color = None);
-        self.are_joints_colored = false;
+    pub fn forget_colors(&mut self) {
+        self.edges.iter_mut().for_each(|edge| edge.color = None);
+        self.is_colored = false;
     }
 
     /// Takes over the joints of the world; returns those that began, ended or changed.
     ///
     /// A joint keeps impulse and color wherever it stands in the list: it is the one with the same bodies and anchors, else one
     /// with the same bodies, whose anchors moved.
-    pub fn follow_joints(&mut self, world: &World, problem: &mut StepProblem) -> Vec<BallJoint> {
+    pub fn follow(&mut self, world: &World, problem: &mut StepProblem) -> Vec<BallJoint> {
         let (before, now) = (std::mem::take(&mut self.joints), &world.joints);
         let from = matched(&before, now);
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
         let edge = |(joint, from): (&BallJoint, &Option<usize>)| Edge {
             a: movable(joint.body_a),
             b: joint.body_b.map_or(IMMOVABLE, movable),
-            color: from.and_then(|i| self.joint_edges[i].color),
+            color: from.and_then(|i| self.edges[i].color),
             rank: 0,
         };
         let edges: Vec<Edge> = now.iter().zip(&from).map(edge).collect();
-        self.are_joints_colored &= edges == self.joint_edges;
-        self.joint_edges = edges;
+        self.is_colored &= edges == self.edges;
+        self.edges = edges;
         let impulse =
             |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
         problem.joint_impulses = from.iter().map(impulse).collect();
@@ -107,6 +59,61 @@ impl Prepared {
         let all = changed.map(|(joint, _)| *joint).chain(ended.map(|(joint, _)| *joint)).collect();
         self.joints.clone_from(now);
         all
+    }
+
+    /// Gives every joint a color, unless all have theirs; joints and contacts share none.
+    pub fn color(&mut self, world: &World, max_colors: u32) {
+        if !self.is_colored {
+            self.coloring = self.graph.color(world.bodies.len(), &mut self.edges, max_colors);
+            self.is_colored = true;
+        }
+    }
+
+    /// Writes the rows of all joints, after those of bodies and contacts.
+    pub fn write(&self, world: &World, asleep: &[bool], problem: &mut StepProblem) {
+        problem.joints.clear();
+        problem.joint_impulses.resize(world.joints.len(), JointImpulseRow::default());
+        problem.params.joint_count = world.joints.len() as u32;
+        if world.joints.is_empty() {
+            return;
+        }
+        // A joint holds bodies of one island, which are asleep together.
+        let rests = |body: usize| asleep.get(body) == Some(&true);
+        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+        let is_awake = |i: u32| {
+            let joint = &world.joints[i as usize];
+            // One of two bodies that nothing moves has no block to solve.
+            (moves(joint.body_a) || joint.body_b.is_some_and(moves))
+                && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
+        };
+        let contacts = problem.order.len();
+        for color in self.coloring.offsets.windows(2) {
+            let own = &self.coloring.order[color[0] as usize..color[1] as usize];
+            problem.order.extend(own.iter().filter(|&&i| is_awake(i)));
+            problem.colors.push(problem.order.len() as u32);
+        }
+        if problem.order.len() == contacts {
+            problem.colors.truncate(problem.first_joint_color as usize + 1);
+        }
+        let world_row = world.bodies.len() as u32;
+        problem.joints.extend(world.joints.iter().map(|joint| {
+            let [anchor_a, anchor_b] = world.anchors(joint);
+            let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
+            JointRow {
+                r_a: arm(joint.body_a, anchor_a),
+                body_a: joint.body_a as u32,
+                r_b: joint.body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
+                body_b: joint.body_b.map_or(world_row, |b| b as u32),
+                gap: (anchor_b - anchor_a).to_array(),
+                ..JointRow::default()
+            }
+        }));
+        // The world, as a body that nothing moves.
+        if world.joints.iter().any(|j| j.body_b.is_none()) {
+            problem.bodies.push(BodyRow::AT_REST);
+            problem.masses.push(MassRow::default());
+            problem.params.body_count += 1;
+        }
     }
 }
 
@@ -134,7 +141,6 @@ fn matched(before: &[BallJoint], now: &[BallJoint]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     fn joint(body: usize, anchor: f32) -> BallJoint {
         BallJoint::to_world(body, Vec3::X * anchor, Vec3::ZERO)

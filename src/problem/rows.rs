@@ -109,8 +109,8 @@ pub struct ContactRow {
     pub radius_a: f32,
     /// Radius of curvature of b's surface (m).
     pub radius_b: f32,
-    /// How far the springs of a soft contact are compressed while the surfaces just touch (m). What they answer to is the separation
-    /// less this.
+    /// How far the springs of a soft contact are compressed while the surfaces just touch (m). The contact
+    /// acts on the separation less the preload.
     pub preload: f32,
     #[doc(hidden)]
     pub pad: f32,
@@ -248,7 +248,7 @@ impl Softness {
     }
 }
 
-/// What is the same for every body and contact of a step, 96 B.
+/// The numbers that are the same for every body and contact of a step, 96 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
@@ -272,7 +272,7 @@ pub struct Params {
     pub point_count: u32,
     /// Overlap that is left alone (m).
     pub slop: f32,
-    /// What every correction is multiplied by.
+    /// Factor of every correction.
     pub relaxation: f32,
     /// Corrections that change a relative velocity by less count as none (m/s).
     pub tolerance: f32,

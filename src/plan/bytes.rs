@@ -1,0 +1,76 @@
+//! How many bytes a plan moves.
+
+use std::ops::Range;
+
+use super::{Kernel, Pass, StepPlan};
+use crate::config::FrictionRule;
+use crate::kernels::momentum::{CHUNK, StepLength};
+use crate::problem::{
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
+    StepProblem,
+};
+
+impl StepPlan {
+    /// Bytes that the kernels read and write when every row that a thread names is moved once.
+    pub fn bytes_moved(&self, problem: &StepProblem) -> u64 {
+        self.bytes_of_passes(problem).sum()
+    }
+
+    /// The same, pass by pass.
+    pub fn bytes_of_passes(&self, problem: &StepProblem) -> impl Iterator<Item = u64> {
+        // Points of the contacts before each place in the order.
+        let mut points = vec![0];
+        points.extend(problem.swept_contacts().scan(0, |sum, contact| {
+            *sum += contact.point_count as usize;
+            Some(*sum)
+        }));
+        self.passes.iter().map(move |pass| pass.bytes_moved(problem, &points))
+    }
+}
+
+impl Pass {
+    /// Bytes that this pass reads and writes; `points` are those of the contacts before each place in the order.
+    fn bytes_moved(&self, problem: &StepProblem, points: &[usize]) -> u64 {
+        const BODY: usize = size_of::<BodyRow>();
+        const MASS: usize = size_of::<MassRow>();
+        // Velocities are the half of a body that a sweep writes.
+        const VELOCITIES: usize = BODY / 2;
+        const PAIR: usize = 2 * (BODY + MASS + VELOCITIES);
+        const IMPULSE: usize = size_of::<ImpulseRow>();
+        let rows = problem.rows_of(&self.colors);
+        let points_of = |colors: &Range<u32>| {
+            let [first, end] = [colors.start, colors.end].map(|color| points[problem.colors[color as usize] as usize]);
+            end - first
+        };
+        let bytes = match self.kernel {
+            Kernel::IntegrateVelocities { carry } => {
+                problem.bodies.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
+            }
+            Kernel::IntegratePositions => problem.bodies.len() * (BODY + BODY / 2),
+            Kernel::IntegrateGyroscopic => {
+                problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
+            }
+            Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
+            // Reads and writes what was before, and writes where the sweep begins.
+            Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
+            Kernel::MeasureStep => 3 * IMPULSE * problem.impulse_count(),
+            Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<StepLength<f32>>(),
+            Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
+            Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::ClearImpulses => {
+                let patches = if problem.has_patches() { rows.len() } else { 0 };
+                (points_of(&self.colors) + patches) * 2 * IMPULSE
+            }
+            Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
+                let (contacts, points) = (rows.len(), points_of(&self.colors));
+                let patches = if rules.patch { contacts } else { 0 };
+                let writes = !matches!(self.kernel, Kernel::WarmStart(_));
+                let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
+                // Friction at points goes over them a second time; per manifold it adds one row.
+                let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
+                contacts * (size_of::<ContactRow>() + PAIR) + (points + again + patches) * once
+            }
+        };
+        bytes as u64
+    }
+}

@@ -1,0 +1,112 @@
+//! The kernels of a plan: compute shaders, each with its rules.
+
+use std::fmt;
+
+use crate::config::FrictionRule;
+use crate::kernels::Rules;
+
+/// One of the compute shaders, with its rules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Kernel {
+    /// Gravity and forces; over bodies.
+    IntegrateVelocities {
+        /// Whether the impulses that the last substep ended with are applied as well, as velocities.
+        carry: bool,
+    },
+    /// Free rotation of unequal moments of inertia; over `inertias`.
+    IntegrateGyroscopic,
+    /// Forgets impulses; over contact colors, all at once.
+    ClearImpulses,
+    /// Impulses that the joints carry; over joint colors.
+    WarmStartJoints,
+    /// Impulses that the manifolds carry; over contact colors.
+    WarmStart(Rules),
+    /// Counts a sweep, and decides whether it is still needed; `first` of its kind in a substep always is.
+    BeginSweep {
+        /// Whether it is the first.
+        first: bool,
+    },
+    /// Goes on in the direction of the last sweeps, or, `first`, only remembers where they begin; over bodies, points and joints.
+    Extrapolate {
+        /// Whether no sweep came before.
+        first: bool,
+        /// Whether it is left out where sweeps are no longer needed.
+        measured: bool,
+    },
+    /// How far the last sweep moved the impulses; over points and joints.
+    MeasureStep,
+    /// How far the next extrapolation goes.
+    UpdateMomentum,
+    /// One sweep of the joints; over joint colors.
+    SolveJoints(Rules),
+    /// One sweep of the contacts; over contact colors.
+    SolveContacts(Rules),
+    /// Poses; over bodies.
+    IntegratePositions,
+    /// Bounces; over contact colors.
+    ApplyRestitution(Rules),
+}
+
+impl Kernel {
+    /// Name of the shader file and of its entry point.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::IntegrateVelocities { .. } => "integrate_velocities",
+            Self::IntegrateGyroscopic => "integrate_gyroscopic",
+            Self::ClearImpulses => "clear_impulses",
+            Self::WarmStartJoints => "warm_start_joints",
+            Self::WarmStart(_) => "warm_start",
+            Self::BeginSweep { .. } => "begin_sweep",
+            Self::Extrapolate { .. } => "extrapolate",
+            Self::MeasureStep => "measure_step",
+            Self::UpdateMomentum => "update_momentum",
+            Self::SolveJoints(_) => "solve_joints",
+            Self::SolveContacts(_) => "solve_contacts",
+            Self::IntegratePositions => "integrate_positions",
+            Self::ApplyRestitution(_) => "apply_restitution",
+        }
+    }
+
+    /// Rules of a kernel that sweeps constraints, or none.
+    pub fn rules(self) -> Option<Rules> {
+        match self {
+            Self::WarmStart(rules)
+            | Self::SolveJoints(rules)
+            | Self::SolveContacts(rules)
+            | Self::ApplyRestitution(rules) => Some(rules),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.name())?;
+        if matches!(self, Self::IntegrateVelocities { carry: true }) {
+            write!(f, "(carry)")?;
+        }
+        if let Some(r) = self.rules() {
+            let friction = match r.friction {
+                FrictionRule::None => "",
+                FrictionRule::Slip => "slip friction",
+                FrictionRule::Box => "box friction",
+                FrictionRule::Disc => "disc friction",
+            };
+            let named = [
+                (r.biased, "biased"),
+                (r.friction != FrictionRule::None, friction),
+                (r.patch, "per manifold"),
+                (r.friction_first, "first"),
+                (!r.accumulated, "clamped per correction"),
+                (r.round, "round"),
+                (r.driven, "driven"),
+                (r.passes > 1, "repeated"),
+                (r.measured, "measured"),
+            ];
+            let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
+            write!(f, "({})", on.join(", "))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,93 @@
+//! The rows of bodies: from a world, and back to it.
+
+use glam::{Quat, Vec3};
+use rayon::prelude::*;
+
+use super::StepProblem;
+use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params};
+use super::softness::{contact_softness, joint_softness};
+use crate::config::{SolverConfig, Stabilization};
+use crate::math::Lane;
+use crate::world::{Body, BodyKind, World};
+
+/// Bodies that one task works on at least.
+const LEAST_BODIES: usize = 256;
+
+/// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
+/// bodies that nothing moves.
+pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, dt: f32, problem: &mut StepProblem) {
+    write_bodies(world, asleep, config, problem);
+    let h = dt / config.substeps as f32;
+    problem.params = Params {
+        substep: h,
+        inverse_substep: 1.0 / h,
+        restitution_threshold: config.restitution_threshold,
+        inertia_count: problem.inertias.len() as u32,
+        movable: contact_softness(config, h, 1.0),
+        fixed: contact_softness(config, h, config.fixed_contact_frequency_ratio),
+        joint: joint_softness(config, h),
+        body_count: problem.bodies.len() as u32,
+        slop: if config.stabilization == Stabilization::Baumgarte { config.slop } else { 0.0 },
+        relaxation: config.relaxation,
+        tolerance: config.tolerance,
+        ..Params::default()
+    };
+    problem.convergence = ConvergenceRow::default();
+    problem.momentum = MomentumRow::default();
+}
+
+fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
+    let rests = |i: usize| asleep.get(i) == Some(&true);
+    let state = |(i, b): (usize, &Body)| {
+        let moves = b.kind != BodyKind::Fixed && !rests(i);
+        let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
+        BodyRow { v: velocity(b.linear_velocity), w: velocity(b.angular_velocity), ..BodyRow::AT_REST }
+    };
+    world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
+    let mass = |(i, b): (usize, &Body)| {
+        if b.kind != BodyKind::Dynamic || rests(i) {
+            return MassRow::default();
+        }
+        let i = b.mass.world_inverse_inertia(b.rotation);
+        MassRow {
+            inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
+            inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
+            inv_mass: 1.0 / b.mass.mass,
+            acceleration: (world.gravity + b.force / b.mass.mass).to_array(),
+            ..MassRow::default()
+        }
+    };
+    world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
+    problem.inertias.clear();
+    if config.gyroscopic {
+        let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic();
+        let row = |(i, b): (usize, &Body)| {
+            let unit = b.mass.principal_inertia.max_element().inverse_power();
+            let principal = b.mass.principal_inertia * unit;
+            InertiaRow {
+                principal: principal.to_array(),
+                body: i as u32,
+                inv_principal: principal.recip().to_array(),
+                frame: (b.rotation * b.mass.principal_frame).to_array(),
+                ..InertiaRow::default()
+            }
+        };
+        problem.inertias.extend(world.bodies.iter().enumerate().filter(|&(i, b)| turns(b) && !rests(i)).map(row));
+    }
+}
+
+/// Writes poses and velocities into the world, but for bodies that are asleep. Impulses stay in their rows, where the next step
+/// finds them.
+pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
+    let bodies = world.bodies.par_iter_mut().with_min_len(LEAST_BODIES).zip(&problem.bodies);
+    bodies.enumerate().for_each(|(i, (body, row))| {
+        if body.kind == BodyKind::Fixed || asleep.get(i) == Some(&true) {
+            return;
+        }
+        let center = body.center_of_mass() + Vec3::from_array(row.dp);
+        body.rotation = (Quat::from_array(row.dq) * body.rotation).normalize();
+        body.position = center - body.rotation * body.mass.center;
+        body.linear_velocity = Vec3::from_array(row.v);
+        body.angular_velocity = Vec3::from_array(row.w);
+    });
+}

@@ -1,0 +1,57 @@
+//! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
+
+use super::StepProblem;
+use super::softness::contact_softness;
+use crate::config::SolverConfig;
+use crate::world::{BodyKind, World};
+
+/// The quantities that the impulses and preloads of a step are proportional to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepScale {
+    /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.
+    substep: f32,
+    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move (s).
+    movable_compliance: f32,
+    /// The same of contacts with bodies that cannot (s).
+    fixed_compliance: f32,
+}
+
+impl StepScale {
+    /// That of steps of `dt` seconds.
+    pub fn new(config: &SolverConfig, dt: f32) -> Self {
+        let substep = dt / config.substeps as f32;
+        let compliance = |ratio| contact_softness(config, substep, ratio).compliance();
+        Self {
+            substep,
+            movable_compliance: compliance(1.0),
+            fixed_compliance: compliance(config.fixed_contact_frequency_ratio),
+        }
+    }
+}
+
+/// The quotient, or 1 where nothing is to be divided by.
+fn ratio(now: f32, before: f32) -> f32 {
+    if before > 0.0 { now / before } else { 1.0 }
+}
+
+impl StepScale {
+    /// Rescales the impulses and preloads of a step of the scale `before`, so that all contacts and joints bear the same forces in a
+    /// step of this one. A pile that came to rest with 32 substeps rattled at 0.8 m/s without this when it went on with 8.
+    pub fn rescale(&self, before: &Self, world: &World, problem: &mut StepProblem) {
+        let forces = ratio(self.substep, before.substep);
+        let movable = forces * ratio(self.movable_compliance, before.movable_compliance);
+        let fixed = forces * ratio(self.fixed_compliance, before.fixed_compliance);
+        let is_dynamic = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
+        for contact in &mut problem.contacts {
+            contact.preload *= if is_dynamic(contact.body_a) && is_dynamic(contact.body_b) { movable } else { fixed };
+        }
+        for impulse in &mut problem.impulses {
+            impulse.normal *= forces;
+            impulse.tangent_1 *= forces;
+            impulse.tangent_2 *= forces;
+        }
+        for impulse in &mut problem.joint_impulses {
+            impulse.linear = impulse.linear.map(|x| x * forces);
+        }
+    }
+}

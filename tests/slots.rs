@@ -1,0 +1,104 @@
+//! Rows stay in their slots as long as their manifold lasts, and a slot that is free goes to another manifold with nothing in it.
+
+use drystone::glam::Vec3;
+use drystone::{Body, Cpu, Scene, Shape, Simulation, SolverConfig, World};
+
+const DT: f32 = 1.0 / 60.0;
+
+fn simulation(world: World) -> Simulation {
+    Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+}
+
+fn run(simulation: &mut Simulation, steps: u32) {
+    for _ in 0..steps {
+        simulation.step(DT).expect("a step");
+    }
+}
+
+fn ball(x: f32, y: f32) -> Body {
+    Body::dynamic().shape(Shape::ball(0.5)).position(x, y, 0.0)
+}
+
+/// Rows of the contacts of a body.
+fn rows(simulation: &mut Simulation, body: u32) -> Vec<u32> {
+    let (problem, _) = simulation.next_problem(DT).expect("a step");
+    let own = |&row: &u32| {
+        let contact = &problem.contacts[row as usize];
+        contact.body_a == body || contact.body_b == body
+    };
+    problem.rows_of(&problem.contact_colors()).iter().copied().filter(own).collect()
+}
+
+#[test]
+fn a_contact_stays_in_its_row_while_others_come_and_go() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    for i in 0..8 {
+        world.add(ball(2.0 * i as f32, 0.5));
+    }
+    let mut simulation = simulation(world);
+    run(&mut simulation, 10);
+    let before = rows(&mut simulation, 8);
+    for body in 1..4 {
+        simulation.world.bodies[body].position.y = 50.0;
+        run(&mut simulation, 5);
+        assert_eq!(rows(&mut simulation, 8), before, "without body {body}");
+    }
+    assert_eq!(simulation.problem().swept_contacts().count(), 5);
+}
+
+#[test]
+fn a_manifold_in_the_slot_of_one_that_ended_begins_without_its_impulses_and_preload() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let (first, second) = (world.add(ball(0.0, 0.5)), world.add(ball(5.0, 80.0)));
+    for i in 0..4 {
+        world.add(ball(10.0 + 2.0 * i as f32, 0.5));
+    }
+    let mut simulation = simulation(world);
+    run(&mut simulation, 120);
+    let row = rows(&mut simulation, first as u32)[0];
+    let borne = simulation.problem().contacts[row as usize];
+    assert!(borne.preload > 0.0 && simulation.problem().impulses[borne.first_point as usize].normal > 1.0);
+    simulation.world.bodies[first].position.y = 40.0;
+    run(&mut simulation, 1);
+    assert!(rows(&mut simulation, first as u32).is_empty());
+    simulation.world.bodies[second].position.y = 0.5;
+    simulation.world.bodies[second].linear_velocity = Vec3::ZERO;
+    assert_eq!(rows(&mut simulation, second as u32), [row]);
+    let (problem, _) = simulation.next_problem(DT).expect("a step");
+    let begun = problem.contacts[row as usize];
+    let impulse = problem.impulses[begun.first_point as usize];
+    assert_eq!((begun.preload, impulse.normal, impulse.tangent_1, impulse.tangent_2), (0.0, 0.0, 0.0, 0.0));
+}
+
+/// A ball that rolls over a mesh is in contact with one triangle after another.
+#[test]
+fn slots_of_manifolds_that_ended_are_used_again() {
+    let mut world = World::new();
+    let vertices = (0..=60).flat_map(|i| [-2.0, 2.0].map(|z| Vec3::new(i as f32 * 0.25, 0.0, z))).collect();
+    let triangles = (0..60).flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 2], [2 * i + 2, 2 * i + 1, 2 * i + 3]]).collect();
+    world.add(Body::fixed().shape(Shape::mesh(vertices, triangles).expect("a mesh")));
+    world.add(ball(1.0, 0.5).velocity(Vec3::X * 5.0, Vec3::NEG_Z * 10.0));
+    // Contacts that last, so that slots are not sorted all the time.
+    for i in 0..10 {
+        world.add(Body::fixed().shape(Shape::cuboid(0.6, 0.1, 0.6)).position(2.0 * i as f32, -3.0, 8.0));
+        world.add(ball(2.0 * i as f32, -2.4).position(2.0 * i as f32, -2.4, 8.0));
+    }
+    let mut simulation = simulation(world);
+    run(&mut simulation, 120);
+    assert!(simulation.world.bodies[1].position.x > 8.0, "{}", simulation.world.bodies[1].position);
+    let problem = simulation.problem();
+    let (slots, swept) = (problem.contacts.len(), problem.swept_contacts().count());
+    assert!(slots <= swept + 4, "{slots} slots for {swept} contacts");
+}
+
+#[test]
+fn rows_of_a_world_that_begins_stand_in_the_order_of_the_sweeps() {
+    let scene = Scene::find("pyramid", &["base=6".into()]).expect("the scene");
+    let mut simulation = simulation(scene.world);
+    run(&mut simulation, 1);
+    let problem = simulation.problem();
+    let order = problem.rows_of(&problem.contact_colors());
+    assert!(order.len() > 20 && order.iter().enumerate().all(|(i, &row)| i as u32 == row), "{order:?}");
+}
