@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::world::{BodyKind, World};
+use crate::world::World;
 
 /// A world, with what a run needs to know about it.
 #[derive(Clone, Debug)]
@@ -49,7 +49,6 @@ impl Scene {
     /// Dynamic bodies whose center of mass is outside the container.
     pub fn escaped(&self, world: &World) -> usize {
         let Some((low, high)) = self.container else { return 0 };
-        let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
-        dynamic.map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
+        world.dynamic().map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()
     }
 }

@@ -1,30 +1,28 @@
 //! One rigid body: pose, velocity, mass, colliders, material.
 
-use std::ops::RangeInclusive;
+use glam::{DVec3, Quat, Vec3};
 
-use glam::{DVec3, Mat3, Quat, Vec3};
-use parry3d::mass_properties::MassProperties as ParryMass;
-
+use super::limits::{MOST_LENGTH, MOST_SPEED, is_place, is_rotation, is_within};
+use super::mass::MassProperties;
 use super::shape::{Shape, pose};
-use super::{MOST_LENGTH, MOST_SPEED, is_place};
 use crate::error::{Error, Result};
 
-/// Who decides how a body moves.
+/// How a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "lowercase"))]
 #[non_exhaustive]
 pub enum BodyKind {
     /// Never moves.
     Fixed,
-    /// Moves with the velocity it is given; contacts do not change it.
+    /// Moves with the velocity that the caller gives it; contacts do not change the velocity.
     Kinematic,
     /// Moves by forces and impulses.
     Dynamic,
 }
 
-/// What a surface does to whatever touches it.
+/// Friction and restitution of a surface.
 ///
-/// Two materials combine by one rule each: friction by the geometric mean, sqrt(a b); restitution by the larger.
+/// Two materials combine: friction by the geometric mean, sqrt(a b); restitution by the larger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Coulomb coefficient mu, 0 or more.
@@ -46,11 +44,6 @@ impl Material {
     }
 }
 
-/// Whether a quaternion is near unit length.
-fn is_rotation(q: Quat) -> bool {
-    (q.length() - 1.0).abs() <= 1e-3
-}
-
 /// A shape at a place on a body.
 #[derive(Clone, Debug)]
 pub struct Collider {
@@ -60,95 +53,6 @@ pub struct Collider {
     pub position: Vec3,
     /// Rotation in the body's frame.
     pub rotation: Quat,
-}
-
-/// Mass, centre of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassProperties {
-    /// Mass (kg).
-    pub mass: f32,
-    /// Centre of mass in the body's frame (m).
-    pub center: Vec3,
-    /// Moments of inertia about the principal axes (kg m²).
-    pub principal_inertia: Vec3,
-    /// Rotation from the principal axes to the body's frame.
-    pub principal_frame: Quat,
-}
-
-impl MassProperties {
-    /// Infinite mass: nothing moves it.
-    pub const IMMOVABLE: Self =
-        Self { mass: 0.0, center: Vec3::ZERO, principal_inertia: Vec3::ZERO, principal_frame: Quat::IDENTITY };
-
-    /// Masses that can be simulated (kg): squares of impulses and of inverse masses stay numbers in single precision.
-    pub const MASSES: RangeInclusive<f32> = 1e-15..=1e15;
-    /// Moments of inertia that can be simulated (kg m²).
-    pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
-    /// Largest ratio of two moments of a body; that of a rod is a sixth of the square of its length over its radius.
-    pub const MOST_RATIO: f32 = 1e12;
-
-    /// Refuses what a dynamic body cannot have.
-    pub(crate) fn check(&self) -> Result<()> {
-        self.check_frame()?;
-        let Self { mass, principal_inertia, .. } = *self;
-        let moments = principal_inertia.to_array();
-        if !(Self::MASSES.contains(&mass)
-            && moments.iter().all(|i| Self::MOMENTS.contains(i))
-            && principal_inertia.max_element() <= Self::MOST_RATIO * principal_inertia.min_element())
-        {
-            return Err(Error::input(format!(
-                "mass = {mass:e} kg, inertia = {moments:?} kg m²: must be 1e-15 to 1e15 kg, 1e-30 to 1e30 kg m² and moments within \
-                 1e12 of each other"
-            )));
-        }
-        Ok(())
-    }
-
-    /// Refuses what no body can have: a center that is no place, a frame that is no rotation.
-    fn check_frame(&self) -> Result<()> {
-        let Self { center, principal_frame, .. } = *self;
-        if is_place(center) && is_rotation(principal_frame) {
-            return Ok(());
-        }
-        Err(Error::input(format!(
-            "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
-        )))
-    }
-
-    /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.
-    fn from_parry(m: &ParryMass, density: f32) -> Self {
-        Self {
-            mass: m.mass() * density,
-            center: m.local_com,
-            principal_inertia: m.principal_inertia() * density,
-            principal_frame: m.principal_inertia_local_frame,
-        }
-    }
-
-    /// Inverse inertia about the centre of mass in world axes, for a body with rotation `rotation` (1/(kg m²)).
-    pub fn world_inverse_inertia(&self, rotation: Quat) -> Mat3 {
-        self.world_tensor(rotation, self.principal_inertia.map(|i| if i > 0.0 { 1.0 / i } else { 0.0 }))
-    }
-
-    /// Inertia about the centre of mass in world axes (kg m²).
-    pub fn world_inertia(&self, rotation: Quat) -> Mat3 {
-        self.world_tensor(rotation, self.principal_inertia)
-    }
-
-    fn world_tensor(&self, rotation: Quat, principal: Vec3) -> Mat3 {
-        // Turning an isotropic tensor only adds rounding.
-        if principal.x == principal.y && principal.y == principal.z {
-            return Mat3::from_diagonal(principal);
-        }
-        let axes = Mat3::from_quat(rotation * self.principal_frame);
-        axes * Mat3::from_diagonal(principal) * axes.transpose()
-    }
-
-    /// Whether the moments differ, so that a free rotation changes its axis (gyroscopic term).
-    pub fn is_anisotropic(&self) -> bool {
-        let i = self.principal_inertia;
-        i.max_element() - i.min_element() > 1e-6 * i.max_element()
-    }
 }
 
 /// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
@@ -162,19 +66,19 @@ impl MassProperties {
 pub struct Body {
     /// Name for people; empty if none was given.
     pub name: String,
-    /// Who decides how it moves.
+    /// How it moves.
     pub kind: BodyKind,
     /// Origin of the body's frame in the world (m).
     pub position: Vec3,
     /// Rotation of the body's frame.
     pub rotation: Quat,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub linear_velocity: Vec3,
     /// Angular velocity in world axes (rad/s).
     pub angular_velocity: Vec3,
-    /// Force through the centre of mass, besides gravity, constant until changed (N).
+    /// Force through the center of mass, besides gravity, constant until changed (N).
     pub force: Vec3,
-    /// Mass, centre of mass and inertia; zero unless dynamic.
+    /// Mass, center of mass and inertia; zero unless dynamic.
     pub mass: MassProperties,
     /// Surface.
     pub material: Material,
@@ -205,12 +109,12 @@ impl Body {
         Self::new(BodyKind::Fixed)
     }
 
-    /// A body that moves with the velocity it is given.
+    /// A body that moves with the velocity that the caller gives it.
     pub fn kinematic() -> Self {
         Self::new(BodyKind::Kinematic)
     }
 
-    /// A body that moves by forces and impulses; density 1000 kg/m³ until told otherwise.
+    /// A body that moves by forces and impulses; its density is 1000 kg/m³ unless set.
     pub fn dynamic() -> Self {
         Self::new(BodyKind::Dynamic)
     }
@@ -242,7 +146,7 @@ impl Body {
         self.density(density)
     }
 
-    /// Mass, centre and inertia as given, whatever the shapes say.
+    /// Mass, center and inertia as given, instead of those of the shapes.
     pub fn mass_properties(mut self, mass: MassProperties) -> Self {
         self.mass = mass;
         self
@@ -260,7 +164,7 @@ impl Body {
         self
     }
 
-    /// Velocity of the centre of mass (m/s) and angular velocity (rad/s).
+    /// Velocity of the center of mass (m/s) and angular velocity (rad/s).
     pub fn velocity(mut self, linear: Vec3, angular: Vec3) -> Self {
         self.linear_velocity = linear;
         self.angular_velocity = angular;
@@ -289,11 +193,11 @@ impl Body {
         if self.kind != BodyKind::Dynamic {
             return;
         }
-        let parts = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
+        let masses = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
             let own = c.shape.0.mass_properties(1.0);
             own.transform_by(&pose(c.position, c.rotation))
         });
-        self.mass = MassProperties::from_parry(&parts.sum(), self.density);
+        self.mass = MassProperties::from_parry(&masses.sum(), self.density);
     }
 
     /// Centre of mass in the world (m).
@@ -336,7 +240,7 @@ impl Body {
         (self.rotation * self.mass.principal_frame).as_dquat().inverse() * self.angular_velocity.as_dvec3()
     }
 
-    /// Refuses what no step can be made of.
+    /// Refuses a body that cannot be simulated.
     pub(crate) fn check(&self) -> Result<()> {
         self.check_motion()?;
         self.check_shapes()?;
@@ -352,7 +256,7 @@ impl Body {
             return refuse(format!("rotation = {}: must have unit length", self.rotation));
         }
         for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
-            if !v.abs().cmple(Vec3::splat(MOST_SPEED)).all() {
+            if !is_within(v, MOST_SPEED) {
                 return refuse(format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size"));
             }
         }
@@ -382,7 +286,7 @@ impl Body {
         Ok(())
     }
 
-    /// Refuses a mass or a material that no step can be made of.
+    /// Refuses a mass or a material that cannot be simulated.
     pub(super) fn check_surface(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::input(what));
         let Material { friction, restitution } = self.material;

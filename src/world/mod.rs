@@ -1,12 +1,16 @@
-//! Bodies, shapes and materials: what a scene is made of. SI units, right-handed, Y up in the catalogue.
+//! Bodies, shapes, joints and materials. SI units, right-handed, Y up in the catalogue.
 
 mod body;
 mod joint;
+mod limits;
+mod mass;
 mod shape;
 mod surface;
 
-pub use body::{Body, BodyKind, Collider, MassProperties, Material};
+pub use body::{Body, BodyKind, Collider, Material};
 pub use joint::BallJoint;
+pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
+pub use mass::MassProperties;
 pub use shape::Shape;
 pub(crate) use shape::pose;
 pub use surface::Triangles;
@@ -16,27 +20,16 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::error::{Error, Result};
-
-/// Largest coordinate and size (m): its cube is still a number in single precision.
-pub const MOST_LENGTH: f32 = 1e9;
-/// Fastest that a body may begin with (m/s), (rad/s).
-pub const MOST_SPEED: f32 = 1e9;
-/// Largest acceleration of gravity along an axis (m/s²).
-pub const MOST_GRAVITY: f32 = 1e9;
-
-/// Whether a point has coordinates that are numbers and not too large.
-fn is_place(point: Vec3) -> bool {
-    point.abs().cmple(Vec3::splat(MOST_LENGTH)).all()
-}
+use limits::{is_place, is_within};
 
 /// A set of rigid bodies under one gravity.
 #[derive(Clone, Debug)]
 pub struct World {
     /// Acceleration of every dynamic body (m/s²).
     pub gravity: Vec3,
-    /// The bodies; a body's index here is its name everywhere else.
+    /// The bodies. Everything else names a body by its index here.
     pub bodies: Vec<Body>,
-    /// Ball joints between them.
+    /// The ball joints.
     pub joints: Vec<BallJoint>,
     /// First body of each world that was set [beside](World::beside) the first; empty for one world.
     pub begins: Vec<usize>,
@@ -63,7 +56,7 @@ impl World {
     /// Adds a joint and returns its index.
     ///
     /// # Panics
-    /// A body that it names is not there yet.
+    /// The joint names a body that the world does not have yet.
     pub fn join(&mut self, joint: BallJoint) -> usize {
         let bodies = self.bodies.len();
         assert!(
@@ -74,8 +67,8 @@ impl World {
         self.joints.len() - 1
     }
 
-    /// Sets another world beside this one: its bodies and joints follow those that are here, and its bodies never meet them,
-    /// wherever they are. What is added later belongs to the last world.
+    /// Sets another world beside this one: its bodies and joints follow those of this world, and bodies of different worlds never
+    /// meet, wherever they are. A body that is added later belongs to the last world.
     ///
     /// # Errors
     /// The gravity of the two is not the same.
@@ -114,9 +107,9 @@ impl World {
         self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
     }
 
-    /// Refuses what no step can be made of: numbers that are not finite or out of range, shapes without extent, dynamic bodies
-    /// without mass or with one out of [`MassProperties::MASSES`], moving bodies with shapes that only fixed ones can have, joints to
-    /// bodies that are not there.
+    /// Refuses a world that cannot be simulated: numbers that are not finite or out of range, shapes without extent, dynamic bodies
+    /// without mass or with a mass out of [`MassProperties::MASSES`], moving bodies with shapes that only fixed bodies can have,
+    /// joints to bodies that do not exist.
     ///
     /// # Errors
     /// One line that names the body and its shape, or the joint.
@@ -134,14 +127,14 @@ impl World {
 
     /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
     pub(crate) fn check_gravity(&self) -> Result<()> {
-        if self.gravity.abs().cmple(Vec3::splat(MOST_GRAVITY)).all() {
+        if is_within(self.gravity, MOST_GRAVITY) {
             return Ok(());
         }
         let gravity = self.gravity;
         Err(Error::input(format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis")))
     }
 
-    /// Refuses masses and materials that no step can be made of.
+    /// Refuses masses and materials that cannot be simulated.
     pub(crate) fn check_surfaces(&self) -> Result<()> {
         self.check_bodies(Body::check_surface)
     }
@@ -153,7 +146,7 @@ impl World {
         Ok(())
     }
 
-    /// Refuses joints to bodies that are not there, and anchors that are no points.
+    /// Refuses joints to bodies that do not exist, and anchors out of range.
     pub(crate) fn check_joints(&self) -> Result<()> {
         for (i, joint) in self.joints.iter().enumerate() {
             let bodies = self.bodies.len();
@@ -170,12 +163,17 @@ impl World {
         Ok(())
     }
 
-    /// Number of dynamic bodies.
-    pub fn dynamic_count(&self) -> usize {
-        self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic).count()
+    /// The dynamic bodies.
+    pub fn dynamic(&self) -> impl Iterator<Item = &Body> {
+        self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic)
     }
 
-    /// The first body whose pose or velocity is not finite: trouble in the numbers, as data.
+    /// Number of dynamic bodies.
+    pub fn dynamic_count(&self) -> usize {
+        self.dynamic().count()
+    }
+
+    /// The first body whose pose or velocity is not finite.
     pub fn first_non_finite(&self) -> Option<usize> {
         self.bodies.iter().position(|b| !b.is_finite())
     }
@@ -187,19 +185,18 @@ impl World {
 
     /// Sum of the potential energies of the dynamic bodies (J), zero at the origin, in f64.
     pub fn potential_energy(&self) -> f64 {
-        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
-        dynamic.map(|b| -f64::from(b.mass.mass) * self.gravity.as_dvec3().dot(b.center_of_mass().as_dvec3())).sum()
+        self.dynamic()
+            .map(|b| -f64::from(b.mass.mass) * self.gravity.as_dvec3().dot(b.center_of_mass().as_dvec3()))
+            .sum()
     }
 
     /// Linear momentum of the dynamic bodies (kg m/s), in f64.
     pub fn linear_momentum(&self) -> glam::DVec3 {
-        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
-        dynamic.map(|b| f64::from(b.mass.mass) * b.linear_velocity.as_dvec3()).sum()
+        self.dynamic().map(|b| f64::from(b.mass.mass) * b.linear_velocity.as_dvec3()).sum()
     }
 
     /// Angular momentum of the dynamic bodies about the origin (kg m²/s), in f64.
     pub fn angular_momentum(&self) -> glam::DVec3 {
-        let dynamic = self.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
-        dynamic.map(Body::angular_momentum).sum()
+        self.dynamic().map(Body::angular_momentum).sum()
     }
 }

@@ -1,4 +1,4 @@
-//! The shapes a body can carry: parry's, thinly named.
+//! The shapes of bodies, made by parry.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::{HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
-use super::{MOST_LENGTH, is_place};
+use super::limits::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result};
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
@@ -112,7 +112,7 @@ impl Shape {
         Ok(Self(SharedShape::heightfield_with_flags(data, scale, HeightFieldFlags::FIX_INTERNAL_EDGES)))
     }
 
-    /// Refuses a shape without extent, one larger than [`MOST_LENGTH`], or one whose numbers are none.
+    /// Refuses a shape without extent, or with a number that is not finite or larger than [`MOST_LENGTH`].
     ///
     /// # Errors
     /// One line that names the shape, the number and its range.
@@ -140,12 +140,10 @@ impl Shape {
             }
             _ => {
                 let extents = self.0.compute_local_aabb();
-                match is_place(extents.mins) && is_place(extents.maxs) {
-                    true => Ok(()),
-                    false => {
-                        Err(Error::input(format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size")))
-                    }
+                if is_place(extents.mins) && is_place(extents.maxs) {
+                    return Ok(());
                 }
+                Err(Error::input(format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size")))
             }
         }
     }
@@ -170,7 +168,7 @@ impl Shape {
         self.0.as_cuboid().map(|c| c.half_extents)
     }
 
-    /// Every number that makes the shape, as text.
+    /// Every number of the shape, as text.
     pub(crate) fn geometry(&self) -> String {
         format!("{:?}", self.0.as_typed_shape())
     }
@@ -181,7 +179,7 @@ impl Shape {
         sphere.center().length() + sphere.radius()
     }
 
-    /// parry's shape, for those who hand it to another engine.
+    /// parry's shape, for use with another engine.
     pub fn parry(&self) -> &SharedShape {
         &self.0
     }

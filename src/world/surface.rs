@@ -1,11 +1,11 @@
-//! The surface of a shape as triangles, and where a ray meets it: for pictures and for pointing at things.
+//! The surface of a shape as triangles, and its intersection with a ray: for pictures and for picking bodies.
 
 use glam::{Quat, Vec3};
 use parry3d::query::Ray;
 use parry3d::shape::TypedShape;
 
+use super::body::{Body, Collider};
 use super::shape::{Shape, pose};
-use super::{Body, Collider};
 
 /// Vertices (m) and triangles, counter-clockwise seen from outside.
 pub type Triangles = (Vec<Vec3>, Vec<[u32; 3]>);

@@ -1,0 +1,25 @@
+//! Ranges of the numbers of a world.
+
+use glam::{Quat, Vec3};
+
+/// Largest coordinate and size (m): its cube is still a number in single precision.
+pub const MOST_LENGTH: f32 = 1e9;
+/// Largest speed at the start (m/s), (rad/s).
+pub const MOST_SPEED: f32 = 1e9;
+/// Largest acceleration of gravity along an axis (m/s²).
+pub const MOST_GRAVITY: f32 = 1e9;
+
+/// Whether every coordinate of a point is a number of at most [`MOST_LENGTH`].
+pub(super) fn is_place(point: Vec3) -> bool {
+    is_within(point, MOST_LENGTH)
+}
+
+/// Whether every component is a number of at most `most` in size.
+pub(super) fn is_within(x: Vec3, most: f32) -> bool {
+    x.abs().cmple(Vec3::splat(most)).all()
+}
+
+/// Whether a quaternion is near unit length.
+pub(super) fn is_rotation(q: Quat) -> bool {
+    (q.length() - 1.0).abs() <= 1e-3
+}
