@@ -135,8 +135,8 @@ impl RenderArgs {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
         let (width, height) = self.size;
         let mut page = format!(
-            "# Every scene of the catalogue\n\nMade by `drystone render --gallery {} --size {width}x{height}`: each scene a \
-             third of the way through its run.\n",
+            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page. Each picture shows a \
+             scene after a third of its steps.\n",
             folder.display()
         );
         for entry in CATALOGUE {

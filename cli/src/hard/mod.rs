@@ -137,19 +137,19 @@ impl Case {
     pub const ALL: &'static [Self] = &[
         Self {
             name: "H1",
-            summary: "a cube under one of 10 to 1e6 times its mass",
+            summary: "a cube under a cube of 10 to 1e6 times its mass",
             long: false,
             run: stacks::light_under_heavy,
         },
         Self {
             name: "H2",
-            summary: "towers of 20 and 40 that lean to and fro by 1 cm, 10 s",
+            summary: "towers of 20 and 40 cubes, shifted by 1 cm to either side in turn, 10 s",
             long: false,
             run: stacks::towers,
         },
         Self {
             name: "H3",
-            summary: "towers with a top of 100 and 1000 times, 1 and 1000 in turn, 10 s",
+            summary: "towers with a top 100 and 1000 times heavier, and with masses 1 and 1000 in turn, 10 s",
             long: false,
             run: stacks::heavy_tops,
         },
@@ -161,13 +161,13 @@ impl Case {
         },
         Self {
             name: "H5",
-            summary: "five storeys of cards 200 times as long as thick, 10 s",
+            summary: "a card house of five storeys, cards 200 times as long as thick, 10 s",
             long: false,
             run: stacks::cards,
         },
         Self {
             name: "H6",
-            summary: "100 links, at their end 1000 times the mass of a link, let go level",
+            summary: "a level chain of 100 links falls, with 1000 times the mass of a link at its end",
             long: false,
             run: bodies::heavy_chain,
         },
@@ -185,7 +185,7 @@ impl Case {
         },
         Self {
             name: "H9",
-            summary: "balls on an edge, on a corner, in the same place: no direction to push",
+            summary: "balls on an edge, on a corner, in the same place: contacts without a defined normal",
             long: false,
             run: bodies::no_direction,
         },
@@ -197,13 +197,13 @@ impl Case {
         },
         Self {
             name: "H11",
-            summary: "next to no inertia, hair-thin rods, pairs that nothing can move",
+            summary: "tiny inertia, hair-thin rods, pairs of immovable bodies",
             long: false,
             run: bodies::no_inertia,
         },
         Self {
             name: "H12",
-            summary: "10 and 100 km from the origin; input that is no number",
+            summary: "10 and 100 km from the origin; input that is not finite",
             long: false,
             run: inputs::far_and_bad,
         },
@@ -241,7 +241,7 @@ impl Case {
         },
         Self {
             name: "release",
-            summary: "a load of 100 times is taken off two balls: they stay",
+            summary: "a load of 100 times the mass of a ball is removed from two balls: they stay in place",
             long: false,
             run: bodies::release,
         },

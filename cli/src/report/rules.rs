@@ -108,7 +108,7 @@ fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()>
     let page = &mut report.page;
     let _ = writeln!(
         page,
-        "\n## Clamping\n\n`misaligned`, {SHEET}; a box is out of its place half a box from where it began; 20 s at most.\n\n\
+        "\n## Clamping\n\nThe scene `misaligned` runs for at most 20 s with the settings {SHEET}. A stack stands until a box is half a box away from its first position.\n\n\
          | boxes | clamping | stands | drift | rms speed |\n|---|---|---|---|---|"
     );
     for n in [5, 10, 20] {
@@ -145,8 +145,8 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
     let mut lines = Vec::new();
     let _ = writeln!(
         report.page,
-        "\n## Stabilization\n\n`tower` of 10 boxes for 20 s, 16 sweeps a step: without a bias and with Baumgarte's in one step, soft in 8 substeps of 1 + 1. *Energy added*: most that kinetic and potential energy ever rose \
-         above their lowest value before. *Exit speed*: of a box that begins 5 cm deep in the floor.\n\n\
+        "\n## Stabilization\n\nThe scene `tower` with 10 boxes runs for 20 s with 16 sweeps a step: `none` and `baumgarte` in one substep, `soft` in 8 substeps of 1 + 1 sweeps. *Energy added* is the largest rise of \
+         kinetic and potential energy above an earlier minimum. *Exit speed* is the speed of a box that starts 5 cm deep in the floor.\n\n\
          | stabilization | deepest after 1 s | after 20 s | energy added | rms speed at rest | exit speed |\n|---|---|---|---|---|---|"
     );
     for (rule, text) in STABILIZATIONS {
@@ -175,9 +175,9 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
         after_run();
     }
     report.page.push_str(
-        "\nWithout a bias, what the first sweeps leave over stays for good. Baumgarte's takes it away and shakes the tower with what \
-         it puts in. The soft contact sinks by the amount that its stiffness says, comes up again as the load \
-         is taken for lasting (`preload_rate`; the energy added is that of lifting the tower by what it had sunk), and rests.\n",
+        "\nWithout stabilization the overlap that the first sweeps leave stays forever. Baumgarte stabilization removes the overlap, and the energy that \
+         it adds shakes the tower. The soft contact first overlaps by the amount that its stiffness gives. The preload (`preload_rate`) then removes \
+         the overlap, and the tower comes to rest; the energy added is the energy that lifts the tower by the overlap.\n",
     );
     let axes = Axes { title: "Deepest overlap in a tower of 10 boxes", x: "time s", y: "overlap mm", log_y: true };
     report.picture("stabilization.svg", svg(&axes, &lines));
@@ -215,8 +215,8 @@ fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
 fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Friction\n\nA block pushed at 4 m/s at an angle to its edges, mu 0.4: distance until it rests, against v²/(2 mu g) = {:.3} m; the axes \
-         of the box rule are those of the contact's tangents. *Creep*: what lies on a slope of 20° with mu 0.5 moves in 10 s.\n\n\
+        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its distance until it rests; Coulomb's law gives v²/(2 mu g) = {:.3} m. The axes \
+         of the box rule are the tangents of the contact. *Creep* is the distance that a block at rest on a slope of 20° with mu 0.5 moves in 10 s.\n\n\
          | friction | 0° | 15° | 30° | 45° | largest spread | creep |\n|---|---|---|---|---|---|---|",
         16.0 / (2.0 * 0.4 * 9.81)
     );
@@ -263,8 +263,8 @@ fn creep(rule: &str) -> Result<f64> {
 fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe same block sent off at 2 m/s while it spins at 5 rad/s: under Coulomb's law both end together. (Friction acts below the centre and tips the load forward, so the path is not quite straight; friction per manifold does not see that, nor how sliding weakens the hold on the spin.)\n\n\
-         | friction | slides for | spins for | off its line |\n|---|---|---|---|"
+        "\nThe same block starts at 2 m/s and spins at 5 rad/s. Under Coulomb's law sliding and spinning end at the same time. Friction acts below the center of mass and shifts the load forward, so the path is not quite straight. Friction per manifold has neither this effect nor the effect that sliding weakens friction against the spin.\n\n\
+         | friction | slides for | spins for | distance from its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();
     let cases = [("slip", ""), ("box", ""), ("disc", ""), ("disc", "friction_at=manifold")];
@@ -297,7 +297,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
 fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n`throw`: a ball flies at a standing stack. Boxes in place just before it arrives, and at the end.\n\n\
+        "\nIn the scene `throw` a ball hits a standing stack. The table has the number of boxes in place just before the hit and at the end.\n\n\
          | friction | before | at the end |\n|---|---|---|"
     );
     let scene = Scene::find("throw", &[])?;
@@ -358,7 +358,7 @@ const MOST_BOXES: u32 = 128;
 fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Substeps\n\nThe tallest tower, boxes 1 cm off one way and the other, that stands for 20 s (searched up to {MOST_BOXES}):\n\n\
+        "\n## Substeps\n\nThe table has the number of boxes of the tallest tower that stands for 20 s, up to {MOST_BOXES}. Boxes are shifted by 1 cm to one side and to the other in turn.\n\n\
          | substeps | soft, default | Baumgarte, as many sweeps |\n|---|---|---|"
     );
     for substeps in [1_u32, 4, 8, 16] {
@@ -375,8 +375,8 @@ fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> 
 fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe heaviest top, as a multiple of the other boxes, under which a tower of 10 stands for 20 s (1, 2, 5, 10, ... 10,000 tried), and what the \
-         two goals come to:\n\n| substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n|---|---|---|---|"
+        "\nThe next table has the heaviest top, as a multiple of the other boxes, under which a tower of 10 stands for 20 s (of 1, 2, 5, 10, ... 10,000), and \
+         the overlap in two cases with a mass ratio of 1000.\n\n| substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n|---|---|---|---|"
     );
     let tried = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
     for substeps in [4_u32, 16, 32, 64] {

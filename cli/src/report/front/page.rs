@@ -81,10 +81,10 @@ fn head(html: &mut String, races: &[Vec<Row>]) {
     let _ = writeln!(
         html,
         "<p>{}. Commit {}. Threads of each engine: {}. {}.</p>\n\
-         <p>On each scene all engines step in turns, ten steps each, so that whatever slows the machine down meets all of them. Time \
-         is the median over these turns, of the {} clock; errors are of the second half of the run, by one measure for all. A point is one setting; \
-         labels are substeps × sweeps. Filled points and the line are the front: nothing of that engine is both faster and \
-         better. A setting under which something falls that should stand is not in the picture. Errors below {} µm count as that.</p>",
+         <p>On each scene all engines step in rounds, ten steps each in turn, so that a slow machine slows all of them. Time \
+         is the median over the rounds, of the {} clock. Errors are of the second half of the run, by one measure for all engines. A point is one setting with \
+         the label substeps × sweeps. Filled points and the line are the Pareto front: no other setting of that engine is better in both time and \
+         error. The picture leaves out settings with which a body falls that should stand. Errors below {} µm count as this value.</p>",
         each(|row| row.machine.clone()),
         each(|row| row.commit.clone()),
         each(|row| row.threads.to_string()),
@@ -126,9 +126,9 @@ fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> 
     let names = others.iter().map(|s| escape(s)).collect::<Vec<_>>().join(" and ");
     let _ = writeln!(
         html,
-        "<h2>At equal error</h2>\n<p>For each point on the front of {names} together: the least time of {OWN} with an error that is \
-         no larger, relative to theirs. Below 1 {OWN} is faster.</p>\n<div class=\"wide\"><table><tr><th>scene</th><th>error</th>\
-         <th>least, {OWN}</th><th>least, others</th><th>relative time, from</th><th>to</th></tr>"
+        "<h2>At equal error</h2>\n<p>For each point on the common Pareto front of {names}: the least time of {OWN} at an error that is \
+         no larger, relative to the time of the point. Below 1 {OWN} is faster.</p>\n<div class=\"wide\"><table><tr><th>scene</th><th>error</th>\
+         <th>least, {OWN}</th><th>least, others</th><th>relative time, smallest</th><th>largest</th></tr>"
     );
     for race in races {
         let theirs: Vec<_> = race.iter().filter(|row| !row.engine.starts_with(OWN)).collect();
@@ -156,8 +156,8 @@ fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> 
 
 fn profiles(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> {
     html.push_str(
-        "<h2>Performance profiles over the scenes</h2>\n<p>Share of the scenes in which an engine holds the mean overlap, or the \
-         gap in joints, within a factor of the time of the fastest to do so (Dolan and Moré 2002).</p>\n<div class=\"pictures\">",
+        "<h2>Performance profiles over the scenes</h2>\n<p>Share of the scenes in which an engine reaches the mean overlap, or the \
+         gap of joints, within a factor of the time of the fastest engine that reaches it (Dolan and Moré 2002).</p>\n<div class=\"pictures\">",
     );
     for level in LEVELS {
         let cost = |side: &String| -> Result<Vec<Option<f64>>> {
@@ -274,9 +274,9 @@ fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     }
     let _ = writeln!(
         html,
-        "<h2>Contact problems</h2>\n<p>Single steps with hard contacts, solved from zero impulses; what is left is the natural map in \
-         velocities, e_vel. Time is that of the sweeps one by one on one core, the least of three turns, which all do the same; f64, or cpu, which is f32 in \
-         lanes. Below: the share of {} problems that are solved to an error within a factor of the time of the fastest solver.</p>\n\
+        "<h2>Contact problems</h2>\n<p>The problems are single steps with hard contacts, solved from zero impulses. The error e_vel is the natural map in \
+         velocities. Time is that of the sweeps one by one on one core, the least of three equal rounds, on the f64 reference or on the CPU lanes in f32 \
+         (cpu). The curves show the share of {} problems that a solver solves to an error within a factor of the time of the fastest solver.</p>\n\
          <div class=\"pictures\">",
         solves.len()
     );
