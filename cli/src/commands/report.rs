@@ -100,9 +100,6 @@ impl SurveyArgs {
     }
 
     /// Runs drystone and whoever else takes part, and makes the page.
-    ///
-    /// # Errors
-    /// A scene that there is not, a directory that cannot be written, or an engine that gives up.
     pub fn run(&self, others: &[&Team]) -> Result<()> {
         let report = if self.draw { Report::read(&self.out)? } else { self.race(others)? };
         print(report.write(&self.out)?.display())

@@ -89,7 +89,7 @@ impl SaveProblem {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
+        let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
@@ -97,9 +97,9 @@ impl RunArgs {
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         say(why);
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
-        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
-        let mut report = RunReport::new(&scene, &simulation);
+        let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
+        let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
         let bar = progress(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
@@ -122,7 +122,7 @@ impl RunArgs {
         if let (Some(trajectory), Some(path)) = (trajectory, &self.out) {
             replacing(path, || trajectory.finish())?;
         }
-        report.measure(&scene, &mut simulation);
+        report.measure(&scene, simulation);
         if self.scene.json {
             print_json(&report)?;
         } else {

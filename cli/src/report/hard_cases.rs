@@ -44,9 +44,6 @@ pub fn count(cases: &[&Case]) -> u64 {
 }
 
 /// The page as Markdown. `progress` is called with what begins next.
-///
-/// # Errors
-/// Of the cases; no adapter.
 pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     let mut passed = [0; COLUMNS.len()];
     let mut rows = String::new();

@@ -26,9 +26,6 @@ pub struct RulesReport {
 
 impl RulesReport {
     /// Writes `rules.md` and the pictures into a directory, which is made if need be.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
         let pictures = directory.join("rules");
         std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
@@ -44,9 +41,6 @@ impl RulesReport {
 const DT: f32 = 1.0 / 60.0;
 
 /// Runs everything and makes the page; `after_run` is called as often as [`RUNS`] says.
-///
-/// # Errors
-/// Never for want of input: the scenes and settings are fixed.
 pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     let mut report = RulesReport { page: include_str!("rules_head.md").to_owned(), pictures: Vec::new() };
     clamping(&mut report, &mut after_run)?;

@@ -92,9 +92,6 @@ impl SolveReport {
     }
 
     /// Solves a problem in f64, or in f32 on a backend.
-    ///
-    /// # Errors
-    /// A contact that no kernel takes ([`Solver::new`]), or a backend that cannot run.
     pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
         let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;
         let measure = Measure::new(problem);

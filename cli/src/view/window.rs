@@ -53,14 +53,8 @@ pub trait Show {
         Vec::new()
     }
     /// Lets `seconds` of real time pass.
-    ///
-    /// # Errors
-    /// It cannot go on; the window closes.
     fn advance(&mut self, seconds: f32) -> Result<()>;
     /// A key was pressed or let go.
-    ///
-    /// # Errors
-    /// It cannot go on; the window closes.
     fn key(&mut self, key: &Key, down: bool) -> Result<()>;
     /// The left button was pressed: whether the mouse now moves something here, instead of the camera.
     fn grab(&mut self, pointer: &Pointer) -> bool;
@@ -73,9 +67,6 @@ pub trait Show {
 }
 
 /// Opens a window and shows `show` until it is closed.
-///
-/// # Errors
-/// No display, no adapter that can draw on it, or what `show` returns.
 pub fn run(show: Box<dyn Show>) -> Result<()> {
     let events = EventLoop::new().map_err(|_| no_display())?;
     events.set_control_flow(ControlFlow::Poll);

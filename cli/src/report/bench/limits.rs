@@ -60,9 +60,6 @@ impl LimitRow {
 const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
 
 /// Measures a settled pile of `boxes` with each number of `threads`, over so many `turns`.
-///
-/// # Errors
-/// The pile is none, a pool cannot be made.
 pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
     let config = SolverConfig::default().without_sleep();
     let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;

@@ -140,9 +140,6 @@ struct Course {
 
 /// Measures `specs` over `turns` turns on each of the backends that `open` makes, with each number of `threads`. `after_turn` is
 /// called after each turn of each scene, those to settle included.
-///
-/// # Errors
-/// A scene cannot be found, a pool cannot be made, a backend cannot run.
 pub fn bench(
     specs: &[String],
     config: &SolverConfig,

@@ -24,9 +24,6 @@ const OWN: &str = "drystone";
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Makes the page; each race is one scene's.
-///
-/// # Errors
-/// A race has rows of several runs.
 pub fn page(races: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     let sides = sides(races);
     // One setting is a row of a table and no line of a picture: shaders on a software adapter are far off.

@@ -106,9 +106,6 @@ pub struct Duel {
 
 impl Duel {
     /// Of two sides of one race.
-    ///
-    /// # Errors
-    /// Rows are not of one race.
     pub fn new(own: &[&Row], others: &[&Row], fault: Fault) -> Result<Self> {
         let mut duel = Self { worst: 0.0, best: f64::INFINITY, own: f64::INFINITY, others: f64::INFINITY };
         for theirs in front(others, fault) {

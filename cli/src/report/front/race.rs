@@ -94,9 +94,6 @@ impl Row {
     }
 
     /// How long it took relative to another row.
-    ///
-    /// # Errors
-    /// The other row is of another run or another scene: such times say nothing about each other.
     pub fn time_ratio(&self, other: &Self) -> Result<f64> {
         for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
             if own != others {
@@ -125,9 +122,6 @@ struct Lane {
 
 /// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called after
 /// every block of every contender, [`blocks`] times a contender.
-///
-/// # Errors
-/// A contender gave up.
 pub fn race(
     scene: &Scene,
     contenders: &mut [Box<dyn Contender + '_>],

@@ -67,9 +67,6 @@ impl SolveRow {
 }
 
 /// Solves a problem with all solvers in turns.
-///
-/// # Errors
-/// A contact that no kernel takes.
 pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>> {
     let run = Origin::now();
     let mut reports: Vec<Vec<SolveReport>> = vec![Vec::new(); SOLVERS.len()];

@@ -49,9 +49,6 @@ impl Survey<'_> {
     ///
     /// A race counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
     /// on the same machine with as many threads.
-    ///
-    /// # Errors
-    /// The folder cannot be written, holds other files of these names, or a contender gives up.
     pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&Progress)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(scenes_path(&self.out))?;
@@ -143,9 +140,6 @@ fn scenes_path(folder: &Path) -> PathBuf {
 
 impl Report {
     /// The last race of each scene that the folder has.
-    ///
-    /// # Errors
-    /// There are no rows in it, or they cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
         let (rows, solved) =
             (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
@@ -158,9 +152,6 @@ impl Report {
     }
 
     /// Writes `index.html` and `speed-against-error.svg` into the folder, and says where the page is.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let page = page::page(&self.races, &self.solves)?;
         let path = folder.join("index.html");
