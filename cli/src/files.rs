@@ -70,6 +70,13 @@ impl Drop for Draft {
     }
 }
 
+/// Rows with a line of headings, as CSV.
+pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| writer.serialize(row)).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
+    writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))
+}
+
 /// Removes all drafts, right before the process ends.
 pub fn discard_drafts() {
     drafts().drain(..).for_each(|draft| discard(&draft));

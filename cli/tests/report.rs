@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use drystone::{Error, Result, Scene, SolverConfig};
-use drystone_cli::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
+use drystone_cli::report::comparison::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
 
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
@@ -34,7 +34,7 @@ fn origin(build: &str) -> Origin {
 /// Scene and setting of every row, and the runs, in the order of the file.
 fn rows(out: &Path) -> (Vec<String>, Vec<String>) {
     let mut reader = csv::Reader::from_path(out.join("scenes.csv")).expect("rows");
-    let rows: Vec<drystone_cli::report::front::Row> =
+    let rows: Vec<drystone_cli::report::comparison::Row> =
         reader.deserialize().collect::<std::result::Result<_, _>>().unwrap();
     let mut runs: Vec<_> = rows.iter().map(|row| row.run.clone()).collect();
     runs.dedup();

@@ -7,11 +7,12 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::words;
 use super::{print, print_json, progress};
+use crate::files;
 use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
 use crate::settings;
 use drystone::backend::{Backend, BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::{Error, Result};
+use drystone::Result;
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]
@@ -79,7 +80,7 @@ impl BenchArgs {
             return print_json(&now);
         }
         if self.csv {
-            return print(csv(&now.rows)?.trim_end());
+            return print(String::from_utf8_lossy(&files::csv(&now.rows)?).trim_end());
         }
         let changes = baseline.map(|then| compare_with(&now, &then));
         print(now.machine.line())?;
@@ -124,15 +125,6 @@ impl BenchArgs {
         }
         Ok(())
     }
-}
-
-fn csv(rows: &[BenchRow]) -> Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
-    }
-    let bytes = writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 fn table(rows: &[BenchRow], changes: Option<&[Change]>) -> Table {

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::{print, progress};
 use crate::files;
-use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone, scene};
+use crate::report::comparison::{Extent, Origin, Progress, Report, Survey, Team, drystone, scene, scenes};
 use crate::report::{RUNS, convergence, problems, rules};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
@@ -101,16 +101,16 @@ impl SurveyArgs {
 
     /// Runs drystone and whoever else takes part, and makes the page.
     pub fn run(&self, others: &[&Team]) -> Result<()> {
-        let report = if self.draw { Report::read(&self.out)? } else { self.race(others)? };
+        let report = if self.draw { Report::read(&self.out)? } else { self.measure(others)? };
         print(report.write(&self.out)?.display())
     }
 
-    fn race(&self, others: &[&Team]) -> Result<Report> {
+    fn measure(&self, others: &[&Team]) -> Result<Report> {
         // Fails only if it was set before, which nothing does. This thread is one of them.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
         let extent = if self.quick { Extent::Quick } else { Extent::Full };
         let scenes = match self.scene.is_empty() {
-            true => course(extent)?,
+            true => scenes(extent)?,
             false => self.scene.iter().map(|word| scene(word)).collect::<Result<_>>()?,
         };
         let some = self.scene.is_empty() || self.problems.is_some();

@@ -11,7 +11,7 @@ use drystone::contacts::ContactProblem;
 use drystone::residuals::{Measure, Residuals};
 use drystone::solver::{Order, Solver};
 
-use super::clock::Clock;
+use super::rounds::Clock;
 
 /// Errors `e_vel` whose sweeps are reported.
 const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];

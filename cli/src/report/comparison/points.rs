@@ -30,7 +30,7 @@ const LARGE: usize = 2000;
 const LARGE_STEPS: u32 = 300;
 
 /// The scenes of the report.
-pub fn course(extent: Extent) -> Result<Vec<Scene>> {
+pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
     let named = |name: &&str| {
         let scene = scene(name)?;

@@ -1,4 +1,4 @@
-//! What takes part in a race: an engine with its settings.
+//! What takes part in a comparison: an engine with its settings.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,20 +1,20 @@
 //! `drystone report`: speed against error.
 
 mod contender;
-mod course;
+mod measure;
 mod origin;
 mod page;
 mod pareto;
 mod picture;
-mod race;
+mod points;
 mod solves;
 mod survey;
 mod table;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
-pub use course::{course, drystone, scene, substeps};
+pub use measure::{Row, blocks, measure};
 pub use origin::Origin;
-pub use race::{Row, blocks, race};
+pub use points::{drystone, scene, scenes, substeps};
 pub use solves::SolveRow;
 pub use survey::{Progress, Report, Survey};
 

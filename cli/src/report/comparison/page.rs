@@ -1,11 +1,11 @@
-//! The page: pictures and tables of races, one HTML file that needs nothing else.
+//! The page: pictures and tables of what was measured, one HTML file that needs nothing else.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::measure::Row;
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least, profile};
 use super::picture::{Frame, Series, svg};
-use super::race::Row;
 use super::solves::SolveRow;
 use drystone::Result;
 
@@ -23,25 +23,25 @@ const OWN: &str = "drystone";
 /// Errors that the profiles over the scenes are made at (m).
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
-/// Makes the page; each race is one scene's.
-pub fn page(races: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
-    let sides = sides(races);
+/// Makes the page; each element of `results` has the rows of one scene.
+pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
+    let sides = sides(results);
     // One setting is a row of a table and no line of a picture: shaders on a software adapter are far off.
-    let has_line = |side: &&String| races.iter().any(|race| of_side(race, side).len() > 1);
+    let has_line = |side: &&String| results.iter().any(|rows| of_side(rows, side).len() > 1);
     let drawn: Vec<_> = sides.iter().filter(has_line).cloned().collect();
     let main =
-        grid(&races.iter().map(|race| picture(race, &drawn, faults(race)[0], (410, 320))).collect::<Vec<_>>(), 3);
+        grid(&results.iter().map(|rows| picture(rows, &drawn, faults(rows)[0], (410, 320))).collect::<Vec<_>>(), 3);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Speed against error</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>\n{}</style></head><body>\n<h1>Speed against error</h1>\n",
         include_str!("page.css")
     );
-    head(&mut html, races);
+    head(&mut html, results);
     html.push_str(&inline(&main));
-    duels(&mut html, races, &sides)?;
-    profiles(&mut html, races, &drawn)?;
-    for race in races {
-        scene(&mut html, race, &sides, &drawn);
+    duels(&mut html, results, &sides)?;
+    profiles(&mut html, results, &drawn)?;
+    for rows in results {
+        scene(&mut html, rows, &sides, &drawn);
     }
     problems(&mut html, solves);
     html.push_str("</body></html>\n");
@@ -54,24 +54,24 @@ fn side(row: &Row) -> String {
 }
 
 /// All sides; those of [`OWN`] first.
-fn sides(races: &[Vec<Row>]) -> Vec<String> {
-    let all: BTreeSet<_> = races.iter().flatten().map(side).collect();
+fn sides(results: &[Vec<Row>]) -> Vec<String> {
+    let all: BTreeSet<_> = results.iter().flatten().map(side).collect();
     let (own, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|s| s == OWN);
     let (same, others): (Vec<_>, Vec<_>) = others.into_iter().partition(|s| s.starts_with(OWN));
     own.into_iter().chain(others).chain(same).collect()
 }
 
-fn of_side<'a>(race: &'a [Row], wanted: &str) -> Vec<&'a Row> {
-    race.iter().filter(|row| side(row) == wanted).collect()
+fn of_side<'a>(rows: &'a [Row], wanted: &str) -> Vec<&'a Row> {
+    rows.iter().filter(|row| side(row) == wanted).collect()
 }
 
-fn faults(race: &[Row]) -> &'static [Fault] {
-    race.first().map_or(&[Fault::Mean], Fault::of_scene)
+fn faults(rows: &[Row]) -> &'static [Fault] {
+    rows.first().map_or(&[Fault::Mean], Fault::of_scene)
 }
 
-fn head(html: &mut String, races: &[Vec<Row>]) {
+fn head(html: &mut String, results: &[Vec<Row>]) {
     let each = |of: fn(&Row) -> String| {
-        let all: BTreeSet<_> = races.iter().flatten().map(of).collect();
+        let all: BTreeSet<_> = results.iter().flatten().map(of).collect();
         all.into_iter().map(|text| escape(&text)).collect::<Vec<_>>().join("; ")
     };
     let day = |row: &Row| row.run.chars().take(10).collect();
@@ -92,12 +92,12 @@ fn head(html: &mut String, races: &[Vec<Row>]) {
 }
 
 /// Time against one error in one scene.
-fn picture(race: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> String {
+fn picture(rows: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> String {
     let place = |row: &Row| (row.ms, fault.of(row) * 1e3);
     let series: Vec<_> = sides
         .iter()
         .enumerate()
-        .map(|(look, name)| (look, name, of_side(race, name)))
+        .map(|(look, name)| (look, name, of_side(rows, name)))
         .filter(|(.., rows)| !rows.is_empty())
         .map(|(look, name, rows)| Series {
             name: name.clone(),
@@ -106,7 +106,7 @@ fn picture(race: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> St
             line: front(&rows, fault).into_iter().map(place).collect(),
         })
         .collect();
-    let title = race.first().map_or(String::new(), |row| row.scene.clone());
+    let title = rows.first().map_or(String::new(), |row| row.scene.clone());
     let y = format!("{} [{}]", fault.name(), fault.unit());
     svg(&Frame { title: &title, x: "time of a step [ms]", y: &y, share: false, size }, &series)
 }
@@ -115,7 +115,7 @@ fn point_label(row: &Row) -> String {
     format!("{}×{}", row.substeps, row.sweeps)
 }
 
-fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> {
+fn duels(html: &mut String, results: &[Vec<Row>], sides: &[String]) -> Result<()> {
     let others: Vec<_> = sides.iter().filter(|side| !side.starts_with(OWN)).collect();
     if others.is_empty() {
         return Ok(());
@@ -127,11 +127,11 @@ fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> 
          no larger, relative to the time of the point. Below 1 {OWN} is faster.</p>\n<div class=\"wide\"><table><tr><th>scene</th><th>error</th>\
          <th>least, {OWN}</th><th>least, others</th><th>relative time, smallest</th><th>largest</th></tr>"
     );
-    for race in races {
-        let theirs: Vec<_> = race.iter().filter(|row| !row.engine.starts_with(OWN)).collect();
-        for &fault in faults(race) {
-            let duel = Duel::new(&of_side(race, OWN), &theirs, fault)?;
-            let scene = escape(&race[0].scene);
+    for rows in results {
+        let theirs: Vec<_> = rows.iter().filter(|row| !row.engine.starts_with(OWN)).collect();
+        for &fault in faults(rows) {
+            let duel = Duel::new(&of_side(rows, OWN), &theirs, fault)?;
+            let scene = escape(&rows[0].scene);
             let [own, other] = [duel.own, duel.others]
                 .map(|error| if error.is_finite() { shown(fault, error) } else { "none holds".into() });
             let [low, high] = match duel.others.is_finite() {
@@ -151,59 +151,59 @@ fn duels(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> 
     Ok(())
 }
 
-fn profiles(html: &mut String, races: &[Vec<Row>], sides: &[String]) -> Result<()> {
+fn profiles(html: &mut String, results: &[Vec<Row>], sides: &[String]) -> Result<()> {
     html.push_str(
         "<h2>Performance profiles over the scenes</h2>\n<p>Share of the scenes in which an engine reaches the mean overlap, or the \
          gap of joints, within a factor of the time of the fastest engine that reaches it (Dolan and Moré 2002).</p>\n<div class=\"pictures\">",
     );
     for level in LEVELS {
         let cost = |side: &String| -> Result<Vec<Option<f64>>> {
-            let of = |race: &Vec<Row>| {
-                let best = fastest(&of_side(race, side), faults(race)[0], level);
-                best.map(|row| row.time_ratio(&race[0])).transpose()
+            let of = |rows: &Vec<Row>| {
+                let best = fastest(&of_side(rows, side), faults(rows)[0], level);
+                best.map(|row| row.time_ratio(&rows[0])).transpose()
             };
-            races.iter().map(of).collect()
+            results.iter().map(of).collect()
         };
         let costs = sides.iter().map(cost).collect::<Result<Vec<_>>>()?;
         let title = format!("error of at most {} mm", level * 1e3);
-        html.push_str(&inline(&profile_picture(&title, "share of scenes", races.len(), sides, &costs)));
+        html.push_str(&inline(&profile_picture(&title, "share of scenes", results.len(), sides, &costs)));
     }
     html.push_str("</div>\n");
     Ok(())
 }
 
-fn scene(html: &mut String, race: &[Row], sides: &[String], drawn: &[String]) {
-    let Some(first) = race.first() else { return };
+fn scene(html: &mut String, rows: &[Row], sides: &[String], drawn: &[String]) {
+    let Some(first) = rows.first() else { return };
     let (name, bodies, steps) = (escape(&first.scene), first.bodies, first.steps);
     let _ = writeln!(
         html,
         "<h2>{name}</h2>\n<p>{bodies} dynamic bodies, {steps} steps; hash of the scene {}, run {}.</p>\n<div class=\"pictures\">",
         first.hash, first.run
     );
-    for &fault in faults(race) {
-        html.push_str(&inline(&picture(race, drawn, fault, (590, 400))));
+    for &fault in faults(rows) {
+        html.push_str(&inline(&picture(rows, drawn, fault, (590, 400))));
     }
     html.push_str("</div>\n");
-    at_fixed_times(html, race, sides);
-    all_rows(html, race);
+    at_fixed_times(html, rows, sides);
+    all_rows(html, rows);
 }
 
 /// 1, 2, 4 and 8 ms; in scenes that take a power of ten less or more, that power of ten times as much.
-fn fixed_times(race: &[Row]) -> [f64; 4] {
-    let scale = 10_f64.powf(race.first().map_or(0.0, |row| (row.ms / 2.0).log10().round()));
+fn fixed_times(rows: &[Row]) -> [f64; 4] {
+    let scale = 10_f64.powf(rows.first().map_or(0.0, |row| (row.ms / 2.0).log10().round()));
     [1.0, 2.0, 4.0, 8.0].map(|t| t * scale)
 }
 
-fn at_fixed_times(html: &mut String, race: &[Row], sides: &[String]) {
-    let times = fixed_times(race);
+fn at_fixed_times(html: &mut String, rows: &[Row], sides: &[String]) {
+    let times = fixed_times(rows);
     let columns = times.iter().fold(String::new(), |text, t| text + &format!("<th>{} ms</th>", number(*t)));
     let _ = writeln!(
         html,
         "<h3>Least error in a given time</h3>\n<div class=\"wide\"><table><tr><th>error</th><th>engine</th>{columns}</tr>"
     );
-    for &fault in faults(race) {
+    for &fault in faults(rows) {
         for name in sides {
-            let rows = of_side(race, name);
+            let rows = of_side(rows, name);
             if rows.is_empty() {
                 continue;
             }
@@ -222,16 +222,16 @@ fn at_fixed_times(html: &mut String, race: &[Row], sides: &[String]) {
     html.push_str("</table></div>\n");
 }
 
-fn all_rows(html: &mut String, race: &[Row]) {
-    let faults = faults(race);
+fn all_rows(html: &mut String, rows: &[Row]) {
+    let faults = faults(rows);
     let columns = faults.iter().fold(String::new(), |text, f| text + &format!("<th>{} [{}]</th>", f.name(), f.unit()));
     let _ = writeln!(
         html,
         "<details><summary>All {} settings</summary>\n<div class=\"wide\"><table><tr><th>setting</th><th>ms a step</th><th>quartiles</th>\
          <th>relative time</th>{columns}<th>in place</th></tr>",
-        race.len()
+        rows.len()
     );
-    for row in race {
+    for row in rows {
         let label = escape(&row.setting().label());
         let _ = write!(
             html,

@@ -33,9 +33,7 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
     /// Adds a block of rows: to the file too, which has all of them afterwards or none.
     pub fn add(&mut self, block: Vec<R>) -> Result<()> {
         self.rows.extend(block);
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        self.rows.iter().try_for_each(|row| writer.serialize(row)).map_err(Error::input)?;
-        files::write(&self.path, &writer.into_inner().map_err(Error::input)?)
+        files::write(&self.path, &files::csv(&self.rows)?)
     }
 
     /// All rows, the oldest first.
