@@ -10,9 +10,9 @@ use super::{print, print_json, progress};
 use crate::files;
 use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
 use crate::settings;
+use drystone::Result;
 use drystone::backend::{Backend, BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::Result;
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]

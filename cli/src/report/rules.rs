@@ -13,7 +13,7 @@ use drystone::scenes::Scene;
 use drystone::world::{Body, Shape, World};
 use drystone::{Error, Result};
 
-use super::plot::{Axes, Line, svg};
+use super::plot::{Frame, Scale, Series, svg};
 use glam::{Quat, Vec3};
 
 /// The page and its pictures.
@@ -165,7 +165,7 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
             points[1199].1,
             rms * 1e3
         );
-        lines.push(Line { name: rule.into(), points });
+        lines.push((rule.to_owned(), points));
         after_run();
     }
     report.page.push_str(
@@ -173,8 +173,12 @@ fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resul
          it adds shakes the tower. The soft contact first overlaps by the amount that its stiffness gives. The preload (`preload_rate`) then removes \
          the overlap, and the tower comes to rest; the energy added is the energy that lifts the tower by the overlap.\n",
     );
-    let axes = Axes { title: "Deepest overlap in a tower of 10 boxes", x: "time s", y: "overlap mm", log_y: true };
-    report.picture("stabilization.svg", svg(&axes, &lines));
+    report.picture(
+        "stabilization.svg",
+        "Deepest overlap in a tower of 10 boxes",
+        ("overlap mm", Scale::Decades),
+        lines,
+    );
     Ok(())
 }
 
@@ -280,11 +284,10 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
         let name = if more.is_empty() { rule.to_owned() } else { format!("{rule}, per manifold") };
         let end = |t: f64| if t > 0.99 { "1 s and more".into() } else { format!("{t:.3} s") };
         let _ = writeln!(report.page, "| {name} | {} | {} | {:.1} mm |", end(slides), end(spins), aside * 1e3);
-        lines.push(Line { name, points });
+        lines.push((name, points));
         after_run();
     }
-    let axes = Axes { title: "Speed of a block that slides and spins", x: "time s", y: "speed m/s", log_y: false };
-    report.picture("spinning-block.svg", svg(&axes, &lines));
+    report.picture("spinning-block.svg", "Speed of a block that slides and spins", ("speed m/s", Scale::Linear), lines);
     Ok(())
 }
 
@@ -409,8 +412,20 @@ fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
 pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
 
 impl RulesReport {
-    fn picture(&mut self, name: &'static str, text: String) {
-        let _ = writeln!(self.page, "\n![{name}](rules/{name})");
-        self.pictures.push((name, text));
+    /// Adds a picture of lines over time, each with its name. A scale over decades leaves out what is not above 0.
+    fn picture(
+        &mut self,
+        file: &'static str,
+        title: &str,
+        (y, scale): (&str, Scale),
+        lines: Vec<(String, Vec<(f64, f64)>)>,
+    ) {
+        let _ = writeln!(self.page, "\n![{file}](rules/{file})");
+        let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {
+            line.retain(|p| scale != Scale::Decades || p.1 > 0.0);
+            Series { name, look, points: Vec::new(), line }
+        });
+        let frame = Frame { title, x: "time s", y, scales: (Scale::Linear, scale), size: (760, 420) };
+        self.pictures.push((file, svg(&frame, &series.collect::<Vec<_>>())));
     }
 }

@@ -5,7 +5,6 @@ mod measure;
 mod origin;
 mod page;
 mod pareto;
-mod picture;
 mod points;
 mod solves;
 mod survey;

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 
 use super::measure::Row;
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least, profile};
-use super::picture::{Frame, Series, svg};
 use super::solves::SolveRow;
+use crate::report::plot::Scale::{Decades, Share};
+use crate::report::plot::{Frame, Series, svg};
 use drystone::Result;
 
 /// The HTML, and the picture that stands for all of it.
@@ -108,7 +109,7 @@ fn picture(rows: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> St
         .collect();
     let title = rows.first().map_or(String::new(), |row| row.scene.clone());
     let y = format!("{} [{}]", fault.name(), fault.unit());
-    svg(&Frame { title: &title, x: "time of a step [ms]", y: &y, share: false, size }, &series)
+    svg(&Frame { title: &title, x: "time of a step [ms]", y: &y, scales: (Decades, Decades), size }, &series)
 }
 
 fn point_label(row: &Row) -> String {
@@ -337,7 +338,8 @@ fn curves(rows: &[SolveRow], solvers: &[String]) -> String {
         let points = line.iter().map(|&(ms, e)| (ms, e, String::new())).collect();
         Series { name: name.clone(), look, points, line }
     });
-    let frame = Frame { title: &rows[0].problem, x: "time [ms]", y: "e_vel", share: false, size: (400, 300) };
+    let frame =
+        Frame { title: &rows[0].problem, x: "time [ms]", y: "e_vel", scales: (Decades, Decades), size: (400, 300) };
     svg(&frame, &series.collect::<Vec<_>>())
 }
 
@@ -349,7 +351,7 @@ fn profile_picture(title: &str, y: &str, count: usize, names: &[String], costs: 
         let line = ratios.iter().enumerate().map(|(i, &ratio)| (ratio, share(i + 1))).collect();
         Series { name: name.clone(), look, points: Vec::new(), line }
     };
-    let frame = Frame { title, x: "time, relative to the fastest", y, share: true, size: (400, 280) };
+    let frame = Frame { title, x: "time, relative to the fastest", y, scales: (Decades, Share), size: (400, 280) };
     svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 
