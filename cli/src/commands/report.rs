@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{print, progress};
+use super::output::print;
+use super::progress::{PERCENT, Progress};
 use crate::files;
-use crate::report::comparison::{Extent, Origin, Progress, Report, Survey, Team, drystone, scene, scenes};
+use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
 use crate::report::{RUNS, convergence, problems, rules};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
@@ -71,14 +72,14 @@ impl ReportArgs {
         match &self.page {
             None => self.survey.run(&[]),
             Some(Page::Rules { out }) => {
-                let bar = super::progress(RUNS as u32, false);
+                let bar = Progress::steps(RUNS as u32, false);
                 let report = rules(|| bar.inc())?;
                 bar.finish();
                 report.write(out)?;
                 print(out.join("rules.md").display())
             }
             Some(Page::Convergence { out, problems }) => {
-                let bar = super::progress(0, false);
+                let bar = Progress::steps(0, false);
                 let page = convergence(problems.as_deref(), |problems| {
                     bar.set_length(problems as u64);
                     bar.inc();
@@ -118,9 +119,9 @@ impl SurveyArgs {
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();
         let adapter = adapters().into_iter().next().map(|a| a.to_string());
-        let bar = progress::Progress::new(progress::PERCENT, 1, false);
+        let bar = Progress::new(PERCENT, 1, false);
         let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
-        let report = survey.run(&Origin::here(adapter), &mut |&Progress { what, done, total }| {
+        let report = survey.run(&Origin::here(adapter), &mut |what, done, total| {
             bar.set_message(what);
             bar.set(done, total);
         })?;

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::CellAlignment;
 
-use super::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs};
-use super::{print, print_json, progress, replacing, say, step_with_contacts};
+use super::output::{plain_table, print, print_json, replacing, say};
+use super::progress::Progress;
+use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, step_with_contacts};
 use crate::files;
 use crate::report::{RunReport, Trajectory};
 use drystone::Simulation;
@@ -100,7 +101,7 @@ impl RunArgs {
         let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
         let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
-        let bar = progress(scene.steps, self.scene.json);
+        let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
                 let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
@@ -138,8 +139,7 @@ impl RunArgs {
 }
 
 fn print_table(report: &RunReport) -> Result<()> {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    let mut table = plain_table();
     for (what, value) in report.rows() {
         table.add_row([what, value]);
     }

@@ -15,7 +15,7 @@ pub use measure::{Row, blocks, measure};
 pub use origin::Origin;
 pub use points::{drystone, scene, scenes, substeps};
 pub use solves::SolveRow;
-pub use survey::{Progress, Report, Survey};
+pub use survey::{Report, Survey};
 
 #[cfg(test)]
 mod tests {

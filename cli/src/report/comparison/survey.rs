@@ -27,17 +27,6 @@ pub struct Survey<'a> {
     pub out: PathBuf,
 }
 
-/// How far a survey is.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
-    /// What is running.
-    pub what: &'a str,
-    /// How much is done, in some unit.
-    pub done: u64,
-    /// How much there is.
-    pub total: u64,
-}
-
 /// Rows of one survey, ready to be drawn.
 pub struct Report {
     results: Vec<Vec<Row>>,
@@ -45,11 +34,12 @@ pub struct Report {
 }
 
 impl Survey<'_> {
-    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each scene.
+    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each scene. `progress` is told what runs, how much is done, and how much
+    /// there is in all.
     ///
     /// A scene counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
     /// on the same machine with as many threads.
-    pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&Progress)) -> Result<Report> {
+    pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(scenes_path(&self.out))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
@@ -59,7 +49,7 @@ impl Survey<'_> {
         for scene in &self.scenes {
             let mut contenders = self.contenders(scene)?;
             let settings: Vec<_> = contenders.iter().map(|c| c.setting()).collect();
-            progress(&Progress { what: &scene.name, done: before, total });
+            progress(&scene.name, before, total);
             let rows = match finished(table.rows(), scene, origin, &settings) {
                 Some(rows) => rows,
                 None => {
@@ -68,7 +58,7 @@ impl Survey<'_> {
                     let mut after_block = || {
                         turn += 1;
                         let done = before + weight(scene) * turn / turns;
-                        progress(&Progress { what: &scene.name, done, total });
+                        progress(&scene.name, done, total);
                     };
                     let rows = measure(scene, &mut contenders, origin, &mut after_block)?;
                     table.add(rows.clone())?;
@@ -81,7 +71,7 @@ impl Survey<'_> {
         let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
         let mut all = Vec::new();
         for problem in &self.problems {
-            progress(&Progress { what: &problem.name, done: before, total });
+            progress(&problem.name, before, total);
             let rows = match solved(table.rows(), &solves::hash(problem), origin) {
                 Some(rows) => rows,
                 None => {
