@@ -1,6 +1,7 @@
 //! Pictures without a window: drawn into a texture and read back.
 
-use super::renderer::{Quality, Renderer, Shot};
+use super::pipeline::Quality;
+use super::renderer::{Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
 use drystone::world::World;
 use drystone::{Error, Result};

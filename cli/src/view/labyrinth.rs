@@ -7,7 +7,7 @@ use super::camera::{Bounds, Camera};
 use super::canvas::{Canvas, Picture};
 use super::colors::Rgba;
 use super::renderer::Shot;
-use super::window::{Pointer, Show};
+use super::show::{Pointer, Show};
 use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
 use drystone::Result;
 use drystone::backend::{BackendChoice, choose};

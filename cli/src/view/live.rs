@@ -10,7 +10,7 @@ use super::colors::{ColorBy, Rgba};
 use super::film::bounds;
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
-use super::window::{Pointer, Show};
+use super::show::{Pointer, Show};
 use drystone::Result;
 use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
