@@ -1,11 +1,13 @@
 //! `drystone report`: speed against error.
 
 mod contender;
+mod html;
 mod measure;
 mod origin;
 mod page;
 mod pareto;
 mod points;
+mod problems;
 mod solves;
 mod survey;
 mod table;
