@@ -21,13 +21,3 @@ fn restitute_contact(i: u32) {
     }
     store_pair(contact.body_a, contact.body_b, &pair);
 }
-
-@compute @workgroup_size(WORKGROUP)
-fn apply_restitution(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            restitute_contact(colors[at]);
-        }
-        storageBarrier();
-    }
-}

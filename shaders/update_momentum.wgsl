@@ -2,8 +2,7 @@
 // one is extrapolated: further each time, and not at all after a step back, or one twice as long as the shortest since momentum
 // last began. Reads lengths. Writes momentum. Double: src/kernels/momentum.rs.
 
-@compute @workgroup_size(WORKGROUP)
-fn update_momentum(@builtin(local_invocation_index) thread: u32) {
+fn update_momentum(thread: u32) {
     var own = vec2f();
     let count = (params.point_count + params.joint_count + CHUNK - 1u) / CHUNK;
     for (var i = thread; i < count; i += WORKGROUP) { own += lengths[i]; }

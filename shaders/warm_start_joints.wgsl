@@ -10,13 +10,3 @@ fn warm_start_joint(i: u32) {
     apply_impulse(&pair, anchors.r_a, anchors.r_b, joint_impulses[i].linear);
     store_pair(joint.body_a, joint.body_b, &pair);
 }
-
-@compute @workgroup_size(WORKGROUP)
-fn warm_start_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            warm_start_joint(colors[at]);
-        }
-        storageBarrier();
-    }
-}

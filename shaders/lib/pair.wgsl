@@ -1,7 +1,4 @@
-// Two bodies while one thread works on them, and the sweeps over colors. Doubles: src/kernels/pair.rs.
-
-override BIASED: bool = true;
-override MEASURED: bool = false;
+// Two bodies while one thread works on them. Doubles: src/kernels/pair.rs.
 
 struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass }
 
@@ -49,17 +46,4 @@ fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
         bodies[b].v = (*pair).b.v;
         bodies[b].w = (*pair).b.w;
     }
-}
-
-// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
-fn note_correction(impulse: f32, mass: f32) {
-    if MEASURED {
-        if larger(impulse, -impulse) > params.tolerance * mass { atomicStore(&convergence.moving, 1u); }
-    }
-}
-
-// Whether the sweeps of this substep have come to their end already.
-fn is_converged() -> bool {
-    if MEASURED { return convergence.done != 0u; }
-    return false;
 }

@@ -1,8 +1,5 @@
 // Sums over a workgroup. Double: workgroup_sum in src/kernels/momentum.rs.
 
-// Numbers that one workgroup sums.
-const CHUNK: u32 = 1024u;
-
 var<workgroup> sums: array<vec2f, WORKGROUP>;
 
 // The sum of what each thread has of its own: halves are added. Every thread of the workgroup calls it.

@@ -1,6 +1,6 @@
 //! The buffers of a device: one for each binding, grown when rows need it, and what of their content is known here.
 
-use super::shader::{BINDINGS, CARRY_BINDINGS};
+use super::bindings::Binding;
 use crate::error::{Error, Result};
 
 /// Bytes that are compared, and sent, together.
@@ -28,30 +28,30 @@ struct Slot {
 
 impl Buffers {
     pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String) -> Self {
-        let slots = (0..BINDINGS.len() + CARRY_BINDINGS.len()).map(|_| Slot::default()).collect();
+        let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
     }
 
     /// The buffer of a binding.
-    pub fn get(&self, binding: u32) -> &wgpu::Buffer {
+    pub fn get(&self, binding: Binding) -> &wgpu::Buffer {
         self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
     }
 
     /// Refuses rows that no buffer holds.
-    pub fn check(&self, binding: u32, bytes: usize) -> Result<()> {
+    pub fn check(&self, binding: Binding, bytes: usize) -> Result<()> {
         if bytes as u64 <= self.limit {
             return Ok(());
         }
-        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, name(binding));
+        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, binding.name());
         Err(Error::TooLarge(format!(
             "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
         )))
     }
 
     /// Makes room for `size` bytes; what the buffer held may be lost.
-    pub fn reserve(&mut self, binding: u32, size: usize) {
+    pub fn reserve(&mut self, binding: Binding, size: usize) {
         let size = size as u64;
         let slot = &mut self.slots[binding as usize];
         if slot.buffer.as_ref().is_some_and(|b| b.size() >= size.max(16)) {
@@ -59,7 +59,7 @@ impl Buffers {
         }
         slot.known.clear();
         slot.buffer = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name(binding)),
+            label: Some(binding.name()),
             size: size_of_buffer(size, self.limit),
             usage: wgpu::BufferUsages::UNIFORM
                 | wgpu::BufferUsages::STORAGE
@@ -71,7 +71,7 @@ impl Buffers {
     }
 
     /// Makes room for `size` bytes; the first `kept` bytes stay.
-    pub fn grow(&mut self, binding: u32, kept: usize, size: usize) {
+    pub fn grow(&mut self, binding: Binding, kept: usize, size: usize) {
         let before = self.slots[binding as usize].buffer.clone();
         self.reserve(binding, size);
         if let Some(before) = before.filter(|b| b != self.get(binding)) {
@@ -82,7 +82,7 @@ impl Buffers {
     }
 
     /// Sends rows that begin at the byte `at`.
-    pub fn write(&mut self, binding: u32, at: usize, bytes: &[u8]) {
+    pub fn write(&mut self, binding: Binding, at: usize, bytes: &[u8]) {
         self.queue.write_buffer(self.get(binding), at as u64, bytes);
         self.sent += bytes.len() as u64;
     }
@@ -93,7 +93,7 @@ impl Buffers {
     }
 
     /// Sends all rows of a binding.
-    pub fn send(&mut self, binding: u32, bytes: &[u8]) {
+    pub fn send(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
         if !bytes.is_empty() {
             self.write(binding, 0, bytes);
@@ -101,7 +101,7 @@ impl Buffers {
     }
 
     /// Sends those rows of a binding that the device does not have yet.
-    pub fn update(&mut self, binding: u32, bytes: &[u8]) {
+    pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
         let mut known = std::mem::take(&mut self.slots[binding as usize].known);
         let same = |at: usize| {
@@ -128,7 +128,7 @@ impl Buffers {
     }
 
     /// Notes what a buffer holds: nothing that is known, if `bytes` are none.
-    pub fn note(&mut self, binding: u32, bytes: &[u8]) {
+    pub fn note(&mut self, binding: Binding, bytes: &[u8]) {
         let known = &mut self.slots[binding as usize].known;
         known.clear();
         known.extend_from_slice(bytes);
@@ -139,11 +139,6 @@ impl Buffers {
 /// most the limit; below that it is half as much again as is wanted, so that a growing pile does not mean a new buffer every step.
 pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
     (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)
-}
-
-fn name(binding: u32) -> &'static str {
-    let binding = binding as usize;
-    BINDINGS.get(binding).copied().unwrap_or_else(|| CARRY_BINDINGS[binding - BINDINGS.len()])
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! From the buffers of a device to memory, through one buffer that both can reach.
 
+use super::bindings::Binding;
 use super::buffers::{Buffers, size_of_buffer};
 
 /// A buffer that the device writes and the processor reads.
@@ -25,7 +26,7 @@ impl ReadBack {
         &mut self,
         mut encoder: wgpu::CommandEncoder,
         buffers: &Buffers,
-        wanted: &mut [(u32, &mut [u8])],
+        wanted: &mut [(Binding, &mut [u8])],
         more: Option<(&wgpu::Buffer, u64)>,
     ) -> Result<Vec<u64>, Lost> {
         let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
