@@ -1,4 +1,4 @@
-// apply_restitution: one thread makes the points of one manifold bounce that were hit fast enough.
+// apply_restitution: one thread lets the points of one manifold bounce that approached faster than the threshold.
 // Reads contacts, points, masses. Writes impulses, and bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.

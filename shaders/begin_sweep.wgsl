@@ -1,8 +1,8 @@
-// begin_sweep: one thread decides whether the sweep that follows is still needed, and counts.
+// begin_sweep: one thread decides whether the next sweep is still needed, and counts sweeps.
 // Reads and writes convergence. Double: src/backend/cpu/mod.rs.
 
 fn begin_sweep(first: bool) {
-    // The first sweep of a substep is always needed; a later one if the sweep before it moved something.
+    // The first sweep of a substep is always needed; a later one only if the sweep before it moved an impulse by more than the tolerance.
     let done = !first && (convergence.done != 0u || atomicLoad(&convergence.moving) == 0u);
     convergence.done = select(0u, 1u, done);
     convergence.sweeps += select(1u, 0u, done);

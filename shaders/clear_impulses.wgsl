@@ -1,4 +1,4 @@
-// clear_impulses: one thread forgets the impulses of one manifold, where every correction is clamped by itself.
+// clear_impulses: one thread sets the impulses of one manifold to zero, for plans that clamp each correction by itself.
 // Reads contacts. Writes impulses; one thread a manifold. Double: src/kernels/contact.rs.
 
 fn clear_contact(i: u32) {

@@ -1,6 +1,6 @@
-// extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction in which the last sweeps moved
-// it; before the first it only remembers where it is. Joints stand after the points in impulse_steps.
-// Reads momentum, or begins it. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
+// extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction of the last sweeps. Before the first
+// sweep the kernel only notes them. In impulse_steps joints follow the points.
+// Reads momentum, or sets it before the first sweep. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
 // Double: src/kernels/momentum.rs.
 
 fn extrapolated(is_first: bool, now: vec3f, before: vec3f) -> vec3f {
@@ -8,7 +8,7 @@ fn extrapolated(is_first: bool, now: vec3f, before: vec3f) -> vec3f {
     return now + (now - before) * momentum.factor;
 }
 
-// Goes on with an impulse, and remembers where it was and where it begins.
+// Extrapolates an impulse, and notes the impulse before and after.
 fn extrapolated_impulse(is_first: bool, i: u32, now: vec3f) -> vec3f {
     let begin = extrapolated(is_first, now, impulse_steps[i].before);
     impulse_steps[i] = Step(now, begin);

@@ -27,8 +27,7 @@ fn newton_step(inertia: Inertia, h: f32, spin: vec3f, next: vec3f) -> vec3f {
 // Square of the angle [rad] up to which two Newton steps leave no more than rounding.
 const SLOW: f32 = 0.0625;
 
-// What integrate_gyroscopic adds to the angular velocity w of a body whose spin about its principal axes x, y, z is fast: its
-// square is (h W)^2.
+// The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
 fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
     var h = params.substep;
     if square > 1.0 { h = params.substep * inverse_sqrt(square); }
@@ -59,7 +58,7 @@ fn turn_spin(i: u32) {
     let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
     let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-    // The free spin: impulses come after.
+    // The free spin: impulses come later.
     let w = free[inertia.body].w;
     let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
 

@@ -1,5 +1,5 @@
-// integrate_velocities: one thread adds gravity and force to the velocity of one body, and what the impulses of the substep
-// before did to it, if they are to be carried over: the difference of its velocities from the free ones.
+// integrate_velocities: one thread adds gravity and force to the velocity of one body. With `carry` it also adds the change of
+// velocity that the impulses of the substep before caused: the difference of the velocities from the free ones.
 // Reads masses. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
 
 fn integrate_velocity(carry: bool, i: u32) {

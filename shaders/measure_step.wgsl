@@ -1,5 +1,5 @@
-// measure_step: one workgroup adds up how far a sweep moved the impulses of CHUNK points or joints: squared, and along the way
-// from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair.
+// measure_step: one workgroup adds up the step of a sweep over the impulses of CHUNK points or joints: its square, and its product
+// with the way from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair of sums.
 // Double: src/kernels/momentum.rs.
 
 fn step_length(i: u32) -> vec2f {

@@ -1,4 +1,4 @@
-// warm_start: one thread applies the impulses that one manifold already carries.
+// warm_start: one thread applies the impulses that one manifold carries from the step before.
 // Reads contacts, points, impulses, masses. Writes bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.

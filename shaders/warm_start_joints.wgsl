@@ -1,4 +1,4 @@
-// warm_start_joints: one thread applies the impulse that one joint already carries.
+// warm_start_joints: one thread applies the impulse that one joint carries from the step before.
 // Reads joints, joint_impulses, masses. Writes bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/joint.rs.

@@ -7,14 +7,14 @@ fn normal_movement(rules: Rules, pair: ptr<function, Pair>, contact: Contact) ->
     let turn_a = turned(conjugate((*pair).a.dq), contact.normal);
     let turn_b = turned(conjugate((*pair).b.dq), contact.normal);
     var shift = dot3((*pair).b.dp - (*pair).a.dp, contact.normal);
-    // A round surface turns under its contact: what is carried along is the centre of its curvature.
+    // A round surface turns under its contact: the contact moves with the center of curvature.
     if rules.round {
         shift = shift + contact.radius_a * dot3(turn_a, contact.normal) + contact.radius_b * dot3(turn_b, contact.normal);
     }
     return NormalMovement(shift, turn_a, turn_b);
 }
 
-// What the contact answers to: the separation when the step began, less the preload, and what the bodies moved since.
+// The separation that the solver uses: the separation at the begin of the step, less the preload, plus the movement since.
 fn current_separation(movement: NormalMovement, contact: Contact, point: Point) -> f32 {
     return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }

@@ -5,7 +5,7 @@ fn note_correction(measured: bool, impulse: f32, mass: f32) {
     if measured && larger(impulse, -impulse) > params.tolerance * mass { atomicStore(&convergence.moving, 1u); }
 }
 
-// Whether the sweeps of this substep have come to their end already.
+// Whether the sweeps of this substep are over.
 fn is_converged(measured: bool) -> bool {
     return measured && convergence.done != 0u;
 }

@@ -25,7 +25,7 @@ fn relative_velocity(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f
     return ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));
 }
 
-// How far b at r_b moved relative to a at r_a since the step began.
+// Movement of b at r_b relative to a at r_a since the step began.
 fn relative_movement(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
     let moved_b = (*pair).b.dp + turned((*pair).b.dq, r_b);
     let moved_a = (*pair).a.dp + turned((*pair).a.dq, r_a);

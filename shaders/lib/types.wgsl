@@ -48,8 +48,8 @@ struct Params {
     tolerance: f32, joint_count: u32, patches: u32,
 }
 
-// The colors that one dispatch sweeps, one after another. `colors` holds where each begins, and where the last ends, in itself; and there
-// the rows of the contacts, or joints, that are in it.
+// The colors that one dispatch sweeps, one after another. The buffer `colors` holds where each color begins, then where the last one
+// ends, then the rows of the contacts or joints of the colors.
 struct PassColors { first: u32, end: u32 }
 
 struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, warm_start: u32 }

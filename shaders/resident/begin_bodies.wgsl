@@ -1,4 +1,4 @@
-// begin_bodies: one thread lets one body begin a step: it has not moved yet.
+// begin_bodies: one thread sets the movement of one body since the begin of the step to zero.
 // Writes bodies; no other thread writes the same one. Its double is BodyRow::AT_REST.
 
 fn begin_body(i: u32) {

@@ -1,11 +1,11 @@
-// begin_contacts: one thread lets one manifold begin a step: how far its points are apart now, and its preload, which follows
-// from the impulses that it carries. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
+// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the
+// impulses of the step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
 // Doubles: Writer::write_slot in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
 
 fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
     let sag = pressed * compliance * reciprocal(mass);
-    // What is borne no more is not held up either.
+    // A contact that bears less has less preload at once.
     return smaller(before + resident.preload.share * (sag - before), 2.0 * sag);
 }
 

@@ -1,4 +1,5 @@
-// write_contacts: one thread writes the rows of one manifold again, and brings its impulses to the points and tangents that it has now.
+// write_contacts: one thread writes the rows of one manifold that the host computed anew, and moves its impulses to the new points
+// and tangents.
 // Reads written, written_contacts, written_points. Writes contacts, points, impulses; one thread a manifold.
 // Doubles: Writer::bring_impulses and retangented in src/problem/contacts.rs.
 

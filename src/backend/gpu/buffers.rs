@@ -1,9 +1,9 @@
-//! The buffers of a device: one for each binding, grown when rows need it, and what of their content is known here.
+//! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
 
 use super::bindings::Binding;
 use crate::error::{Error, Result};
 
-/// Bytes that are compared, and sent, together.
+/// Bytes that are compared and sent together.
 const BLOCK: usize = 1024;
 
 /// The buffers of a device.
@@ -14,7 +14,7 @@ pub(super) struct Buffers {
     /// Largest buffer that a kernel can be given (B).
     limit: u64,
     slots: Vec<Slot>,
-    /// Grows whenever a binding has another buffer, so that bind groups are no longer valid.
+    /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
     pub generation: u64,
     sent: u64,
 }
@@ -22,7 +22,7 @@ pub(super) struct Buffers {
 #[derive(Default)]
 struct Slot {
     buffer: Option<wgpu::Buffer>,
-    /// What the buffer begins with, as far as that is known.
+    /// The first bytes of the buffer, as far as the host knows them.
     known: Vec<u8>,
 }
 
@@ -50,7 +50,7 @@ impl Buffers {
         )))
     }
 
-    /// Makes room for `size` bytes; what the buffer held may be lost.
+    /// Makes room for `size` bytes; the content may be lost.
     pub fn reserve(&mut self, binding: Binding, size: usize) {
         let size = size as u64;
         let slot = &mut self.slots[binding as usize];
@@ -100,7 +100,7 @@ impl Buffers {
         }
     }
 
-    /// Sends those rows of a binding that the device does not have yet.
+    /// Sends the rows of a binding that the device does not have yet.
     pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
         let mut known = std::mem::take(&mut self.slots[binding as usize].known);
@@ -127,7 +127,7 @@ impl Buffers {
         self.slots[binding as usize].known = known;
     }
 
-    /// Notes what a buffer holds: nothing that is known, if `bytes` are none.
+    /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.
     pub fn note(&mut self, binding: Binding, bytes: &[u8]) {
         let known = &mut self.slots[binding as usize].known;
         known.clear();
@@ -136,7 +136,7 @@ impl Buffers {
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at
-/// most the limit; below that it is half as much again as is wanted, so that a growing pile does not mean a new buffer every step.
+/// most the limit. Below the limit it is 1.5 times the wanted size, so that a growing pile does not need a new buffer every step.
 pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
     (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)
 }
@@ -165,7 +165,7 @@ mod tests {
     fn a_buffer_has_room_to_grow_by_half_up_to_the_limit() {
         assert_eq!(size_of_buffer(1 << 20, 1 << 31), 3 << 19);
         assert_eq!(size_of_buffer(3_000_000, 4_000_000), 4_000_000);
-        // Bindings of nothing are bound too.
+        // A buffer without rows is bound too.
         assert!(size_of_buffer(0, 1 << 20) >= 16);
     }
 }

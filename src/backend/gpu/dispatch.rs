@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use super::pipelines::Pipelines;
+use super::timer::Timer;
 use super::wgsl::{Program, WORKGROUP};
 use crate::kernels::momentum::CHUNK;
 use crate::plan::{Kernel, Pass};
@@ -55,5 +57,31 @@ fn threads(problem: &StepProblem, pass: &Pass) -> usize {
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
+    }
+}
+
+/// Encodes dispatches as one compute pass.
+pub(super) fn encode(
+    encoder: &mut wgpu::CommandEncoder,
+    dispatches: &[Dispatch],
+    pipelines: &Pipelines,
+    mut timer: Option<&mut Timer>,
+) {
+    let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    timer.iter_mut().for_each(|timer| timer.begin());
+    for run in dispatches.chunk_by(|a, b| a.program == b.program) {
+        if let Some(timer) = &mut timer {
+            timer.before(&mut compute, &run[0].program);
+        }
+        let compiled = pipelines.get(&run[0].program);
+        compute.set_pipeline(&compiled.pipeline);
+        for dispatch in run {
+            let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };
+            compute.set_bind_group(0, &compiled.bind_group, offsets);
+            compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
+        }
+    }
+    if let Some(timer) = timer {
+        timer.end(&mut compute);
     }
 }

@@ -1,7 +1,7 @@
 //! The GPU backend: the passes of a plan as dispatches of one compute pass in one submission.
 //!
-//! Stays inside the limits that every WebGPU implementation offers (at most 8 storage buffers a kernel, 64 threads a
-//! workgroup, no optional features), except for the size of buffers, which are asked for as large as the adapter has them.
+//! The programs stay inside the limits that every WebGPU implementation offers: at most 8 storage buffers a program, 64 threads a
+//! workgroup, no optional features. Only buffers may be as large as the adapter allows.
 //!
 //! [`Backend::run`] sends all rows of a problem and reads back all rows that the plan changes. [`Backend::step`] goes on from the
 //! rows that the step before left on the device (`resident.rs`): it sends the rows that changed and reads back poses and velocities.
@@ -24,7 +24,7 @@ pub(crate) mod spirv_exact;
 mod timer;
 pub(crate) mod wgsl;
 
-pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_for_surface};
+pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_device, open_for_surface};
 
 use std::sync::{Arc, Mutex};
 
@@ -41,16 +41,6 @@ use pipelines::Pipelines;
 use read_back::ReadBack;
 use resident::ResidentRows;
 use timer::Timer;
-
-/// Opens the adapter that `choice` finds, for drawing.
-///
-/// # Errors
-/// No such adapter, or it cannot be opened.
-pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
-    let (adapter, summary) = adapter::find(choice)?;
-    let (device, queue) = adapter::open(&adapter, false)?;
-    Ok((device, queue, summary))
-}
 
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
@@ -121,7 +111,7 @@ impl Gpu {
         self.exact
     }
 
-    /// Sends every row, whatever the device has.
+    /// Sends every row, also those that the device has.
     fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         self.check(problem, passes)?;
         for (binding, _) in rows::small(problem, &[]) {
@@ -134,9 +124,9 @@ impl Gpu {
         Ok(())
     }
 
-    /// Sends those of the small rows that the device does not have yet.
+    /// Sends the small rows that the device does not have yet.
     fn update_small_rows(&mut self, problem: &StepProblem) {
-        // Colors begin in the same buffer, after themselves.
+        // One buffer holds where each color begins, and then the rows of the colors.
         let shift = problem.colors.len() as u32;
         self.colors.clear();
         self.colors.extend(problem.colors.iter().map(|begin| begin + shift));
@@ -146,7 +136,7 @@ impl Gpu {
         }
     }
 
-    /// Refuses a problem that is too large, before anything of it is sent.
+    /// Refuses a problem that is too large, before any row is sent. Makes room for the buffers that stay on the device.
     fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         for (binding, bytes) in rows::small(problem, &[]).into_iter().chain(rows::of_contacts(problem)) {
             self.buffers.check(binding, bytes.len())?;
@@ -160,7 +150,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Some programs and then the passes, ready to be submitted; the passes of a small world `together`, in one dispatch.
+    /// The dispatches `first`, then the passes, ready for submission. With `together` the passes of a small world are one dispatch.
     fn encoded(
         &mut self,
         problem: &StepProblem,
@@ -169,7 +159,7 @@ impl Gpu {
         together: bool,
     ) -> Result<wgpu::CommandEncoder> {
         let mut all = first;
-        // Apart where each kernel is to be timed.
+        // The timer measures each kernel by itself.
         match one_dispatch::of(problem, passes).filter(|_| together && self.timer.is_none()) {
             Some((program, passes)) => {
                 self.buffers.update(Binding::Passes, bytemuck::cast_slice(&passes));
@@ -187,11 +177,11 @@ impl Gpu {
             self.pipelines.prepare(&dispatch.program, &self.buffers)?;
         }
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.encode(&mut encoder, &all);
+        dispatch::encode(&mut encoder, &all, &self.pipelines, self.timer.as_mut());
         Ok(encoder)
     }
 
-    /// Adds to the times of the kernels what they moved.
+    /// Adds the bytes that kernels moved to their times.
     fn count_bytes(&mut self, problem: &StepProblem, passes: &[Pass]) {
         if self.times.is_empty() {
             return;
@@ -204,27 +194,7 @@ impl Gpu {
         }
     }
 
-    fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, all: &[Dispatch]) {
-        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        self.timer.iter_mut().for_each(Timer::begin);
-        for run in all.chunk_by(|a, b| a.program == b.program) {
-            if let Some(timer) = &mut self.timer {
-                timer.before(&mut compute, &run[0].program);
-            }
-            let compiled = self.pipelines.get(&run[0].program);
-            compute.set_pipeline(&compiled.pipeline);
-            for dispatch in run {
-                let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };
-                compute.set_bind_group(0, &compiled.bind_group, offsets);
-                compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
-            }
-        }
-        if let Some(timer) = &mut self.timer {
-            timer.end(&mut compute);
-        }
-    }
-
-    /// Submits, brings the `wanted` rows back, and waits for it.
+    /// Submits, waits, and reads the `wanted` rows back.
     fn finish(&mut self, mut encoder: wgpu::CommandEncoder, wanted: &mut [(Binding, &mut [u8])]) -> Result<()> {
         let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
         let read = self.read_back.submit(encoder, &self.buffers, wanted, times);
@@ -235,33 +205,6 @@ impl Gpu {
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
         self.traffic = Traffic { up: self.buffers.take_sent(), down, ..self.traffic };
-        Ok(())
-    }
-
-    /// Runs a step whose rows stay on the device, and brings back what moved.
-    fn follow(&mut self, problem: &mut StepProblem, passes: &[Pass], carry: &Carry) -> Result<()> {
-        let first = match self.rows.take().filter(|_| carry.on_device) {
-            Some(before) => {
-                self.check(problem, passes)?;
-                self.update_small_rows(problem);
-                resident::begin(&mut self.buffers, problem, carry, before, &mut self.separations)?
-            }
-            None => {
-                self.send_all(problem, passes)?;
-                Vec::new()
-            }
-        };
-        let encoder = self.encoded(problem, first, passes, true)?;
-        self.finish(encoder, &mut rows::moved(problem))?;
-        self.count_bytes(problem, passes);
-        for (binding, bytes) in rows::moved(problem) {
-            self.buffers.note(binding, bytes);
-        }
-        // The next step begins with begin_bodies.
-        self.states.clear();
-        self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
-        self.buffers.note(Binding::Bodies, bytemuck::cast_slice(&self.states));
-        self.rows = Some(ResidentRows::of(problem));
         Ok(())
     }
 }
@@ -290,9 +233,30 @@ impl Backend for Gpu {
 
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let (problem, passes) = step.into_parts();
-        self.follow(problem, passes, carry)
+        let first = match self.rows.take().filter(|_| carry.on_device) {
+            Some(before) => {
+                self.check(problem, passes)?;
+                self.update_small_rows(problem);
+                resident::begin(&mut self.buffers, problem, carry, before, &mut self.separations)?
+            }
+            None => {
+                self.send_all(problem, passes)?;
+                Vec::new()
+            }
+        };
+        let encoder = self.encoded(problem, first, passes, true)?;
+        self.finish(encoder, &mut rows::moved(problem))?;
+        self.count_bytes(problem, passes);
+        for (binding, bytes) in rows::moved(problem) {
+            self.buffers.note(binding, bytes);
+        }
+        // The next step begins with begin_bodies.
+        self.states.clear();
+        self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
+        self.buffers.note(Binding::Bodies, bytemuck::cast_slice(&self.states));
+        self.rows = Some(ResidentRows::of(problem));
+        Ok(())
     }
-
     fn keeps_rows(&self) -> bool {
         self.rows.is_some()
     }

@@ -24,7 +24,7 @@ pub(super) struct Compiled {
     /// Bindings that it uses, in the order of their numbers.
     bindings: Vec<Binding>,
     pub bind_group: wgpu::BindGroup,
-    /// Of the buffers in the bind group.
+    /// Generation of the buffers in the bind group.
     generation: u64,
 }
 
@@ -40,12 +40,12 @@ impl Pipelines {
         Self { device, exact, compiled: HashMap::new() }
     }
 
-    /// One that was prepared.
+    /// A prepared pipeline.
     pub fn get(&self, program: &Program) -> &Compiled {
         &self.compiled[program]
     }
 
-    /// Compiles a program if it is not yet, and binds it to the buffers that there are.
+    /// Compiles a program once, and binds it to the present buffers.
     pub fn prepare(&mut self, program: &Program, buffers: &Buffers) -> Result<()> {
         if let Some(compiled) = self.compiled.get_mut(program) {
             if compiled.generation != buffers.generation {

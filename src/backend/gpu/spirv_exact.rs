@@ -2,8 +2,8 @@
 //!
 //! Plain WGSL leaves drivers free to reassociate and to fuse: software Vulkan turns `v + (x y - z w)` into
 //! `(v + x y) - z w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every
-//! arithmetic result it does not, at the same speed, and the GPU agrees with the reference to the last bit. naga writes
-//! no such decoration, so it is added to the words that naga wrote.
+//! arithmetic result it does not, at the same speed, and the GPU agrees with the reference to the last bit. naga writes no such
+//! decoration; this module adds it to the words of naga.
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};

@@ -1,7 +1,8 @@
-//! How long each program takes, by the device's own clock, where it has one that can be asked inside a pass.
+//! The time of each program by the clock of the device, where the device can write timestamps inside a pass; and the bandwidth of
+//! copies.
 //!
-//! Only when asked for: the software adapter ends what it is doing at every timestamp, and a step of a tower of ten took 2.6
-//! times as long with them.
+//! A backend has a timer only on request: the software adapter ends its work at every timestamp, and a step of a tower of ten took
+//! 2.6 times as long with them.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,7 @@ use super::wgsl::Program;
 use crate::error::{Error, Result};
 use crate::stats::KernelTime;
 
-/// What the adapter must have for it.
+/// The features of the adapter that a timer needs.
 pub(super) const FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 
@@ -64,7 +65,7 @@ impl Timer {
         pass.write_timestamp(&self.queries, self.runs.len() as u32);
     }
 
-    /// Brings the times to a buffer that can be copied from; gives it, and how many bytes of it there are.
+    /// Writes the times to a buffer that can be copied from. Returns the buffer and the number of its bytes.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) -> Option<(&wgpu::Buffer, u64)> {
         if self.runs.is_empty() {
             return None;
@@ -74,7 +75,7 @@ impl Timer {
         Some((&self.resolved, u64::from(count) * wgpu::QUERY_SIZE as u64))
     }
 
-    /// Time of each program, in the order in which they first ran, from what was read back.
+    /// Time of each program from the ticks that were read back, in the order of the first runs.
     pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
         let mut times: Vec<KernelTime> = Vec::new();
         for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)) {

@@ -29,7 +29,7 @@ macro_rules! part {
 pub enum Program {
     /// A kernel of a plan.
     Pass(Kernel),
-    /// All kernels of a plan; one workgroup of so many threads follows the passes.
+    /// All kernels of a plan. One workgroup with this number of threads follows the passes.
     OneDispatch(Arc<[Kernel]>, u32),
     /// Sets the movements of all bodies to zero.
     BeginBodies,
@@ -57,8 +57,10 @@ impl Program {
     /// Its WGSL.
     pub fn source(&self) -> String {
         match self {
-            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, |calls| calls[0].replace(COLORS, "pass_colors")),
-            Self::OneDispatch(kernels, threads) => of_plan(kernels, *threads, follow_passes),
+            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, "pass_colors", |calls| calls.concat()),
+            Self::OneDispatch(kernels, threads) => {
+                of_plan(kernels, *threads, "PassColors(step.y, step.z)", follow_passes)
+            }
             Self::BeginBodies => of_begin(part!("resident/begin_bodies"), "begin_body", "body_count"),
             Self::WriteContacts => of_begin(part!("resident/write_contacts"), "write_contact", "written_count"),
             Self::BeginContacts => of_begin(part!("resident/begin_contacts"), "begin_contact", "contact_count"),
@@ -66,20 +68,17 @@ impl Program {
     }
 }
 
-/// Stands in calls for the colors of the pass.
-const COLORS: &str = "COLORS";
-
 /// The rows that a kernel goes over.
 enum Over {
-    /// So many rows.
+    /// This number of rows.
     Count(&'static str),
     /// The rows of the colors of a pass.
     Colors,
-    /// The kernel itself finds its rows.
+    /// The rows that the kernel finds itself.
     Own,
 }
 
-/// The files of a kernel, its rows, and the call for one `row` or for all.
+/// The files of a kernel, its rows, and the call of its function: for one `row`, or for all where the kernel finds its rows.
 fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
@@ -142,9 +141,9 @@ fn is_measured(kernel: &Kernel) -> bool {
     matches!(kernel, Kernel::Extrapolate { measured: true, .. }) || kernel.rules().is_some_and(|rules| rules.measured)
 }
 
-/// The WGSL of some kernels, whose calls `main` puts together.
-fn of_plan(kernels: &[Kernel], threads: u32, main: impl Fn(&[String]) -> String) -> String {
-    // A stage may have eight storage buffers; where no kernel is measured, none reads or writes `convergence`.
+/// The WGSL of some kernels. `colors` is the WGSL of the colors of a pass; `main` makes the body of the entry point of the calls.
+fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[String]) -> String) -> String {
+    // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections.
     let is_measured = kernels.iter().any(is_measured);
     let mut parts = vec![
         part!("lib/types"),
@@ -155,18 +154,18 @@ fn of_plan(kernels: &[Kernel], threads: u32, main: impl Fn(&[String]) -> String)
     let (mut calls, mut loops) = (Vec::new(), String::new());
     for (at, &kernel) in kernels.iter().enumerate() {
         let (own, over, call) = kernel_text(kernel);
-        own.iter()
-            .filter(|part| !parts.contains(part))
-            .collect::<Vec<_>>()
-            .into_iter()
-            .for_each(|part| parts.push(part));
+        for part in own {
+            if !parts.contains(part) {
+                parts.push(part);
+            }
+        }
         calls.push(match over {
             Over::Own => format!("{call};"),
             Over::Count(count) => over_count(count, &call),
             Over::Colors => {
                 let name = format!("over_colors_{at}");
                 loops += &part!("lib/over_colors").replace("over_colors", &name).replace("over_row(row)", &call);
-                format!("{name}({COLORS}, first, stride);")
+                format!("{name}({colors}, first, stride);")
             }
         });
     }
@@ -183,11 +182,10 @@ fn over_count(count: &str, call: &str) -> String {
     format!("for (var row = first; row < {count}; row += stride) {{ {call}; }}")
 }
 
-/// One thread follows the passes, with a barrier after each of them.
+/// All threads follow the passes, with a barrier after each pass.
 fn follow_passes(calls: &[String]) -> String {
     let mut cases = String::new();
     for (at, call) in calls.iter().enumerate() {
-        let call = call.replace(COLORS, "PassColors(step.y, step.z)");
         writeln!(cases, "            case {at}u: {{ {call} }}").expect("memory takes it");
     }
     format!(
@@ -201,7 +199,8 @@ fn follow_passes(calls: &[String]) -> String {
     )
 }
 
-/// A whole shader: constants, buffers, parts, and an entry point that does what `main` says.
+/// A shader: constants, buffers, parts, and an entry point with the body `main`. In `main` the first row of a thread is `first`, and
+/// its rows are `stride` apart.
 fn text(of_plan: bool, threads: u32, parts: &[&str], loops: &str, main: &str) -> String {
     let (buffers, parts) = (declarations(of_plan), parts.join("\n"));
     format!(
