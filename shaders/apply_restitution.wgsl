@@ -1,4 +1,4 @@
-// apply_restitution: one thread makes the points of one manifold bounce that were hit fast enough.
+// apply_restitution: one thread lets the points of one manifold bounce that approached faster than the threshold.
 // Reads contacts, points, masses. Writes impulses, and bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.
@@ -20,14 +20,4 @@ fn restitute_contact(i: u32) {
         apply_impulse(&pair, point.r_a, point.r_b, contact.normal * change);
     }
     store_pair(contact.body_a, contact.body_b, &pair);
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn apply_restitution(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            restitute_contact(colors[at]);
-        }
-        storageBarrier();
-    }
 }

@@ -1,12 +1,9 @@
-// begin_sweep: one thread decides whether the sweep that follows is still needed, and counts.
+// begin_sweep: one thread decides whether the next sweep is still needed, and counts sweeps.
 // Reads and writes convergence. Double: src/backend/cpu/mod.rs.
 
-override FIRST: bool = false;
-
-@compute @workgroup_size(1)
-fn begin_sweep() {
-    // The first sweep of a substep is always needed; a later one if the sweep before it moved something.
-    let done = !FIRST && (convergence.done != 0u || atomicLoad(&convergence.moving) == 0u);
+fn begin_sweep(first: bool) {
+    // The first sweep of a substep is always needed; a later one only if the sweep before it moved an impulse by more than the tolerance.
+    let done = !first && (convergence.done != 0u || atomicLoad(&convergence.moving) == 0u);
     convergence.done = select(0u, 1u, done);
     convergence.sweeps += select(1u, 0u, done);
     convergence.planned += 1u;

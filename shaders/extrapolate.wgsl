@@ -1,42 +1,35 @@
-// extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction in which the last sweeps moved
-// it; before the first it only remembers where it is. Joints stand after the points in impulse_steps.
-// Reads momentum, or begins it. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
+// extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction of the last sweeps. Before the first
+// sweep the kernel only notes them. In impulse_steps joints follow the points.
+// Reads momentum, or sets it before the first sweep. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
 // Double: src/kernels/momentum.rs.
 
-override FIRST: bool = false;
-override MEASURED: bool = false;
-
-fn extrapolated(now: vec3f, before: vec3f) -> vec3f {
-    if FIRST { return now; }
+fn extrapolated(is_first: bool, now: vec3f, before: vec3f) -> vec3f {
+    if is_first { return now; }
     return now + (now - before) * momentum.factor;
 }
 
-// Goes on with an impulse, and remembers where it was and where it begins.
-fn extrapolated_impulse(i: u32, now: vec3f) -> vec3f {
-    let begin = extrapolated(now, impulse_steps[i].before);
+// Extrapolates an impulse, and notes the impulse before and after.
+fn extrapolated_impulse(is_first: bool, i: u32, now: vec3f) -> vec3f {
+    let begin = extrapolated(is_first, now, impulse_steps[i].before);
     impulse_steps[i] = Step(now, begin);
     return begin;
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn extrapolate(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    if MEASURED {
-        if convergence.done != 0u { return; }
-    }
-    if FIRST && id.x == 0u { momentum = Momentum(1.0, 0.0, 3.4028234663852886e38, momentum.restarts); }
-    let stride = groups.x * WORKGROUP;
-    for (var i = id.x; i < params.body_count; i += stride) {
+fn extrapolate(is_first: bool, measured: bool, first: u32, stride: u32) {
+    if is_converged(measured) { return; }
+    if is_first && first == 0u { momentum = Momentum(1.0, 0.0, 3.4028234663852886e38, momentum.restarts); }
+    for (var i = first; i < params.body_count; i += stride) {
         let now = Free(bodies[i].v, bodies[i].w);
-        bodies[i].v = extrapolated(now.v, velocities_before[i].v);
-        bodies[i].w = extrapolated(now.w, velocities_before[i].w);
+        bodies[i].v = extrapolated(is_first, now.v, velocities_before[i].v);
+        bodies[i].w = extrapolated(is_first, now.w, velocities_before[i].w);
         velocities_before[i] = now;
     }
-    for (var i = id.x; i < params.point_count; i += stride) {
+    for (var i = first; i < params.point_count; i += stride) {
         let impulse = impulses[i];
-        let r = extrapolated_impulse(i, vec3f(impulse.normal, impulse.tangent_1, impulse.tangent_2));
+        let r = extrapolated_impulse(is_first, i, vec3f(impulse.normal, impulse.tangent_1, impulse.tangent_2));
         impulses[i] = Impulse(r.x, r.y, r.z, impulse.peak);
     }
-    for (var i = id.x; i < params.joint_count; i += stride) {
-        joint_impulses[i].linear = extrapolated_impulse(params.point_count + i, joint_impulses[i].linear);
+    for (var i = first; i < params.joint_count; i += stride) {
+        joint_impulses[i].linear = extrapolated_impulse(is_first, params.point_count + i, joint_impulses[i].linear);
     }
 }

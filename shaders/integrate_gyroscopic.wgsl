@@ -27,8 +27,7 @@ fn newton_step(inertia: Inertia, h: f32, spin: vec3f, next: vec3f) -> vec3f {
 // Square of the angle [rad] up to which two Newton steps leave no more than rounding.
 const SLOW: f32 = 0.0625;
 
-// What integrate_gyroscopic adds to the angular velocity w of a body whose spin about its principal axes x, y, z is fast: its
-// square is (h W)^2.
+// The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
 fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
     var h = params.substep;
     if square > 1.0 { h = params.substep * inverse_sqrt(square); }
@@ -48,40 +47,37 @@ fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: 
     return select(vec3f(0.0), turn + changed * scale, 1.0 > scale * scale);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn integrate_gyroscopic(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var i = id.x; i < params.inertia_count; i += groups.x * WORKGROUP) {
-        let inertia = inertias[i];
-        let p = inertia.principal;
-        let k = inertia.inv_principal;
+fn turn_spin(i: u32) {
+    let inertia = inertias[i];
+    let p = inertia.principal;
+    let k = inertia.inv_principal;
 
-        // The principal axes now.
-        let q = quat_mul(bodies[inertia.body].dq, inertia.frame);
-        let x = turned(q, vec3f(1.0, 0.0, 0.0)) + vec3f(1.0, 0.0, 0.0);
-        let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
-        let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
+    // The principal axes now.
+    let q = quat_mul(bodies[inertia.body].dq, inertia.frame);
+    let x = turned(q, vec3f(1.0, 0.0, 0.0)) + vec3f(1.0, 0.0, 0.0);
+    let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
+    let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-        // The free spin: impulses come after.
-        let w = free[inertia.body].w;
-        let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
+    // The free spin: impulses come later.
+    let w = free[inertia.body].w;
+    let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
 
-        // (h W)^2
-        let a = vec3f((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
-        let rates = vec3f(a.y * a.z, a.z * a.x, a.x * a.y);
-        let sizes = vec3f(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
-        let angle = spin * params.substep;
-        let square = dot3(sizes, angle * angle);
+    // (h W)^2
+    let a = vec3f((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
+    let rates = vec3f(a.y * a.z, a.z * a.x, a.x * a.y);
+    let sizes = vec3f(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
+    let angle = spin * params.substep;
+    let square = dot3(sizes, angle * angle);
 
-        var turn: vec3f;
-        if SLOW > square {
-            let next = newton_step(inertia, params.substep, spin, newton_step(inertia, params.substep, spin, spin));
-            // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
-            let change = next - spin;
-            turn = x * change.x + y * change.y + z * change.z;
-        } else {
-            turn = fast_turn(inertia, square, x, y, z, spin, w);
-        }
-        free[inertia.body].w = w + turn;
-        bodies[inertia.body].w += turn;
+    var turn: vec3f;
+    if SLOW > square {
+        let next = newton_step(inertia, params.substep, spin, newton_step(inertia, params.substep, spin, spin));
+        // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+        let change = next - spin;
+        turn = x * change.x + y * change.y + z * change.z;
+    } else {
+        turn = fast_turn(inertia, square, x, y, z, spin, w);
     }
+    free[inertia.body].w = w + turn;
+    bodies[inertia.body].w += turn;
 }

@@ -1,22 +1,17 @@
-// integrate_velocities: one thread adds gravity and force to the velocity of one body, and what the impulses of the substep
-// before did to it, if they are to be carried over: the difference of its velocities from the free ones.
+// integrate_velocities: one thread adds gravity and force to the velocity of one body. With `carry` it also adds the change of
+// velocity that the impulses of the substep before caused: the difference of the velocities from the free ones.
 // Reads masses. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
 
-override CARRY: bool = false;
-
-@compute @workgroup_size(WORKGROUP)
-fn integrate_velocities(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var i = id.x; i < params.body_count; i += groups.x * WORKGROUP) {
-        let free_v = bodies[i].v + masses[i].acceleration * params.substep;
-        let free_w = bodies[i].w;
-        if CARRY {
-            let carried_v = bodies[i].v - free[i].v;
-            let carried_w = bodies[i].w - free[i].w;
-            bodies[i].v = free_v + carried_v;
-            bodies[i].w = free_w + carried_w;
-        } else {
-            bodies[i].v = free_v;
-        }
-        free[i] = Free(free_v, free_w);
+fn integrate_velocity(carry: bool, i: u32) {
+    let free_v = bodies[i].v + masses[i].acceleration * params.substep;
+    let free_w = bodies[i].w;
+    if carry {
+        let carried_v = bodies[i].v - free[i].v;
+        let carried_w = bodies[i].w - free[i].w;
+        bodies[i].v = free_v + carried_v;
+        bodies[i].w = free_w + carried_w;
+    } else {
+        bodies[i].v = free_v;
     }
+    free[i] = Free(free_v, free_w);
 }

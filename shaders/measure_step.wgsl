@@ -1,5 +1,5 @@
-// measure_step: one workgroup adds up how far a sweep moved the impulses of CHUNK points or joints: squared, and along the way
-// from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair.
+// measure_step: one workgroup adds up the step of a sweep over the impulses of CHUNK points or joints: its square, and its product
+// with the way from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair of sums.
 // Double: src/kernels/momentum.rs.
 
 fn step_length(i: u32) -> vec2f {
@@ -14,14 +14,9 @@ fn step_length(i: u32) -> vec2f {
     return vec2f(dot3(d, d), dot3(d, now - impulse_steps[i].before));
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn measure_step(
-    @builtin(local_invocation_index) thread: u32,
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-) {
+fn measure_step(thread: u32, group: u32, groups: u32) {
     let count = params.point_count + params.joint_count;
-    for (var first = group.x * CHUNK; first < count; first += groups.x * CHUNK) {
+    for (var first = group * CHUNK; first < count; first += groups * CHUNK) {
         var own = vec2f();
         for (var i = first + thread; i < min(first + CHUNK, count); i += WORKGROUP) { own += step_length(i); }
         let sum = workgroup_sum(thread, own);

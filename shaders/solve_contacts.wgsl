@@ -3,27 +3,46 @@
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.
 
-// How often a manifold is swept before the next one.
-override PASSES: u32 = 1u;
-
-fn solve_contact(i: u32) {
-    let contact = contacts[i];
-    var pair = load_pair(contact.body_a, contact.body_b);
-    for (var k = 0u; k < PASSES; k++) {
-        if FRICTION != FRICTION_NONE && FRICTION_FIRST { sweep_friction(&pair, contact); }
-        sweep_normals(&pair, contact);
-        if FRICTION != FRICTION_NONE && !FRICTION_FIRST { sweep_friction(&pair, contact); }
+fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
+    let softness = pair_softness(pair);
+    let movement = normal_movement(rules, pair, contact);
+    for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
+        var impulse = impulses[k];
+        solve_normal(rules, pair, contact, points[k], softness, movement, &impulse);
+        impulses[k] = impulse;
     }
-    store_pair(contact.body_a, contact.body_b, &pair);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn solve_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let converged = is_converged();
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            if !converged { solve_contact(colors[at]); }
+fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
+    let end = contact.first_point + contact.point_count;
+    if rules.at_patch {
+        var pressed = 0.0;
+        var lever = 0.0;
+        for (var k = contact.first_point; k < end; k++) {
+            pressed += impulses[k].normal;
+            lever += impulses[k].normal * points[k].slip_1;
         }
-        storageBarrier();
+        var impulse = impulses[end];
+        solve_twist(pair, contact, points[end], lever, &impulse);
+        solve_friction(rules, pair, contact, points[end], pressed, &impulse);
+        impulses[end] = impulse;
+    } else {
+        for (var k = contact.first_point; k < end; k++) {
+            var impulse = impulses[k];
+            solve_friction(rules, pair, contact, points[k], impulse.normal, &impulse);
+            impulses[k] = impulse;
+        }
     }
+}
+
+fn solve_contact(rules: Rules, i: u32) {
+    if is_converged(rules.measured) { return; }
+    let contact = contacts[i];
+    var pair = load_pair(contact.body_a, contact.body_b);
+    for (var k = 0u; k < rules.passes; k++) {
+        if rules.friction != FRICTION_NONE && rules.friction_first { sweep_friction(rules, &pair, contact); }
+        sweep_normals(rules, &pair, contact);
+        if rules.friction != FRICTION_NONE && !rules.friction_first { sweep_friction(rules, &pair, contact); }
+    }
+    store_pair(contact.body_a, contact.body_b, &pair);
 }

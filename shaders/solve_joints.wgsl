@@ -3,7 +3,8 @@
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/joint.rs.
 
-fn solve_joint(i: u32) {
+fn solve_joint(rules: Rules, i: u32) {
+    if is_converged(rules.measured) { return; }
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
     let anchors = current_anchors(&pair, joint);
@@ -16,7 +17,7 @@ fn solve_joint(i: u32) {
     var wanted = relative_velocity(&pair, anchors.r_a, anchors.r_b);
     var mass_scale = 1.0;
     var impulse_scale = 0.0;
-    if BIASED {
+    if rules.biased {
         wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
         mass_scale = params.joint.mass_scale;
         impulse_scale = params.joint.impulse_scale;
@@ -24,20 +25,9 @@ fn solve_joint(i: u32) {
     let correction = solve_block(x, y, z, wanted) * mass_scale + before * impulse_scale;
     let change = correction * -params.relaxation;
     joint_impulses[i].linear = before + change;
-    note_correction(change.x, reciprocal(x.x));
-    note_correction(change.y, reciprocal(y.y));
-    note_correction(change.z, reciprocal(z.z));
+    note_correction(rules.measured, change.x, reciprocal(x.x));
+    note_correction(rules.measured, change.y, reciprocal(y.y));
+    note_correction(rules.measured, change.z, reciprocal(z.z));
     apply_impulse(&pair, anchors.r_a, anchors.r_b, change);
     store_pair(joint.body_a, joint.body_b, &pair);
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn solve_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let converged = is_converged();
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            if !converged { solve_joint(colors[at]); }
-        }
-        storageBarrier();
-    }
 }

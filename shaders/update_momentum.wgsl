@@ -1,9 +1,8 @@
-// update_momentum: one workgroup finds the step of the last sweep from the sums of measure_step, and how far the next
-// one is extrapolated: further each time, and not at all after a step back, or one twice as long as the shortest since momentum
-// last began. Reads lengths. Writes momentum. Double: src/kernels/momentum.rs.
+// update_momentum: one workgroup computes the step of the last sweep from the sums of measure_step, and the factor of the next
+// extrapolation. The factor grows with each sweep. It is zero after a step back, and after a step twice as long as the shortest
+// since the last zero. Reads lengths. Writes momentum. Double: src/kernels/momentum.rs.
 
-@compute @workgroup_size(WORKGROUP)
-fn update_momentum(@builtin(local_invocation_index) thread: u32) {
+fn update_momentum(thread: u32) {
     var own = vec2f();
     let count = (params.point_count + params.joint_count + CHUNK - 1u) / CHUNK;
     for (var i = thread; i < count; i += WORKGROUP) { own += lengths[i]; }

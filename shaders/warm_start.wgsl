@@ -1,9 +1,9 @@
-// warm_start: one thread applies the impulses that one manifold already carries.
+// warm_start: one thread applies the impulses that one manifold carries from the step before.
 // Reads contacts, points, impulses, masses. Writes bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.
 
-fn warm_start_contact(i: u32) {
+fn warm_start_contact(rules: Rules, i: u32) {
     let contact = contacts[i];
     let tangent_2 = cross3(contact.normal, contact.tangent);
     let end = contact.first_point + contact.point_count;
@@ -11,12 +11,12 @@ fn warm_start_contact(i: u32) {
     for (var k = contact.first_point; k < end; k++) {
         let impulse = impulses[k];
         var p = contact.normal * impulse.normal;
-        if FRICTION != FRICTION_NONE && !PATCH {
+        if rules.friction != FRICTION_NONE && !rules.at_patch {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
         apply_impulse(&pair, points[k].r_a, points[k].r_b, p);
     }
-    if FRICTION != FRICTION_NONE && PATCH {
+    if rules.friction != FRICTION_NONE && rules.at_patch {
         let impulse = impulses[end];
         let twist = contact.normal * impulse.normal;
         pair.a.w -= inv_inertia_times(pair.mass_a, twist);
@@ -25,14 +25,4 @@ fn warm_start_contact(i: u32) {
         apply_impulse(&pair, points[end].r_a, points[end].r_b, p);
     }
     store_pair(contact.body_a, contact.body_b, &pair);
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn warm_start(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            warm_start_contact(colors[at]);
-        }
-        storageBarrier();
-    }
 }

@@ -1,4 +1,4 @@
-// warm_start_joints: one thread applies the impulse that one joint already carries.
+// warm_start_joints: one thread applies the impulse that one joint carries from the step before.
 // Reads joints, joint_impulses, masses. Writes bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/joint.rs.
@@ -9,14 +9,4 @@ fn warm_start_joint(i: u32) {
     let anchors = current_anchors(&pair, joint);
     apply_impulse(&pair, anchors.r_a, anchors.r_b, joint_impulses[i].linear);
     store_pair(joint.body_a, joint.body_b, &pair);
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn warm_start_joints(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var color = pass_colors.first; color < pass_colors.end; color++) {
-        for (var at = colors[color] + id.x; at < colors[color + 1u]; at += groups.x * WORKGROUP) {
-            warm_start_joint(colors[at]);
-        }
-        storageBarrier();
-    }
 }

@@ -39,11 +39,15 @@ pub mod backend {
     pub use crate::backend::checked::CheckedStep;
     pub use crate::backend::cpu::peak::multiply_and_add;
 
-    /// The compute shaders: texts, bindings, constants.
+    /// The compute shaders: texts, buffers, layouts.
     #[cfg(feature = "gpu")]
     pub mod shader {
-        pub use crate::backend::gpu::carry::CarryParams;
-        pub use crate::backend::gpu::shader::*;
+        pub use crate::backend::gpu::bindings::Binding;
+        pub use crate::backend::gpu::reflect::Reflected;
+        pub use crate::backend::gpu::resident::ResidentParams;
+        pub use crate::backend::gpu::rows::SCRATCH_ROW;
+        pub use crate::backend::gpu::spirv_exact::exact_spirv;
+        pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, WORKGROUP};
     }
 }
 

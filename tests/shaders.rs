@@ -9,24 +9,35 @@ use std::path::Path;
 use common::kernels::{every_kernel, every_rules};
 use drystone::config::FrictionRule;
 use drystone::stages::backend::shader::{
-    BINDINGS, PASSES, Program, Reflected, SCRATCH_ROW, UNIFORMS, WORKGROUP, constants, source,
+    Binding, ENTRY_POINT, Program, Reflected, SCRATCH_ROW, WORKGROUP, exact_spirv,
 };
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::Kernel;
 
-/// One kernel without overrides that naga reads.
-fn reflected(kernel: Kernel) -> Reflected {
-    let reflected = Reflected::new(&source(kernel), kernel.name(), &constants(kernel));
-    reflected.unwrap_or_else(|e| panic!("{kernel}: {e}"))
+/// A program as naga reads it: validated without any capability.
+fn reflected(program: &Program) -> Reflected {
+    Reflected::new(program.name(), &program.source()).unwrap_or_else(|e| panic!("{program:?}: {e}"))
 }
 
-/// As written, overrides and all.
 fn parsed(source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)))
 }
 
+/// The kernels of plans, and the programs that begin a step on the device.
+fn every_program() -> Vec<Program> {
+    every_kernel().into_iter().map(Program::Pass).chain(Program::RESIDENT).collect()
+}
+
+/// Number of storage buffers of a program.
+fn storage_buffers(reflected: &Reflected) -> usize {
+    let is_storage = |&&at: &&Binding| matches!(reflected.space(at), naga::AddressSpace::Storage { .. });
+    reflected.bindings.iter().filter(is_storage).count()
+}
+
 mod layouts {
     use super::*;
+    use drystone::stages::backend::shader::ResidentParams;
+    use drystone::stages::problem::carry::{Preload, Written};
     use drystone::stages::problem::{
         BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
         MomentumRow, Params, PassColors, PointRow, Softness,
@@ -36,9 +47,9 @@ mod layouts {
 
     /// Size of a struct, and offset of each of its fields.
     #[derive(Debug, PartialEq)]
-    pub struct Layout {
-        pub size: usize,
-        pub fields: BTreeMap<String, usize>,
+    struct Layout {
+        size: usize,
+        fields: BTreeMap<String, usize>,
     }
 
     macro_rules! layouts {
@@ -85,11 +96,16 @@ mod layouts {
                 body_count point_count slop relaxation tolerance joint_count patches
             }
             PassColors = PassColors { first end }
+            Preload = Preload { movable_compliance fixed_compliance share warm_start }
+            ResidentParams = ResidentParams {
+                preload body_count contact_count order written_count patches has_points
+            }
+            Written = Written { row points_before }
         }
     }
 
     /// The layout of each struct of `types`.
-    pub fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
+    fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
         let module = parsed(types);
         let structs = module.types.iter().filter_map(|(_, t)| match &t.inner {
             naga::TypeInner::Struct { members, span } => Some((t.name.clone()?, members, *span)),
@@ -108,7 +124,7 @@ mod layouts {
         let (ours, theirs) = (in_rust(), in_wgsl(types));
         let names: BTreeSet<_> = ours.keys().chain(theirs.keys()).collect();
         let agree = |name: &str| match (ours.get(name), theirs.get(name)) {
-            (Some(a), Some(b)) if name == "Params" => a.fields == b.fields && a.size >= b.size,
+            (Some(a), Some(b)) if name.ends_with("Params") => a.fields == b.fields && a.size >= b.size,
             (a, b) => a == b,
         };
         names.into_iter().filter(|name| !agree(name)).cloned().collect()
@@ -135,132 +151,47 @@ mod layouts {
     }
 }
 
+/// Names of the files of a folder of shaders.
+fn files(folder: &str) -> BTreeSet<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let entries = std::fs::read_dir(folder).expect("a folder of shaders").map(|e| e.expect("an entry").path());
+    let shaders = entries.filter(|path| path.extension().is_some_and(|e| e == "wgsl"));
+    shaders.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
+}
+
 #[test]
-fn every_shader_file_is_a_kernel_and_every_kernel_a_file_with_an_entry_point_of_its_name() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let entries = std::fs::read_dir(folder).expect("the folder of the shaders").map(|e| e.expect("an entry").path());
-    let files: BTreeSet<_> = entries
-        .filter(|path| path.extension().is_some_and(|e| e == "wgsl"))
-        .map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned())
-        .collect();
-    let kernels: BTreeSet<_> = every_kernel().into_iter().map(|k| k.name().to_owned()).collect();
-    assert_eq!(files, kernels);
-    for kernel in every_kernel() {
-        let names: Vec<_> = parsed(&source(kernel)).entry_points.into_iter().map(|e| e.name).collect();
-        assert_eq!(names, [kernel.name()]);
+fn every_shader_file_is_a_program_and_every_program_has_a_file() {
+    let names = |programs: &[Program]| programs.iter().map(|p| p.name().to_owned()).collect::<BTreeSet<_>>();
+    let kernels: Vec<_> = every_kernel().into_iter().map(Program::Pass).collect();
+    assert_eq!(files("shaders"), names(&kernels));
+    assert_eq!(files("shaders/resident"), names(&Program::RESIDENT));
+    for program in every_program() {
+        let entry_points: Vec<_> = reflected(&program).module.entry_points.into_iter().map(|e| e.name).collect();
+        assert_eq!(entry_points, [ENTRY_POINT], "{program:?}");
     }
 }
 
 #[test]
-fn every_kernel_stays_inside_what_every_webgpu_offers() {
-    for kernel in every_kernel() {
-        // Validates without any capability.
-        let reflected = reflected(kernel);
-        let storage = reflected.bindings.iter().filter(|&&b| b as usize >= UNIFORMS).count();
-        assert!(storage <= 8, "{kernel} has {storage} storage buffers");
-        let threads = if matches!(kernel, Kernel::BeginSweep { .. }) { 1 } else { WORKGROUP };
-        assert_eq!(reflected.module.entry_points[0].workgroup_size, [threads, 1, 1], "{kernel}");
+fn every_program_stays_inside_what_every_webgpu_offers() {
+    for program in every_program() {
+        let reflected = reflected(&program);
+        let storage = storage_buffers(&reflected);
+        assert!((1..=8).contains(&storage), "{program:?} has {storage} storage buffers");
+        assert_eq!(reflected.module.entry_points[0].workgroup_size, [WORKGROUP, 1, 1], "{program:?}");
     }
 }
 
+/// A buffer that a program only reads may be in the cache of a texture unit; a program that writes where it declares reading is
+/// refused by naga.
 #[test]
-fn every_binding_stands_where_its_name_stands_in_the_list() {
-    for kernel in every_kernel() {
-        let module = parsed(&source(kernel));
-        let mut bound: Vec<_> = module
-            .global_variables
-            .iter()
-            .filter_map(|(_, v)| {
-                v.binding.map(|at| (at.binding, v.name.clone().expect("a binding has a name"), v.space))
-            })
-            .collect();
-        bound.sort_by_key(|(at, ..)| *at);
-        assert_eq!(bound.iter().map(|(at, ..)| *at).collect::<Vec<_>>(), Vec::from_iter(0..BINDINGS.len() as u32));
-        assert_eq!(bound.iter().map(|(_, name, _)| name).collect::<Vec<_>>(), BINDINGS);
-        for (at, name, space) in bound {
-            assert_eq!(space == naga::AddressSpace::Uniform, (at as usize) < UNIFORMS, "{name}");
-        }
-    }
-}
-
-/// The programs that carry rows from step to step.
-mod carry {
-    use super::*;
-    use drystone::stages::backend::shader::CarryParams;
-    use drystone::stages::backend::shader::{CARRY, CARRY_BINDINGS};
-    use drystone::stages::collide::MAX_POINTS;
-    use drystone::stages::problem::carry::{NO_POINT, Preload, Written};
-
-    fn reflected(program: Program) -> Reflected {
-        Reflected::new(&program.source(), program.name(), &program.constants()).unwrap_or_else(|e| panic!("{e}"))
-    }
-
-    #[test]
-    fn each_is_a_file_with_an_entry_point_of_its_name() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/carry");
-        let files = std::fs::read_dir(folder).expect("the folder").count();
-        assert_eq!(files, Program::CARRY.len() + 1, "and their bindings");
-        for program in Program::CARRY {
-            let names: Vec<_> = parsed(&program.source()).entry_points.into_iter().map(|e| e.name).collect();
-            assert_eq!(names, [program.name()]);
-        }
-    }
-
-    #[test]
-    fn each_stays_inside_what_every_webgpu_offers() {
-        for program in Program::CARRY {
-            let name = program.name();
-            let reflected = reflected(program);
-            let storage = reflected.bindings.iter().filter(|&&b| b != CARRY).count();
-            assert!(storage <= 8, "{name} has {storage} storage buffers");
-            assert_eq!(reflected.module.entry_points[0].workgroup_size, [WORKGROUP, 1, 1]);
-        }
-    }
-
-    #[test]
-    fn every_binding_has_the_number_of_its_name() {
-        let name_of = |at: usize| BINDINGS.get(at).copied().unwrap_or_else(|| CARRY_BINDINGS[at - BINDINGS.len()]);
-        let module = parsed(&Program::WriteContacts.source());
-        let bound: Vec<_> = module.global_variables.iter().filter_map(|(_, v)| Some((v.binding?, v))).collect();
-        // All but that of a plan that one workgroup follows.
-        assert_eq!(bound.len(), 6 + CARRY_BINDINGS.len() - 1);
-        for (at, variable) in bound {
-            assert_eq!(variable.name.as_deref(), Some(name_of(at.binding as usize)));
-            assert_eq!(variable.space == naga::AddressSpace::Uniform, at.binding == CARRY);
-        }
-    }
-
-    #[test]
-    fn every_struct_has_the_layout_of_its_twin() {
-        let theirs = layouts::in_wgsl(&Program::WriteContacts.source());
-        let fields = |name: &str| theirs[name].fields.clone();
-        let own = |fields: &[(&str, usize)]| BTreeMap::from_iter(fields.iter().map(|&(n, at)| (n.to_owned(), at)));
-        let preload = [
-            ("movable_compliance", offset_of!(Preload, movable_compliance)),
-            ("fixed_compliance", offset_of!(Preload, fixed_compliance)),
-            ("share", offset_of!(Preload, share)),
-            ("warm_start", offset_of!(Preload, warm_start)),
-        ];
-        assert_eq!(fields("Preload"), own(&preload));
-        let carry = [
-            ("preload", offset_of!(CarryParams, preload)),
-            ("body_count", offset_of!(CarryParams, body_count)),
-            ("contact_count", offset_of!(CarryParams, contact_count)),
-            ("order", offset_of!(CarryParams, order)),
-            ("written_count", offset_of!(CarryParams, written_count)),
-            ("patches", offset_of!(CarryParams, patches)),
-            ("has_points", offset_of!(CarryParams, has_points)),
-        ];
-        assert_eq!(fields("Carry"), own(&carry));
-        assert!(theirs["Carry"].size <= size_of::<CarryParams>());
-        let written = [("row", offset_of!(Written, row)), ("points_before", offset_of!(Written, points_before))];
-        assert_eq!((fields("Written"), theirs["Written"].size), (own(&written), size_of::<Written>()));
-        // A point that is new is one more than the last.
-        let constants = parsed(&Program::WriteContacts.source());
-        let most = constants.constants.iter().find(|(_, c)| c.name.as_deref() == Some("MAX_POINTS"));
-        let value = &constants.global_expressions[most.expect("the constant").1.init];
-        let same = |x: u32| x == u32::from(NO_POINT) && x as usize == MAX_POINTS;
-        assert!(matches!(value, naga::Expression::Literal(naga::Literal::U32(x)) if same(*x)), "{value:?}");
+fn plans_read_contacts_that_a_resident_program_writes() {
+    let writes = |program: &Program, binding| match reflected(program).space(binding) {
+        naga::AddressSpace::Storage { access } => access.contains(naga::StorageAccess::STORE),
+        _ => false,
+    };
+    for binding in [Binding::Contacts, Binding::Points] {
+        assert!(!writes(&Program::Pass(Kernel::SolveContacts(Rules::default())), binding), "{binding:?}");
+        assert!(writes(&Program::WriteContacts, binding), "{binding:?}");
     }
 }
 
@@ -285,11 +216,9 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
     for (measured, patch, friction) in
         [(false, false, FrictionRule::Disc), (true, false, FrictionRule::Box), (false, true, FrictionRule::Disc)]
     {
-        let program = Program::Whole(of(measured, patch, friction).into(), 16);
-        let reflected = Reflected::new(&program.source(), program.name(), &[]).unwrap_or_else(|e| panic!("{e}"));
-        let storage = reflected.bindings.iter().filter(|&&b| b as usize >= UNIFORMS && b != PASSES).count();
-        assert!(storage <= 8, "{storage} storage buffers");
-        assert!(reflected.module.overrides.is_empty());
+        let reflected = reflected(&Program::OneDispatch(of(measured, patch, friction).into(), 16));
+        assert_eq!(storage_buffers(&reflected), 8);
+        assert_eq!(reflected.bindings.contains(&Binding::Convergence), measured);
         assert_eq!(reflected.module.entry_points[0].workgroup_size, [16, 1, 1]);
     }
 }
@@ -299,7 +228,7 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
 #[test]
 fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
     let kernels = [Kernel::IntegrateVelocities { carry: false }, Kernel::SolveContacts(Rules::default())];
-    let module = parsed(&Program::Whole(kernels.into(), 16).source());
+    let module = parsed(&Program::OneDispatch(kernels.into(), 16).source());
     let [entry] = &module.entry_points[..] else { panic!("one entry point") };
     let mut bodies = Vec::new();
     for statement in entry.function.body.iter() {
@@ -328,11 +257,13 @@ fn every_color_of_a_pass_ends_with_a_barrier() {
         Kernel::ApplyRestitution(Rules::default()),
     ];
     for kernel in swept {
-        let module = parsed(&source(kernel));
+        let module = parsed(&Program::Pass(kernel).source());
+        let over_colors = |f: &&naga::Function| f.name.as_ref().is_some_and(|n| n.starts_with("over_colors"));
+        let [function] = module.functions.iter().map(|(_, f)| f).filter(over_colors).collect::<Vec<_>>()[..] else {
+            panic!("{kernel} goes over colors in one function")
+        };
         let mut bodies = Vec::new();
-        for statement in module.entry_points[0].function.body.iter() {
-            loops(statement, &mut bodies);
-        }
+        function.body.iter().for_each(|statement| loops(statement, &mut bodies));
         // That over the colors is the outer one, and comes first.
         let colors = bodies.first().unwrap_or_else(|| panic!("{kernel} has a loop over its colors"));
         let last = flat(colors).pop().expect("a statement");
@@ -368,27 +299,17 @@ fn loops<'a>(statement: &'a naga::Statement, found: &mut Vec<&'a naga::Block>) {
 }
 
 #[test]
-fn every_override_is_a_constant_of_its_kernel_and_every_constant_an_override() {
-    for kernel in every_kernel() {
-        let module = parsed(&source(kernel));
-        let overrides: BTreeSet<_> = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-        let constants: BTreeSet<_> = constants(kernel).into_iter().map(|(name, _)| name.to_owned()).collect();
-        assert_eq!(overrides, constants, "{kernel}");
-    }
-}
-
-#[test]
 fn every_rule_reaches_the_sweep_as_a_constant() {
     let all = every_rules();
-    let constants = |&rules: &Rules| format!("{:?}", constants(Kernel::SolveContacts(rules)));
-    let distinct: BTreeSet<_> = all.iter().map(constants).collect();
+    let source = |&rules: &Rules| Program::Pass(Kernel::SolveContacts(rules)).source();
+    let distinct: BTreeSet<_> = all.iter().map(source).collect();
     assert_eq!(distinct.len(), all.len());
 }
 
 #[test]
 fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
     // The last ones are too small to show in the bits of a rotation.
-    let module = parsed(&source(Kernel::IntegratePositions));
+    let module = parsed(&Program::Pass(Kernel::IntegratePositions).source());
     let named = |f: &&naga::Function| f.name.as_deref() == Some("exp_rotation");
     let function = module.functions.iter().map(|(_, f)| f).find(named).expect("the function");
     let magnitude = |e: &naga::Expression| match e {
@@ -466,16 +387,15 @@ mod exact {
             .collect()
     }
 
-    fn spirv(source: &str, entry_point: &str, constants: &[(&str, f64)]) -> Vec<u32> {
-        let reflected = Reflected::new(source, entry_point, constants).unwrap_or_else(|e| panic!("{e}"));
-        reflected.exact_spirv().expect("naga writes SPIR-V")
+    fn spirv(source: &str) -> Vec<u32> {
+        let reflected = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}"));
+        exact_spirv(&reflected).expect("naga writes SPIR-V")
     }
 
     #[test]
-    fn every_kernel_only_adds_and_multiplies_and_may_not_be_fused() {
-        for kernel in every_kernel() {
-            let words = spirv(&source(kernel), kernel.name(), &constants(kernel));
-            assert_eq!(inexact(&words), BTreeSet::new(), "{kernel}");
+    fn every_program_only_adds_and_multiplies_and_may_not_be_fused() {
+        for program in every_program() {
+            assert_eq!(inexact(&spirv(&program.source())), BTreeSet::new(), "{program:?}");
         }
     }
 
@@ -483,9 +403,9 @@ mod exact {
     fn one_expression(expression: &str) -> Vec<u32> {
         let source = format!(
             "@group(0) @binding(2) var<storage, read_write> x: array<f32>;
-            @compute @workgroup_size(64) fn kernel() {{ x[0] = {expression}; }}"
+            @compute @workgroup_size(64) fn main() {{ x[0] = {expression}; }}"
         );
-        spirv(&source, "kernel", &[])
+        spirv(&source)
     }
 
     #[test]
@@ -539,10 +459,8 @@ mod exact {
             Kernel::IntegratePositions,
         ]
         .into();
-        let kernels = every_kernel().into_iter().map(Program::Pass);
-        for program in kernels.chain(Program::CARRY).chain([Program::Whole(small_world, 16)]) {
-            let words = spirv(&program.source(), program.name(), &program.constants());
-            let (count, unbounded) = indices(&words);
+        for program in every_program().into_iter().chain([Program::OneDispatch(small_world, 16)]) {
+            let (count, unbounded) = indices(&spirv(&program.source()));
             // One kernel reads no more than one row.
             let has_rows = program.name() != "begin_sweep";
             assert!(unbounded == 0 && (count > 0) == has_rows, "{program:?}: {unbounded} of {count} indices");
@@ -552,9 +470,9 @@ mod exact {
     #[test]
     fn an_index_without_a_bound_is_found() {
         let source = "@group(0) @binding(2) var<storage, read_write> x: array<u32>;
-            @compute @workgroup_size(64) fn kernel(@builtin(global_invocation_id) id: vec3u) { x[x[id.x]] = 7u; }";
-        assert_eq!(indices(&spirv(source, "kernel", &[])), (2, 0));
-        let reflected = Reflected::new(source, "kernel", &[]).unwrap_or_else(|e| panic!("{e}"));
+            @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) { x[x[id.x]] = 7u; }";
+        assert_eq!(indices(&spirv(source)), (2, 0));
+        let reflected = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}"));
         let unchecked = naga::back::spv::write_vec(&reflected.module, &reflected.info, &Default::default(), None);
         assert_eq!(indices(&unchecked.expect("naga writes SPIR-V")), (2, 2));
     }

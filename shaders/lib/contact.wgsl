@@ -1,23 +1,20 @@
 // Non-penetration at one contact point. Doubles: src/kernels/contact.rs.
 
-override ACCUMULATED: bool = true;
-override ROUND: bool = true;
-
 // How two bodies moved along a normal since the step began: a separation is linear in the arms.
 struct NormalMovement { shift: f32, turn_a: vec3f, turn_b: vec3f }
 
-fn normal_movement(pair: ptr<function, Pair>, contact: Contact) -> NormalMovement {
+fn normal_movement(rules: Rules, pair: ptr<function, Pair>, contact: Contact) -> NormalMovement {
     let turn_a = turned(conjugate((*pair).a.dq), contact.normal);
     let turn_b = turned(conjugate((*pair).b.dq), contact.normal);
     var shift = dot3((*pair).b.dp - (*pair).a.dp, contact.normal);
-    // A round surface turns under its contact: what is carried along is the centre of its curvature.
-    if ROUND {
+    // A round surface turns under its contact: the contact moves with the center of curvature.
+    if rules.round {
         shift = shift + contact.radius_a * dot3(turn_a, contact.normal) + contact.radius_b * dot3(turn_b, contact.normal);
     }
     return NormalMovement(shift, turn_a, turn_b);
 }
 
-// What the contact answers to: the separation when the step began, less the preload, and what the bodies moved since.
+// The separation that the solver uses: the separation at the begin of the step, less the preload, plus the movement since.
 fn current_separation(movement: NormalMovement, contact: Contact, point: Point) -> f32 {
     return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }
@@ -28,25 +25,25 @@ fn pair_softness(pair: ptr<function, Pair>) -> Softness {
 }
 
 // The impulse pushes, never pulls: the sum of the corrections, or each by itself.
-fn clamp_normal(sum: f32, correction: f32) -> f32 {
-    if ACCUMULATED { return larger(sum + correction, 0.0); }
+fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
+    if rules.accumulated { return larger(sum + correction, 0.0); }
     return sum + larger(correction, 0.0);
 }
 
-fn solve_normal(pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
+fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, 0.0), -softness.push_limit);
-    let bias = select(select(0.0, pushed, BIASED), s * params.inverse_substep, apart);
-    let mass_scale = select(select(1.0, softness.mass_scale, BIASED), 1.0, apart);
-    let impulse_scale = select(select(0.0, softness.impulse_scale, BIASED), 0.0, apart);
+    let bias = select(select(0.0, pushed, rules.biased), s * params.inverse_substep, apart);
+    let mass_scale = select(select(1.0, softness.mass_scale, rules.biased), 1.0, apart);
+    let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
     let correction = -(point.normal_mass * mass_scale * (vn + bias)) - impulse_scale * (*impulse).normal;
-    let sum = clamp_normal((*impulse).normal, params.relaxation * correction);
+    let sum = clamp_normal(rules, (*impulse).normal, params.relaxation * correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
     (*impulse).peak = larger((*impulse).peak, sum);
-    note_correction(change, point.normal_mass);
+    note_correction(rules.measured, change, point.normal_mass);
     apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
 }

@@ -1,21 +1,11 @@
 // Friction at one point or over one manifold. Doubles: src/kernels/friction.rs.
 
-// 0 none, 1 slip direction, 2 box, 3 disc.
-override FRICTION: u32 = 3u;
-override PATCH: bool = false;
-override FRICTION_FIRST: bool = false;
-override DRIVEN: bool = false;
-
-const FRICTION_NONE: u32 = 0u;
-const FRICTION_SLIP: u32 = 1u;
-const FRICTION_BOX: u32 = 2u;
-
 // x, no further from 0 than the limit.
 fn clamp_abs(x: f32, limit: f32) -> f32 { return larger(smaller(x, limit), -limit); }
 
 // The tangential impulse nearest to y that the rule allows under the normal impulse's limit.
-fn allowed_friction(y: vec2f, limit: f32) -> vec2f {
-    if FRICTION != 3u { return vec2f(clamp_abs(y.x, limit), clamp_abs(y.y, limit)); }
+fn allowed_friction(friction: u32, y: vec2f, limit: f32) -> vec2f {
+    if friction != FRICTION_DISC { return vec2f(clamp_abs(y.x, limit), clamp_abs(y.y, limit)); }
     let length_squared = y.x * y.x + y.y * y.y;
     let scale = select(1.0, limit * inverse_sqrt(length_squared), length_squared > limit * limit);
     return vec2f(y.x * scale, y.y * scale);
@@ -23,32 +13,32 @@ fn allowed_friction(y: vec2f, limit: f32) -> vec2f {
 
 // Coulomb friction: the sum of the tangential impulses stays within what the normal impulse allows. The step along both
 // tangents has one length: with a matrix step the clamped point would slip in a wrong direction.
-fn solve_friction(pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
+fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
     let u = relative_velocity(pair, point.r_a, point.r_b);
     var u_1 = dot3(u, contact.tangent);
     var u_2 = dot3(u, tangent_2);
-    if DRIVEN {
+    if rules.driven {
         u_1 += point.slip_1;
         u_2 += point.slip_2;
     }
     let limit = contact.friction * normal_impulse;
     let mass = params.relaxation * point.tangent_mass;
     var sum: vec2f;
-    if FRICTION == FRICTION_SLIP {
+    if rules.friction == FRICTION_SLIP {
         // One direction: the impulses along both tangents are its components.
         let along = (*impulse).tangent_1 * point.slip_1 + (*impulse).tangent_2 * point.slip_2;
         let s = clamp_abs(along - mass * (u_1 * point.slip_1 + u_2 * point.slip_2), limit);
         sum = vec2f(s * point.slip_1, s * point.slip_2);
     } else {
-        sum = allowed_friction(vec2f((*impulse).tangent_1 - mass * u_1, (*impulse).tangent_2 - mass * u_2), limit);
+        sum = allowed_friction(rules.friction, vec2f((*impulse).tangent_1 - mass * u_1, (*impulse).tangent_2 - mass * u_2), limit);
     }
     let change_1 = sum.x - (*impulse).tangent_1;
     let change_2 = sum.y - (*impulse).tangent_2;
     (*impulse).tangent_1 = sum.x;
     (*impulse).tangent_2 = sum.y;
-    note_correction(change_1, point.tangent_mass);
-    note_correction(change_2, point.tangent_mass);
+    note_correction(rules.measured, change_1, point.tangent_mass);
+    note_correction(rules.measured, change_2, point.tangent_mass);
     apply_impulse(pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 

@@ -2,7 +2,7 @@
 
 struct Anchors { r_a: vec3f, r_b: vec3f }
 
-// The arms now: what they were when the step began, turned with their bodies.
+// The arms now: those at the begin of the step, turned with their bodies.
 fn current_anchors(pair: ptr<function, Pair>, joint: Joint) -> Anchors {
     return Anchors(joint.r_a + turned((*pair).a.dq, joint.r_a), joint.r_b + turned((*pair).b.dq, joint.r_b));
 }

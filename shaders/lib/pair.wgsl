@@ -1,7 +1,4 @@
-// Two bodies while one thread works on them, and the sweeps over colors. Doubles: src/kernels/pair.rs.
-
-override BIASED: bool = true;
-override MEASURED: bool = false;
+// Two bodies while one thread works on them. Doubles: src/kernels/pair.rs.
 
 struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass }
 
@@ -28,7 +25,7 @@ fn relative_velocity(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f
     return ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));
 }
 
-// How far b at r_b moved relative to a at r_a since the step began.
+// Movement of b at r_b relative to a at r_a since the step began.
 fn relative_movement(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
     let moved_b = (*pair).b.dp + turned((*pair).b.dq, r_b);
     let moved_a = (*pair).a.dp + turned((*pair).a.dq, r_a);
@@ -49,17 +46,4 @@ fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
         bodies[b].v = (*pair).b.v;
         bodies[b].w = (*pair).b.w;
     }
-}
-
-// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
-fn note_correction(impulse: f32, mass: f32) {
-    if MEASURED {
-        if larger(impulse, -impulse) > params.tolerance * mass { atomicStore(&convergence.moving, 1u); }
-    }
-}
-
-// Whether the sweeps of this substep have come to their end already.
-fn is_converged() -> bool {
-    if MEASURED { return convergence.done != 0u; }
-    return false;
 }

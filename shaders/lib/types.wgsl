@@ -48,6 +48,22 @@ struct Params {
     tolerance: f32, joint_count: u32, patches: u32,
 }
 
-// The colors that one dispatch sweeps, one after another. `colors` holds where each begins, and where the last ends, in itself; and there
-// the rows of the contacts, or joints, that are in it.
+// The colors that one dispatch sweeps, one after another. The buffer `colors` holds where each color begins, then where the last one
+// ends, then the rows of the contacts or joints of the colors.
 struct PassColors { first: u32, end: u32 }
+
+struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, warm_start: u32 }
+
+// What the programs that begin a step on the device are told. Layout: src/backend/gpu/resident.rs.
+struct ResidentParams {
+    preload: Preload,
+    body_count: u32,
+    // Number of contacts that take part, and where their rows begin in `colors`.
+    contact_count: u32, order: u32,
+    written_count: u32,
+    // 1 if a patch follows the points of every contact; 1 if the host sent all points.
+    patches: u32, has_points: u32,
+}
+
+// A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.
+struct Written { row: u32, points_before: u32 }

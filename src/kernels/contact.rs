@@ -1,4 +1,4 @@
-//! What happens at one manifold. Doubles of `shaders/lib/contact.wgsl`, `shaders/lib/sweep.wgsl` and of the kernels
+//! What happens at one manifold. Doubles of `shaders/lib/contact.wgsl` and of the kernels
 //! `clear_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
 //! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share

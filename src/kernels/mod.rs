@@ -2,7 +2,7 @@
 //!
 //! `pair`, `contact`, `friction` and `joint` are the doubles of the parts of that name in `shaders/lib` and of the kernels
 //! that sweep constraints, `integrate` of those that go over bodies, `momentum` of those between accelerated sweeps. Branches on data are `select`s; branches on rules are
-//! plain `if`s, as overrides are in WGSL.
+//! plain `if`s, here and in WGSL.
 
 pub mod contact;
 pub mod friction;
@@ -20,7 +20,7 @@ pub use state::Rows;
 
 use crate::config::FrictionRule;
 
-/// The rules of one kernel: the overrides of the shaders.
+/// The rules of one kernel. Twin: the struct `Rules` of `shaders/lib/rules.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rules {
     /// Whether overlap and gaps are removed.

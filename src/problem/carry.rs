@@ -59,7 +59,7 @@ const LARGEST_PRELOAD: f32 = 2.0;
 
 /// How much a contact is preloaded that was so by `before`, when its points of `mass` together were `pressed` by their normal
 /// impulses: a contact of two bodies that can move, or of one that cannot with one that can. Double of the function of the same
-/// name in `shaders/begin_contacts.wgsl`.
+/// name in `shaders/resident/begin_contacts.wgsl`.
 ///
 /// At rest its springs are compressed by what it bears: the overlap of a soft contact, springs side by side. That much its
 /// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are

@@ -149,7 +149,7 @@ impl Writer<'_> {
     }
 
     /// Brings the impulses of a slot to the points that its manifold has now, and to its tangents. Double of the function of the same
-    /// name in `shaders/carry/write_contacts.wgsl`.
+    /// name in `shaders/resident/write_contacts.wgsl`.
     fn bring_impulses(
         &self,
         write: Write,

@@ -1,10 +1,10 @@
-//! Which adapters there are, and which one is taken.
+//! The adapters of this machine, and the choice of one.
 
 use std::fmt;
 
 use crate::error::{Error, Result};
 
-/// What a person needs to know of an adapter.
+/// An adapter, as reports name it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSummary {
     /// Its own name.
@@ -15,7 +15,7 @@ pub struct AdapterSummary {
     pub driver: String,
     /// Discrete, integrated, virtual, or software running on the processor.
     pub kind: &'static str,
-    /// Whether it runs on hardware of its own.
+    /// Whether the adapter is hardware.
     pub hardware: bool,
     /// Whether it takes SPIR-V, so that exact mode works.
     pub exact: bool,
@@ -41,7 +41,7 @@ pub enum AdapterChoice {
     Hardware,
 }
 
-/// What to tell a person who has no adapter.
+/// Advice where no adapter is found.
 const INSTALL: &str = "install a graphics driver, or the software one: `apt-get install mesa-vulkan-drivers` on Debian and Ubuntu, \
     `dnf install mesa-vulkan-drivers` on Fedora, `pacman -S vulkan-swrast` on Arch";
 
@@ -70,9 +70,19 @@ pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSumma
     if all.is_empty() { Err(nothing()) } else { Ok(all.swap_remove(0)) }
 }
 
+/// Opens the adapter that `choice` finds, for drawing.
+///
+/// # Errors
+/// No such adapter, or it cannot be opened.
+pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+    let (adapter, summary) = find(choice)?;
+    let (device, queue) = open(&adapter, false)?;
+    Ok((device, queue, summary))
+}
+
 fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
     let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
-    // No driver is even loaded.
+    // `none` loads no driver.
     if wanted == "none" {
         return Vec::new();
     }
@@ -168,7 +178,7 @@ pub(super) fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device
         label: Some("drystone"),
         required_features: if exact { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
             | adapter.features() & super::timer::FEATURES,
-        // What WebGPU promises everywhere, with buffers as large as they come.
+        // The limits of every WebGPU implementation, with buffers as large as the adapter allows.
         required_limits: wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,

@@ -1,9 +1,9 @@
-//! The buffers of a device: one for each binding, grown when rows need it, and what of their content is known here.
+//! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
 
-use super::shader::{BINDINGS, CARRY_BINDINGS};
+use super::bindings::Binding;
 use crate::error::{Error, Result};
 
-/// Bytes that are compared, and sent, together.
+/// Bytes that are compared and sent together.
 const BLOCK: usize = 1024;
 
 /// The buffers of a device.
@@ -14,7 +14,7 @@ pub(super) struct Buffers {
     /// Largest buffer that a kernel can be given (B).
     limit: u64,
     slots: Vec<Slot>,
-    /// Grows whenever a binding has another buffer, so that bind groups are no longer valid.
+    /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
     pub generation: u64,
     sent: u64,
 }
@@ -22,36 +22,36 @@ pub(super) struct Buffers {
 #[derive(Default)]
 struct Slot {
     buffer: Option<wgpu::Buffer>,
-    /// What the buffer begins with, as far as that is known.
+    /// The first bytes of the buffer, as far as the host knows them.
     known: Vec<u8>,
 }
 
 impl Buffers {
     pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String) -> Self {
-        let slots = (0..BINDINGS.len() + CARRY_BINDINGS.len()).map(|_| Slot::default()).collect();
+        let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
     }
 
     /// The buffer of a binding.
-    pub fn get(&self, binding: u32) -> &wgpu::Buffer {
+    pub fn get(&self, binding: Binding) -> &wgpu::Buffer {
         self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
     }
 
     /// Refuses rows that no buffer holds.
-    pub fn check(&self, binding: u32, bytes: usize) -> Result<()> {
+    pub fn check(&self, binding: Binding, bytes: usize) -> Result<()> {
         if bytes as u64 <= self.limit {
             return Ok(());
         }
-        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, name(binding));
+        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, binding.name());
         Err(Error::TooLarge(format!(
             "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
         )))
     }
 
-    /// Makes room for `size` bytes; what the buffer held may be lost.
-    pub fn reserve(&mut self, binding: u32, size: usize) {
+    /// Makes room for `size` bytes; the content may be lost.
+    pub fn reserve(&mut self, binding: Binding, size: usize) {
         let size = size as u64;
         let slot = &mut self.slots[binding as usize];
         if slot.buffer.as_ref().is_some_and(|b| b.size() >= size.max(16)) {
@@ -59,7 +59,7 @@ impl Buffers {
         }
         slot.known.clear();
         slot.buffer = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name(binding)),
+            label: Some(binding.name()),
             size: size_of_buffer(size, self.limit),
             usage: wgpu::BufferUsages::UNIFORM
                 | wgpu::BufferUsages::STORAGE
@@ -71,7 +71,7 @@ impl Buffers {
     }
 
     /// Makes room for `size` bytes; the first `kept` bytes stay.
-    pub fn grow(&mut self, binding: u32, kept: usize, size: usize) {
+    pub fn grow(&mut self, binding: Binding, kept: usize, size: usize) {
         let before = self.slots[binding as usize].buffer.clone();
         self.reserve(binding, size);
         if let Some(before) = before.filter(|b| b != self.get(binding)) {
@@ -82,7 +82,7 @@ impl Buffers {
     }
 
     /// Sends rows that begin at the byte `at`.
-    pub fn write(&mut self, binding: u32, at: usize, bytes: &[u8]) {
+    pub fn write(&mut self, binding: Binding, at: usize, bytes: &[u8]) {
         self.queue.write_buffer(self.get(binding), at as u64, bytes);
         self.sent += bytes.len() as u64;
     }
@@ -93,15 +93,15 @@ impl Buffers {
     }
 
     /// Sends all rows of a binding.
-    pub fn send(&mut self, binding: u32, bytes: &[u8]) {
+    pub fn send(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
         if !bytes.is_empty() {
             self.write(binding, 0, bytes);
         }
     }
 
-    /// Sends those rows of a binding that the device does not have yet.
-    pub fn update(&mut self, binding: u32, bytes: &[u8]) {
+    /// Sends the rows of a binding that the device does not have yet.
+    pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
         let mut known = std::mem::take(&mut self.slots[binding as usize].known);
         let same = |at: usize| {
@@ -127,8 +127,8 @@ impl Buffers {
         self.slots[binding as usize].known = known;
     }
 
-    /// Notes what a buffer holds: nothing that is known, if `bytes` are none.
-    pub fn note(&mut self, binding: u32, bytes: &[u8]) {
+    /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.
+    pub fn note(&mut self, binding: Binding, bytes: &[u8]) {
         let known = &mut self.slots[binding as usize].known;
         known.clear();
         known.extend_from_slice(bytes);
@@ -136,14 +136,9 @@ impl Buffers {
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at
-/// most the limit; below that it is half as much again as is wanted, so that a growing pile does not mean a new buffer every step.
+/// most the limit. Below the limit it is 1.5 times the wanted size, so that a growing pile does not need a new buffer every step.
 pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
     (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)
-}
-
-fn name(binding: u32) -> &'static str {
-    let binding = binding as usize;
-    BINDINGS.get(binding).copied().unwrap_or_else(|| CARRY_BINDINGS[binding - BINDINGS.len()])
 }
 
 #[cfg(test)]
@@ -170,7 +165,7 @@ mod tests {
     fn a_buffer_has_room_to_grow_by_half_up_to_the_limit() {
         assert_eq!(size_of_buffer(1 << 20, 1 << 31), 3 << 19);
         assert_eq!(size_of_buffer(3_000_000, 4_000_000), 4_000_000);
-        // Bindings of nothing are bound too.
+        // A buffer without rows is bound too.
         assert!(size_of_buffer(0, 1 << 20) >= 16);
     }
 }

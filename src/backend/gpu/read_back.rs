@@ -1,17 +1,18 @@
 //! From the buffers of a device to memory, through one buffer that both can reach.
 
+use super::bindings::Binding;
 use super::buffers::{Buffers, size_of_buffer};
 
 /// A buffer that the device writes and the processor reads.
 ///
-/// One is enough: every read-back is waited for before the next submission, since the next step begins with the poses.
+/// One buffer is enough: the host waits for every read-back before the next submission.
 pub(super) struct ReadBack {
     device: wgpu::Device,
     queue: wgpu::Queue,
     staging: Option<wgpu::Buffer>,
 }
 
-/// Why nothing could be read.
+/// The reason why a read-back failed.
 pub(super) type Lost = Box<dyn std::fmt::Display>;
 
 impl ReadBack {
@@ -19,17 +20,17 @@ impl ReadBack {
         Self { device, queue, staging: None }
     }
 
-    /// Submits what is encoded, with copies of the `wanted` bindings and of `more` bytes of another buffer at its end, waits, and
-    /// writes what was copied to `wanted`; returns the rest as numbers.
+    /// Submits the encoder with copies of the `wanted` bindings, and of the first bytes of another buffer `more`. Waits, writes the
+    /// copies to `wanted`, and returns those of `more` as numbers.
     pub fn submit(
         &mut self,
         mut encoder: wgpu::CommandEncoder,
         buffers: &Buffers,
-        wanted: &mut [(u32, &mut [u8])],
+        wanted: &mut [(Binding, &mut [u8])],
         more: Option<(&wgpu::Buffer, u64)>,
     ) -> Result<Vec<u64>, Lost> {
         let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
-        // What is copied into numbers begins where they may.
+        // The numbers are aligned to 8 bytes.
         let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
         if self.staging.as_ref().is_none_or(|b| b.size() < size) {
             self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {

@@ -1,14 +1,16 @@
-//! How long each program takes, by the device's own clock, where it has one that can be asked inside a pass.
+//! The time of each program by the clock of the device, where the device can write timestamps inside a pass; and the bandwidth of
+//! copies.
 //!
-//! Only when asked for: the software adapter ends what it is doing at every timestamp, and a step of a tower of ten took 2.6
-//! times as long with them.
+//! A backend has a timer only on request: the software adapter ends its work at every timestamp, and a step of a tower of ten took
+//! 2.6 times as long with them.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use super::shader::Program;
+use super::wgsl::Program;
+use crate::error::{Error, Result};
 use crate::stats::KernelTime;
 
-/// What the adapter must have for it.
+/// The features of the adapter that a timer needs.
 pub(super) const FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 
@@ -63,7 +65,7 @@ impl Timer {
         pass.write_timestamp(&self.queries, self.runs.len() as u32);
     }
 
-    /// Brings the times to a buffer that can be copied from; gives it, and how many bytes of it there are.
+    /// Writes the times to a buffer that can be copied from. Returns the buffer and the number of its bytes.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) -> Option<(&wgpu::Buffer, u64)> {
         if self.runs.is_empty() {
             return None;
@@ -73,7 +75,7 @@ impl Timer {
         Some((&self.resolved, u64::from(count) * wgpu::QUERY_SIZE as u64))
     }
 
-    /// Time of each program, in the order in which they first ran, from what was read back.
+    /// Time of each program from the ticks that were read back, in the order of the first runs.
     pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
         let mut times: Vec<KernelTime> = Vec::new();
         for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)) {
@@ -86,4 +88,35 @@ impl Timer {
         }
         times
     }
+}
+
+/// Bytes a second that the device reads and writes when it copies a large buffer: the limit of every sweep.
+///
+/// # Errors
+/// The device is lost.
+pub(super) fn copy_bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64> {
+    // Larger than caches are, where the adapter has such buffers.
+    let size = device.limits().max_storage_buffer_binding_size.min(256 << 20);
+    let buffer = || {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("bandwidth"),
+            size,
+            usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let (from, to) = (buffer(), buffer());
+    let seconds = |copies: u32| -> Result<f64> {
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
+        let start = Instant::now();
+        queue.submit([encoder.finish()]);
+        let lost = |e| Error::Adapter(format!("the device was lost: {e}"));
+        device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+        Ok(start.elapsed().as_secs_f64())
+    };
+    // The first copy touches the memory. The difference leaves out what a submission costs.
+    seconds(1)?;
+    let (few, many) = (seconds(2)?, seconds(10)?);
+    Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))
 }

@@ -1,16 +1,16 @@
-// begin_contacts: one thread lets one manifold begin a step: how far its points are apart now, and its preload, which follows
-// from the impulses that it carries. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
+// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the
+// impulses of the step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
 // Doubles: Writer::write_slot in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
 
 fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
-    let compliance = select(carry.preload.fixed_compliance, carry.preload.movable_compliance, both_movable);
+    let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
     let sag = pressed * compliance * reciprocal(mass);
-    // What is borne no more is not held up either.
-    return smaller(before + carry.preload.share * (sag - before), 2.0 * sag);
+    // A contact that bears less has less preload at once.
+    return smaller(before + resident.preload.share * (sag - before), 2.0 * sag);
 }
 
 fn begin_contact(at: u32) {
-    let i = colors[carry.order + at];
+    let i = colors[resident.order + at];
     let contact = contacts[i];
     let end = contact.first_point + contact.point_count;
     let both_movable = masses[contact.body_a].inv_mass > 0.0 && masses[contact.body_b].inv_mass > 0.0;
@@ -24,16 +24,11 @@ fn begin_contact(at: u32) {
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
     }
-    for (var k = contact.first_point; k < end + carry.patches; k++) {
-        if carry.preload.warm_start == 1u {
+    for (var k = contact.first_point; k < end + resident.patches; k++) {
+        if resident.preload.warm_start == 1u {
             impulses[k].peak = 0.0;
         } else {
             impulses[k] = Impulse(0.0, 0.0, 0.0, 0.0);
         }
     }
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn begin_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var at = id.x; at < carry.contact_count; at += groups.x * WORKGROUP) { begin_contact(at); }
 }

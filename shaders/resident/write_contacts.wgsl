@@ -1,4 +1,5 @@
-// write_contacts: one thread writes the rows of one manifold again, and brings its impulses to the points and tangents that it has now.
+// write_contacts: one thread writes the rows of one manifold that the host computed anew, and moves its impulses to the new points
+// and tangents.
 // Reads written, written_contacts, written_points. Writes contacts, points, impulses; one thread a manifold.
 // Doubles: Writer::bring_impulses and retangented in src/problem/contacts.rs.
 
@@ -18,25 +19,20 @@ fn write_contact(i: u32) {
     now.preload = select(before.preload, 0.0, is_new);
     contacts[row] = now;
     let first = now.first_point;
-    let stride = MAX_POINTS + carry.patches;
-    if carry.has_points == 0u {
-        for (var k = 0u; k < now.point_count + carry.patches; k++) { points[first + k] = written_points[i * stride + k]; }
+    let stride = MAX_POINTS + resident.patches;
+    if resident.has_points == 0u {
+        for (var k = 0u; k < now.point_count + resident.patches; k++) { points[first + k] = written_points[i * stride + k]; }
     }
     let nothing = Impulse(0.0, 0.0, 0.0, 0.0);
     var old = array(nothing, nothing, nothing, nothing);
     var patch_impulse = nothing;
     if !is_new {
         for (var k = 0u; k < before.point_count; k++) { old[k] = retangented(before, now, impulses[first + k]); }
-        if carry.patches == 1u { patch_impulse = retangented(before, now, impulses[first + before.point_count]); }
+        if resident.patches == 1u { patch_impulse = retangented(before, now, impulses[first + before.point_count]); }
     }
     for (var k = 0u; k < now.point_count; k++) {
         let at = (points_before >> (8u * k)) & 0xffu;
         if at < MAX_POINTS { impulses[first + k] = old[at]; } else { impulses[first + k] = nothing; }
     }
-    if carry.patches == 1u { impulses[first + now.point_count] = patch_impulse; }
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn write_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var i = id.x; i < carry.written_count; i += groups.x * WORKGROUP) { write_contact(i); }
+    if resident.patches == 1u { impulses[first + now.point_count] = patch_impulse; }
 }

@@ -1,15 +1,17 @@
-//! Programs as pipelines, compiled when they are first asked for.
+//! The pipelines of programs, compiled when a plan first asks for them.
 
 use std::collections::HashMap;
 
+use super::bindings::Binding;
 use super::buffers::Buffers;
-use super::exact;
-use super::shader::{self, PASS_COLORS, Program};
+use super::reflect::Reflected;
+use super::spirv_exact;
+use super::wgsl::{ENTRY_POINT, Program};
 use crate::error::Result;
 use crate::problem::PassColors;
 
 /// The pipelines of a device.
-pub(super) struct Programs {
+pub(super) struct Pipelines {
     device: wgpu::Device,
     exact: bool,
     compiled: HashMap<Program, Compiled>,
@@ -19,31 +21,31 @@ pub(super) struct Programs {
 pub(super) struct Compiled {
     pub pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    /// Bindings that it uses, ascending.
-    bindings: Vec<u32>,
+    /// Bindings that it uses, in the order of their numbers.
+    bindings: Vec<Binding>,
     pub bind_group: wgpu::BindGroup,
-    /// Of the buffers in the bind group.
+    /// Generation of the buffers in the bind group.
     generation: u64,
 }
 
 impl Compiled {
-    /// Whether it goes over colors, whose range stands at a dynamic offset.
+    /// Whether it goes over colors, whose range stands at an offset of its own for each dispatch.
     pub fn has_colors(&self) -> bool {
-        self.bindings.contains(&PASS_COLORS)
+        self.bindings.contains(&Binding::PassColors)
     }
 }
 
-impl Programs {
+impl Pipelines {
     pub fn new(device: wgpu::Device, exact: bool) -> Self {
         Self { device, exact, compiled: HashMap::new() }
     }
 
-    /// One that was prepared.
+    /// A prepared pipeline.
     pub fn get(&self, program: &Program) -> &Compiled {
         &self.compiled[program]
     }
 
-    /// Compiles a program if it is not yet, and binds it to the buffers that there are.
+    /// Compiles a program once, and binds it to the present buffers.
     pub fn prepare(&mut self, program: &Program, buffers: &Buffers) -> Result<()> {
         if let Some(compiled) = self.compiled.get_mut(program) {
             if compiled.generation != buffers.generation {
@@ -52,11 +54,11 @@ impl Programs {
             }
             return Ok(());
         }
-        let (name, source, constants) = (program.name(), program.source(), program.constants());
-        let reflected = shader::Reflected::new(&source, name, &constants)?;
-        let layout = shader::layout(&self.device, &reflected);
+        let (name, source) = (program.name(), program.source());
+        let reflected = Reflected::new(name, &source)?;
+        let layout = layout(&self.device, &reflected);
         let module = if self.exact {
-            exact::shader_module(&self.device, &reflected)?
+            spirv_exact::shader_module(&self.device, &reflected)?
         } else {
             self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
@@ -72,12 +74,8 @@ impl Programs {
             label: Some(name),
             layout: Some(&pipeline_layout),
             module: &module,
-            entry_point: Some(name),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                // In exact mode they are part of the SPIR-V already.
-                constants: if self.exact { &[] } else { &constants },
-                ..Default::default()
-            },
+            entry_point: Some(ENTRY_POINT),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
         let bindings = reflected.bindings;
@@ -88,11 +86,35 @@ impl Programs {
     }
 }
 
-fn bind(device: &wgpu::Device, buffers: &Buffers, layout: &wgpu::BindGroupLayout, bindings: &[u32]) -> wgpu::BindGroup {
-    let entry = |&binding: &u32| {
-        let size = (binding == PASS_COLORS).then(|| wgpu::BufferSize::new(size_of::<PassColors>() as u64)).flatten();
+fn layout(device: &wgpu::Device, reflected: &Reflected) -> wgpu::BindGroupLayout {
+    let entry = |&binding: &Binding| {
+        let ty = match reflected.space(binding) {
+            naga::AddressSpace::Storage { access } => {
+                wgpu::BufferBindingType::Storage { read_only: !access.contains(naga::StorageAccess::STORE) }
+            }
+            _ => wgpu::BufferBindingType::Uniform,
+        };
+        wgpu::BindGroupLayoutEntry {
+            binding: binding as u32,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: binding.has_offset(), min_binding_size: None },
+            count: None,
+        }
+    };
+    let entries: Vec<_> = reflected.bindings.iter().map(entry).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+fn bind(
+    device: &wgpu::Device,
+    buffers: &Buffers,
+    layout: &wgpu::BindGroupLayout,
+    bindings: &[Binding],
+) -> wgpu::BindGroup {
+    let entry = |&binding: &Binding| {
+        let size = binding.has_offset().then(|| wgpu::BufferSize::new(size_of::<PassColors>() as u64)).flatten();
         let buffer = wgpu::BufferBinding { buffer: buffers.get(binding), offset: 0, size };
-        wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Buffer(buffer) }
+        wgpu::BindGroupEntry { binding: binding as u32, resource: wgpu::BindingResource::Buffer(buffer) }
     };
     let entries: Vec<_> = bindings.iter().map(entry).collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })

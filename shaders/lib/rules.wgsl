@@ -1,0 +1,20 @@
+// The rules of a kernel, which every call gives as a constant. Twin: Rules in src/kernels/mod.rs; rules_text in src/backend/gpu/wgsl.rs
+// writes the fields in this order.
+
+struct Rules {
+    biased: bool,
+    friction: u32,
+    // Friction acts at the patch of a manifold instead of at its points.
+    at_patch: bool,
+    friction_first: bool,
+    accumulated: bool,
+    round: bool,
+    passes: u32,
+    driven: bool,
+    measured: bool,
+}
+
+const FRICTION_NONE: u32 = 0u;
+const FRICTION_SLIP: u32 = 1u;
+const FRICTION_BOX: u32 = 2u;
+const FRICTION_DISC: u32 = 3u;

@@ -1,0 +1,116 @@
+//! The buffers that shaders see, in one table: the declarations in WGSL, the layouts of pipelines and the numbers come from it.
+
+/// How programs use a buffer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Access {
+    /// All threads read the same few numbers.
+    Uniform,
+    /// Each dispatch reads the numbers at an offset of its own.
+    UniformAtOffset,
+    /// No program writes the rows.
+    Read,
+    /// Kernels of plans read the rows; the programs that begin a step on the device write them.
+    ReadByPlans,
+    /// Every program may write the rows.
+    Write,
+}
+
+macro_rules! bindings {
+    ($($(#[$doc:meta])* $binding:ident $name:literal: $wgsl:literal, $access:ident;)*) => {
+        /// A buffer that shaders see. Its number in a shader is its place in this list.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[repr(u32)]
+        pub enum Binding {
+            $($(#[$doc])* $binding),*
+        }
+
+        impl Binding {
+            /// All of them, in the order of their numbers.
+            pub const ALL: &[Self] = &[$(Self::$binding),*];
+
+            /// Name, WGSL type and access.
+            fn declared(self) -> (&'static str, &'static str, Access) {
+                match self {
+                    $(Self::$binding => ($name, $wgsl, Access::$access)),*
+                }
+            }
+        }
+    };
+}
+
+bindings! {
+    /// Numbers that are the same for all rows.
+    Params "params": "Params", Uniform;
+    /// The colors that a pass goes over.
+    PassColors "pass_colors": "PassColors", UniformAtOffset;
+    /// Velocities and movements of the bodies; read back.
+    Bodies "bodies": "array<Body>", Write;
+    /// Masses of the bodies.
+    Masses "masses": "array<Mass>", Read;
+    /// Principal inertia of the bodies that have unequal moments.
+    Inertias "inertias": "array<Inertia>", Read;
+    /// Manifolds.
+    Contacts "contacts": "array<Contact>", ReadByPlans;
+    /// Points of the manifolds.
+    Points "points": "array<Point>", ReadByPlans;
+    /// Impulses of the points; read back when the simulation asks.
+    Impulses "impulses": "array<Impulse>", Write;
+    /// Where colors begin, and the rows in them.
+    Colors "colors": "array<u32>", Read;
+    /// Joints.
+    Joints "joints": "array<Joint>", Read;
+    /// Impulses of the joints; read back.
+    JointImpulses "joint_impulses": "array<JointImpulse>", Write;
+    /// Whether the sweeps still move anything; read back.
+    Convergence "convergence": "Convergence", Write;
+    /// How far accelerated sweeps extrapolate; read back.
+    Momentum "momentum": "Momentum", Write;
+    /// Velocities without the impulses of the substep. This buffer and the next three stay on the device: every step writes them
+    /// before it reads them.
+    Free "free": "array<Free>", Write;
+    /// Velocities before the last accelerated sweep.
+    VelocitiesBefore "velocities_before": "array<Free>", Write;
+    /// Impulses before the last accelerated sweep, and where the sweep began.
+    ImpulseSteps "impulse_steps": "array<Step>", Write;
+    /// Sums over the steps of impulses.
+    Lengths "lengths": "array<vec2f>", Write;
+    /// Numbers of the programs that begin a step on the device.
+    Resident "resident": "ResidentParams", Uniform;
+    /// Contacts whose rows the host computed anew.
+    Written "written": "array<Written>", Read;
+    /// The rows of these contacts.
+    WrittenContacts "written_contacts": "array<Contact>", Read;
+    /// The points of these contacts.
+    WrittenPoints "written_points": "array<Point>", Read;
+    /// Separations of the points when the step begins.
+    Separations "separations": "array<f32>", Read;
+    /// The passes of a plan that one dispatch follows.
+    Passes "passes": "array<vec4u, PASS_ROWS>", Uniform;
+}
+
+impl Binding {
+    /// Its name in shaders and in messages.
+    pub fn name(self) -> &'static str {
+        self.declared().0
+    }
+
+    /// Whether each dispatch reads at an offset of its own.
+    pub(super) fn has_offset(self) -> bool {
+        self.declared().2 == Access::UniformAtOffset
+    }
+}
+
+/// The declarations of all buffers, for a kernel of a plan or for a program that begins a step.
+pub(super) fn declarations(of_plan: bool) -> String {
+    let declaration = |&binding: &Binding| {
+        let (name, wgsl, access) = binding.declared();
+        let space = match access {
+            Access::Uniform | Access::UniformAtOffset => "uniform",
+            Access::Read => "storage, read",
+            Access::ReadByPlans if of_plan => "storage, read",
+            Access::ReadByPlans | Access::Write => "storage, read_write",
+        };
+        format!("@group(0) @binding({}) var<{space}> {name}: {wgsl};\n", binding as u32)
+    };
+    Binding::ALL.iter().map(declaration).collect()
+}

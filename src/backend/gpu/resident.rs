@@ -1,0 +1,130 @@
+//! Rows that stay on the device: from those of one step to those of the next.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::bindings::Binding;
+use super::buffers::Buffers;
+use super::dispatch::Dispatch;
+use super::wgsl::Program;
+use crate::collide::MAX_POINTS;
+use crate::error::{Error, Result};
+use crate::problem::carry::{Carry, NO_POINT, Preload};
+use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
+
+// The shader writes no impulse to a point whose number before is `MAX_POINTS` or more.
+const _: () = assert!(NO_POINT as usize == MAX_POINTS);
+
+/// The rows that a step left on the device.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ResidentRows {
+    contacts: usize,
+    points: usize,
+    /// Whether the problem on the host has the same impulses and preloads.
+    pub fetched: bool,
+}
+
+impl ResidentRows {
+    /// Those of a problem that just ran.
+    pub fn of(problem: &StepProblem) -> Self {
+        Self { contacts: problem.contacts.len(), points: problem.points.len(), fetched: false }
+    }
+}
+
+/// Parameters of the programs that begin a step, 48 B. Twin of the WGSL struct of this name.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ResidentParams {
+    /// What preloads follow from.
+    pub preload: Preload,
+    /// Number of bodies.
+    pub body_count: u32,
+    /// Number of contacts that take part.
+    pub contact_count: u32,
+    /// Where their rows begin in the buffer of the colors.
+    pub order: u32,
+    /// Number of contacts whose rows the host computed anew.
+    pub written_count: u32,
+    /// 1 if a patch follows the points of every contact.
+    pub patches: u32,
+    /// 1 if the host sent all points.
+    pub has_points: u32,
+    #[doc(hidden)]
+    pub pad: [u32; 2],
+}
+
+/// Sends what changed since the step before, and returns the programs that bring its rows to those of `problem`. `separations` is
+/// memory that every step uses again.
+pub(super) fn begin(
+    buffers: &mut Buffers,
+    problem: &StepProblem,
+    carry: &Carry,
+    before: ResidentRows,
+    separations: &mut Vec<f32>,
+) -> Result<Vec<Dispatch>> {
+    let swept = problem.rows_of(&problem.contact_colors());
+    let params = ResidentParams {
+        preload: carry.preload,
+        body_count: problem.bodies.len() as u32,
+        contact_count: swept.len() as u32,
+        order: problem.colors.len() as u32,
+        written_count: carry.written.len() as u32,
+        patches: problem.has_patches().into(),
+        has_points: carry.approach.into(),
+        ..ResidentParams::default()
+    };
+    buffers.update(Binding::Resident, bytemuck::bytes_of(&params));
+    let mut programs = vec![Dispatch::over(Program::BeginBodies, problem.bodies.len())];
+    if problem.contacts.is_empty() {
+        return Ok(programs);
+    }
+    let kept: [(Binding, usize, usize); 3] = [
+        (Binding::Contacts, before.contacts * size_of::<ContactRow>(), size_of_val(&problem.contacts[..])),
+        (Binding::Points, before.points * size_of::<PointRow>(), size_of_val(&problem.points[..])),
+        (Binding::Impulses, before.points * size_of::<ImpulseRow>(), size_of_val(&problem.impulses[..])),
+    ];
+    for (binding, kept, size) in kept {
+        buffers.grow(binding, kept, size);
+    }
+    if !carry.written.is_empty() {
+        send_written(buffers, problem, carry)?;
+        programs.push(Dispatch::over(Program::WriteContacts, carry.written.len()));
+    }
+    if carry.approach {
+        buffers.send(Binding::Points, bytemuck::cast_slice(&problem.points));
+    }
+    separations.clear();
+    for &row in swept {
+        let first = problem.contacts[row as usize].first_point as usize;
+        separations.extend(problem.points[first..first + MAX_POINTS].iter().map(|point| point.separation));
+    }
+    buffers.send(Binding::Separations, bytemuck::cast_slice(separations));
+    programs.push(Dispatch::over(Program::BeginContacts, swept.len()));
+    Ok(programs)
+}
+
+/// Sends the rows that the host computed anew.
+fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> Result<()> {
+    if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
+        return Err(Error::input("carry: names contacts that are not there"));
+    }
+    let stride = MAX_POINTS + usize::from(problem.has_patches());
+    let (mut contacts, mut points) = (Vec::new(), Vec::new());
+    for written in &carry.written {
+        let contact = problem.contacts[written.row as usize];
+        let first = contact.first_point as usize;
+        contacts.push(contact);
+        points.extend_from_slice(&problem.points[first..first + stride]);
+    }
+    let rows: [(Binding, &[u8]); 3] = [
+        (Binding::Written, bytemuck::cast_slice(&carry.written)),
+        (Binding::WrittenContacts, bytemuck::cast_slice(&contacts)),
+        (Binding::WrittenPoints, bytemuck::cast_slice(&points)),
+    ];
+    for (binding, bytes) in rows {
+        buffers.check(binding, bytes.len())?;
+    }
+    for (binding, bytes) in rows {
+        buffers.send(binding, bytes);
+    }
+    Ok(())
+}

@@ -1,0 +1,227 @@
+//! The WGSL of every program: parts from files, declarations of buffers, and an entry point that calls the kernels.
+
+use std::fmt::Write;
+use std::sync::Arc;
+
+use super::bindings::declarations;
+use crate::collide::MAX_POINTS;
+use crate::config::FrictionRule;
+use crate::kernels::Rules;
+use crate::kernels::momentum::CHUNK;
+use crate::plan::Kernel;
+
+/// Threads of a workgroup.
+pub const WORKGROUP: u32 = 64;
+/// Rows of the uniform that holds the passes of one dispatch: 16 KiB, what every adapter offers.
+pub const PASS_ROWS: usize = 1024;
+/// Name of every entry point.
+pub const ENTRY_POINT: &str = "main";
+
+/// Reads a shader part at compile time.
+macro_rules! part {
+    ($name:literal) => {
+        include_str!(concat!("../../../shaders/", $name, ".wgsl"))
+    };
+}
+
+/// What a pipeline runs.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Program {
+    /// A kernel of a plan.
+    Pass(Kernel),
+    /// All kernels of a plan. One workgroup with this number of threads follows the passes.
+    OneDispatch(Arc<[Kernel]>, u32),
+    /// Sets the movements of all bodies to zero.
+    BeginBodies,
+    /// Writes the rows of contacts that the host computed anew.
+    WriteContacts,
+    /// Writes separations and preloads of all contacts.
+    BeginContacts,
+}
+
+impl Program {
+    /// The programs that begin a step from the rows on the device.
+    pub const RESIDENT: [Self; 3] = [Self::BeginBodies, Self::WriteContacts, Self::BeginContacts];
+
+    /// Its name in measurements and messages, and of a kernel the name of the file.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Pass(kernel) => kernel.name(),
+            Self::OneDispatch(..) => "one_dispatch",
+            Self::BeginBodies => "begin_bodies",
+            Self::WriteContacts => "write_contacts",
+            Self::BeginContacts => "begin_contacts",
+        }
+    }
+
+    /// Its WGSL.
+    pub fn source(&self) -> String {
+        match self {
+            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, "pass_colors", |calls| calls.concat()),
+            Self::OneDispatch(kernels, threads) => {
+                of_plan(kernels, *threads, "PassColors(step.y, step.z)", follow_passes)
+            }
+            Self::BeginBodies => of_begin(part!("resident/begin_bodies"), "begin_body", "body_count"),
+            Self::WriteContacts => of_begin(part!("resident/write_contacts"), "write_contact", "written_count"),
+            Self::BeginContacts => of_begin(part!("resident/begin_contacts"), "begin_contact", "contact_count"),
+        }
+    }
+}
+
+/// The rows that a kernel goes over.
+enum Over {
+    /// This number of rows.
+    Count(&'static str),
+    /// The rows of the colors of a pass.
+    Colors,
+    /// The rows that the kernel finds itself.
+    Own,
+}
+
+/// The files of a kernel, its rows, and the call of its function: for one `row`, or for all where the kernel finds its rows.
+fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
+    let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
+    match kernel {
+        Kernel::IntegrateVelocities { carry } => {
+            let call = format!("integrate_velocity({carry}, row)");
+            (&[part!("integrate_velocities")], Over::Count("params.body_count"), call)
+        }
+        Kernel::IntegrateGyroscopic => {
+            (&[part!("integrate_gyroscopic")], Over::Count("params.inertia_count"), "turn_spin(row)".into())
+        }
+        Kernel::IntegratePositions => {
+            (&[part!("integrate_positions")], Over::Count("params.body_count"), "integrate_position(row)".into())
+        }
+        Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
+        Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
+        Kernel::Extrapolate { first, measured } => {
+            (&[part!("extrapolate")], Over::Own, format!("extrapolate({first}, {measured}, first, stride)"))
+        }
+        Kernel::MeasureStep => {
+            (&[part!("lib/sum"), part!("measure_step")], Over::Own, "measure_step(thread, group.x, groups.x)".into())
+        }
+        Kernel::UpdateMomentum => {
+            (&[part!("lib/sum"), part!("update_momentum")], Over::Own, "update_momentum(thread)".into())
+        }
+        Kernel::WarmStartJoints => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")];
+            (parts, Over::Colors, "warm_start_joint(row)".into())
+        }
+        Kernel::SolveJoints(rules) => {
+            (&[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")], Over::Colors, with("solve_joint", rules))
+        }
+        Kernel::WarmStart(rules) => {
+            (&[part!("lib/pair"), part!("warm_start")], Over::Colors, with("warm_start_contact", rules))
+        }
+        Kernel::SolveContacts(rules) => {
+            let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
+            (parts, Over::Colors, with("solve_contact", rules))
+        }
+        Kernel::ApplyRestitution(_) => {
+            (&[part!("lib/pair"), part!("apply_restitution")], Over::Colors, "restitute_contact(row)".into())
+        }
+    }
+}
+
+/// A constant of the struct `Rules` of `lib/rules.wgsl`.
+fn rules_text(rules: Rules) -> String {
+    let Rules { biased, patch, friction_first, accumulated, round, passes, driven, measured, friction } = rules;
+    let friction = match friction {
+        FrictionRule::None => "NONE",
+        FrictionRule::Slip => "SLIP",
+        FrictionRule::Box => "BOX",
+        FrictionRule::Disc => "DISC",
+    };
+    format!(
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured})"
+    )
+}
+
+fn is_measured(kernel: &Kernel) -> bool {
+    matches!(kernel, Kernel::Extrapolate { measured: true, .. }) || kernel.rules().is_some_and(|rules| rules.measured)
+}
+
+/// The WGSL of some kernels. `colors` is the WGSL of the colors of a pass; `main` makes the body of the entry point of the calls.
+fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[String]) -> String) -> String {
+    // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections.
+    let is_measured = kernels.iter().any(is_measured);
+    let mut parts = vec![
+        part!("lib/types"),
+        part!("lib/math"),
+        part!("lib/rules"),
+        if is_measured { part!("lib/measured") } else { part!("lib/unmeasured") },
+    ];
+    let (mut calls, mut loops) = (Vec::new(), String::new());
+    for (at, &kernel) in kernels.iter().enumerate() {
+        let (own, over, call) = kernel_text(kernel);
+        for part in own {
+            if !parts.contains(part) {
+                parts.push(part);
+            }
+        }
+        calls.push(match over {
+            Over::Own => format!("{call};"),
+            Over::Count(count) => over_count(count, &call),
+            Over::Colors => {
+                let name = format!("over_colors_{at}");
+                loops += &part!("lib/over_colors").replace("over_colors", &name).replace("over_row(row)", &call);
+                format!("{name}({colors}, first, stride);")
+            }
+        });
+    }
+    text(true, threads, &parts, &loops, &main(&calls))
+}
+
+/// The WGSL of a program that begins a step: a function that is called for each of `count` rows.
+fn of_begin(own: &str, function: &str, count: &str) -> String {
+    let main = over_count(&format!("resident.{count}"), &format!("{function}(row)"));
+    text(false, WORKGROUP, &[part!("lib/types"), part!("lib/math"), own], "", &main)
+}
+
+fn over_count(count: &str, call: &str) -> String {
+    format!("for (var row = first; row < {count}; row += stride) {{ {call}; }}")
+}
+
+/// All threads follow the passes, with a barrier after each pass.
+fn follow_passes(calls: &[String]) -> String {
+    let mut cases = String::new();
+    for (at, call) in calls.iter().enumerate() {
+        writeln!(cases, "            case {at}u: {{ {call} }}").expect("memory takes it");
+    }
+    format!(
+        "for (var i = 1u; i <= passes[0].x; i++) {{
+        let step = passes[i];
+        switch step.x {{
+{cases}            default: {{}}
+        }}
+        storageBarrier();
+    }}"
+    )
+}
+
+/// A shader: constants, buffers, parts, and an entry point with the body `main`. In `main` the first row of a thread is `first`, and
+/// its rows are `stride` apart.
+fn text(of_plan: bool, threads: u32, parts: &[&str], loops: &str, main: &str) -> String {
+    let (buffers, parts) = (declarations(of_plan), parts.join("\n"));
+    format!(
+        "const WORKGROUP: u32 = {threads}u;
+const MAX_POINTS: u32 = {MAX_POINTS}u;
+const CHUNK: u32 = {CHUNK}u;
+const PASS_ROWS: u32 = {PASS_ROWS}u;
+
+{buffers}
+{parts}
+{loops}
+@compute @workgroup_size(WORKGROUP)
+fn {ENTRY_POINT}(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(num_workgroups) groups: vec3u,
+) {{
+    let first = group.x * WORKGROUP + thread;
+    let stride = groups.x * WORKGROUP;
+    {main}
+}}
+"
+    )
+}
