@@ -1,16 +1,17 @@
-//! The shaders as text, without a GPU: what naga finds in them is what the crate says of them.
+//! The shaders as naga reads them, without a GPU.
 
 mod common;
+#[path = "shaders/exact.rs"]
+mod exact;
+#[path = "shaders/layouts.rs"]
+mod layouts;
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::mem::offset_of;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use common::kernels::{every_kernel, every_rules};
 use drystone::config::FrictionRule;
-use drystone::stages::backend::shader::{
-    Binding, ENTRY_POINT, Program, Reflected, SCRATCH_ROW, WORKGROUP, exact_spirv,
-};
+use drystone::stages::backend::shader::{Binding, ENTRY_POINT, Program, Reflected, WORKGROUP};
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::Kernel;
 
@@ -32,123 +33,6 @@ fn every_program() -> Vec<Program> {
 fn storage_buffers(reflected: &Reflected) -> usize {
     let is_storage = |&&at: &&Binding| matches!(reflected.space(at), naga::AddressSpace::Storage { .. });
     reflected.bindings.iter().filter(is_storage).count()
-}
-
-mod layouts {
-    use super::*;
-    use drystone::stages::backend::shader::ResidentParams;
-    use drystone::stages::problem::carry::{Preload, Written};
-    use drystone::stages::problem::{
-        BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-        MomentumRow, Params, PassColors, PointRow, Softness,
-    };
-
-    const TYPES: &str = include_str!("../shaders/lib/types.wgsl");
-
-    /// Size of a struct, and offset of each of its fields.
-    #[derive(Debug, PartialEq)]
-    struct Layout {
-        size: usize,
-        fields: BTreeMap<String, usize>,
-    }
-
-    macro_rules! layouts {
-        ($($twin:ident = $row:ident { $($field:ident)* })*) => {
-            BTreeMap::from([$((
-                stringify!($twin).to_owned(),
-                Layout {
-                    size: size_of::<$row>(),
-                    fields: BTreeMap::from([$((stringify!($field).to_owned(), offset_of!($row, $field))),*]),
-                },
-            )),*])
-        };
-    }
-
-    /// Stays on the device: Rust knows only how long it is.
-    #[repr(C)]
-    struct Step {
-        before: [f32; 4],
-        begin: [f32; 4],
-    }
-    const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
-
-    /// The layout of each row, under the name of its twin.
-    fn in_rust() -> BTreeMap<String, Layout> {
-        layouts! {
-            Body = BodyRow { v w dp dq }
-            Free = FreeRow { v w }
-            Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
-            Inertia = InertiaRow { principal body inv_principal frame }
-            Contact = ContactRow {
-                normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
-                preload
-            }
-            Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
-            Joint = JointRow { r_a body_a r_b body_b gap }
-            JointImpulse = JointImpulseRow { linear }
-            Convergence = ConvergenceRow { moving done sweeps planned }
-            Step = Step { before begin }
-            Momentum = MomentumRow { t factor square restarts }
-            Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
-            Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
-            Params = Params {
-                substep inverse_substep restitution_threshold inertia_count movable fixed joint
-                body_count point_count slop relaxation tolerance joint_count patches
-            }
-            PassColors = PassColors { first end }
-            Preload = Preload { movable_compliance fixed_compliance share warm_start }
-            ResidentParams = ResidentParams {
-                preload body_count contact_count order written_count patches has_points
-            }
-            Written = Written { row points_before }
-        }
-    }
-
-    /// The layout of each struct of `types`.
-    fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
-        let module = parsed(types);
-        let structs = module.types.iter().filter_map(|(_, t)| match &t.inner {
-            naga::TypeInner::Struct { members, span } => Some((t.name.clone()?, members, *span)),
-            _ => None,
-        });
-        let field = |m: &naga::StructMember| (m.name.clone().expect("a field has a name"), m.offset as usize);
-        structs
-            .map(|(name, members, span)| {
-                (name, Layout { size: span as usize, fields: members.iter().map(field).collect() })
-            })
-            .collect()
-    }
-
-    /// Names of the structs whose two layouts differ. A uniform may be larger in Rust: it stands in no array.
-    fn differing(types: &str) -> Vec<String> {
-        let (ours, theirs) = (in_rust(), in_wgsl(types));
-        let names: BTreeSet<_> = ours.keys().chain(theirs.keys()).collect();
-        let agree = |name: &str| match (ours.get(name), theirs.get(name)) {
-            (Some(a), Some(b)) if name.ends_with("Params") => a.fields == b.fields && a.size >= b.size,
-            (a, b) => a == b,
-        };
-        names.into_iter().filter(|name| !agree(name)).cloned().collect()
-    }
-
-    #[test]
-    fn every_row_has_the_layout_of_its_twin() {
-        assert_eq!(differing(TYPES), [""; 0]);
-    }
-
-    #[test]
-    fn a_changed_twin_is_found() {
-        for (before, after, name) in [
-            ("v: vec3f, w: vec3f", "w: vec3f, v: vec3f", "Body"),
-            ("first_point: u32, point_count: u32", "point_count: u32, first_point: u32", "Contact"),
-            ("peak: f32 }", "peak: f32, more: f32 }", "Impulse"),
-            ("push_limit: f32", "limit: f32", "Softness"),
-            ("struct PassColors", "struct Colors", "Colors"),
-        ] {
-            let changed = TYPES.replace(before, after);
-            assert_ne!(changed, TYPES, "{before} is not in the text");
-            assert!(differing(&changed).iter().any(|n| n == name), "{after}");
-        }
-    }
 }
 
 /// Names of the files of a folder of shaders.
@@ -181,8 +65,7 @@ fn every_program_stays_inside_what_every_webgpu_offers() {
     }
 }
 
-/// A buffer that a program only reads may be in the cache of a texture unit; a program that writes where it declares reading is
-/// refused by naga.
+/// naga refuses a program that writes to a buffer which the program declares as read-only.
 #[test]
 fn plans_read_contacts_that_a_resident_program_writes() {
     let writes = |program: &Program, binding| match reflected(program).space(binding) {
@@ -324,165 +207,4 @@ fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
         (1.0 / factorial) as f32
     });
     assert_eq!(found, series.map(f32::to_bits).collect());
-}
-
-mod exact {
-    use super::*;
-
-    /// What may make a float, or a vector of floats: reading, moving, choosing, and + - * in a written order.
-    const EXACT: [u32; 14] = [
-        55,  // OpFunctionParameter
-        57,  // OpFunctionCall
-        61,  // OpLoad
-        79,  // OpVectorShuffle
-        80,  // OpCompositeConstruct
-        81,  // OpCompositeExtract
-        124, // OpBitcast
-        127, // OpFNegate
-        129, // OpFAdd
-        131, // OpFSub
-        133, // OpFMul
-        142, // OpVectorTimesScalar
-        169, // OpSelect
-        245, // OpPhi
-    ];
-    const ROUNDS: [u32; 5] = [127, 129, 131, 133, 142];
-    const TYPE_FLOAT: u32 = 22;
-    const TYPE_VECTOR: u32 = 23;
-    const FUNCTION: u32 = 54;
-    const DECORATE: u32 = 71;
-    const NO_CONTRACTION: u32 = 42;
-
-    fn instructions(words: &[u32]) -> Vec<(u32, &[u32])> {
-        let (mut rest, mut all) = (&words[5..], Vec::new());
-        while let Some(&first) = rest.first() {
-            let (instruction, after) = rest.split_at((first >> 16) as usize);
-            all.push((first & 0xffff, &instruction[1..]));
-            rest = after;
-        }
-        all
-    }
-
-    /// Opcodes that make floats in a way that is not exact, or that a driver may fuse.
-    fn inexact(words: &[u32]) -> BTreeSet<u32> {
-        let all = instructions(words);
-        let mut floats = BTreeSet::new();
-        for (opcode, operands) in &all {
-            if *opcode == TYPE_FLOAT || (*opcode == TYPE_VECTOR && floats.contains(&operands[1])) {
-                floats.insert(operands[0]);
-            }
-        }
-        let kept = |(opcode, operands): &(u32, &[u32])| {
-            (*opcode == DECORATE && operands[1] == NO_CONTRACTION).then(|| operands[0])
-        };
-        let kept: BTreeSet<_> = all.iter().filter_map(kept).collect();
-        // In functions the first operand of what has a result is its type, and no other instruction names a type there.
-        all.iter()
-            .skip_while(|(opcode, _)| *opcode != FUNCTION)
-            .filter(|(opcode, operands)| *opcode != FUNCTION && operands.first().is_some_and(|t| floats.contains(t)))
-            .filter(|(opcode, operands)| {
-                !EXACT.contains(opcode) || (ROUNDS.contains(opcode) && !kept.contains(&operands[1]))
-            })
-            .map(|(opcode, _)| *opcode)
-            .collect()
-    }
-
-    fn spirv(source: &str) -> Vec<u32> {
-        let reflected = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}"));
-        exact_spirv(&reflected).expect("naga writes SPIR-V")
-    }
-
-    #[test]
-    fn every_program_only_adds_and_multiplies_and_may_not_be_fused() {
-        for program in every_program() {
-            assert_eq!(inexact(&spirv(&program.source())), BTreeSet::new(), "{program:?}");
-        }
-    }
-
-    /// The words of a kernel that computes one expression of `x: array<f32>`.
-    fn one_expression(expression: &str) -> Vec<u32> {
-        let source = format!(
-            "@group(0) @binding(2) var<storage, read_write> x: array<f32>;
-            @compute @workgroup_size(64) fn main() {{ x[0] = {expression}; }}"
-        );
-        spirv(&source)
-    }
-
-    #[test]
-    fn what_a_driver_may_round_as_it_likes_is_found() {
-        for (expression, opcode) in [
-            ("x[1] / x[2]", 136),                         // OpFDiv
-            ("sqrt(x[1])", 12),                           // OpExtInst
-            ("fma(x[1], x[2], x[3])", 12),                // OpExtInst
-            ("max(x[1], x[2])", 12),                      // OpExtInst
-            ("x[1] % x[2]", 140),                         // OpFRem
-            ("f32(u32(x[1]))", 112),                      // OpConvertUToF
-            ("dot(vec2f(x[1], x[2]), vec2f(x[3]))", 148), // OpDot
-        ] {
-            let found = inexact(&one_expression(expression));
-            assert!(found.contains(&opcode), "{expression}: {found:?}");
-        }
-        assert_eq!(inexact(&one_expression("x[1] * x[2] + x[3]")), BTreeSet::new());
-    }
-
-    const CONSTANT: u32 = 43;
-    const EXTENDED: u32 = 12;
-    const ACCESS_CHAIN: u32 = 65;
-    const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
-    /// The number of UMin in GLSL.std.450.
-    const UMIN: u32 = 38;
-
-    /// How many indices that are no constants lead into memory, and how many of these are not the smaller of two numbers.
-    fn indices(words: &[u32]) -> (usize, usize) {
-        let all = instructions(words);
-        let results = |wanted: &dyn Fn(u32, &[u32]) -> bool| -> BTreeSet<u32> {
-            all.iter().filter(|(opcode, operands)| wanted(*opcode, operands)).map(|(_, operands)| operands[1]).collect()
-        };
-        let constants = results(&|opcode, _| opcode == CONSTANT);
-        let bounded = results(&|opcode, operands| opcode == EXTENDED && operands[3] == UMIN);
-        let chains = all.iter().filter(|(opcode, _)| [ACCESS_CHAIN, IN_BOUNDS_ACCESS_CHAIN].contains(opcode));
-        // Type, result and base come before the indices.
-        let computed = chains.flat_map(|(_, operands)| &operands[3..]).filter(|index| !constants.contains(index));
-        let (mut count, mut unbounded) = (0, 0);
-        for index in computed {
-            count += 1;
-            unbounded += usize::from(!bounded.contains(index));
-        }
-        (count, unbounded)
-    }
-
-    #[test]
-    fn no_index_leaves_its_buffer() {
-        let small_world: std::sync::Arc<[Kernel]> = [
-            Kernel::IntegrateVelocities { carry: false },
-            Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, round: true, ..Rules::default() }),
-            Kernel::IntegratePositions,
-        ]
-        .into();
-        for program in every_program().into_iter().chain([Program::OneDispatch(small_world, 16)]) {
-            let (count, unbounded) = indices(&spirv(&program.source()));
-            // One kernel reads no more than one row.
-            let has_rows = program.name() != "begin_sweep";
-            assert!(unbounded == 0 && (count > 0) == has_rows, "{program:?}: {unbounded} of {count} indices");
-        }
-    }
-
-    #[test]
-    fn an_index_without_a_bound_is_found() {
-        let source = "@group(0) @binding(2) var<storage, read_write> x: array<u32>;
-            @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) { x[x[id.x]] = 7u; }";
-        assert_eq!(indices(&spirv(source)), (2, 0));
-        let reflected = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}"));
-        let unchecked = naga::back::spv::write_vec(&reflected.module, &reflected.info, &Default::default(), None);
-        assert_eq!(indices(&unchecked.expect("naga writes SPIR-V")), (2, 2));
-    }
-
-    #[test]
-    fn a_result_without_its_decoration_is_found() {
-        let mut words = one_expression("x[1] * x[2] + x[3]");
-        let at = words.iter().position(|&w| w == (3 << 16 | DECORATE)).expect("a decoration");
-        assert_eq!(words[at + 2], NO_CONTRACTION);
-        words.drain(at..at + 3);
-        assert_eq!(inexact(&words).len(), 1);
-    }
 }

@@ -1,0 +1,119 @@
+//! The rows in memory and in WGSL have the same layout.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+
+use super::parsed;
+use drystone::stages::backend::shader::{ResidentParams, SCRATCH_ROW};
+use drystone::stages::problem::carry::{Preload, Written};
+use drystone::stages::problem::{
+    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+    MomentumRow, Params, PassColors, PointRow, Softness,
+};
+
+const TYPES: &str = include_str!("../../shaders/lib/types.wgsl");
+
+/// Size of a struct, and offset of each of its fields.
+#[derive(Debug, PartialEq)]
+struct Layout {
+    size: usize,
+    fields: BTreeMap<String, usize>,
+}
+
+macro_rules! layouts {
+    ($($twin:ident = $row:ident { $($field:ident)* })*) => {
+        BTreeMap::from([$((
+            stringify!($twin).to_owned(),
+            Layout {
+                size: size_of::<$row>(),
+                fields: BTreeMap::from([$((stringify!($field).to_owned(), offset_of!($row, $field))),*]),
+            },
+        )),*])
+    };
+}
+
+/// Stays on the device: Rust knows only how long it is.
+#[repr(C)]
+struct Step {
+    before: [f32; 4],
+    begin: [f32; 4],
+}
+const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
+
+/// The layout of each row, under the name of its twin.
+fn in_rust() -> BTreeMap<String, Layout> {
+    layouts! {
+        Body = BodyRow { v w dp dq }
+        Free = FreeRow { v w }
+        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
+        Inertia = InertiaRow { principal body inv_principal frame }
+        Contact = ContactRow {
+            normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
+            preload
+        }
+        Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
+        Joint = JointRow { r_a body_a r_b body_b gap }
+        JointImpulse = JointImpulseRow { linear }
+        Convergence = ConvergenceRow { moving done sweeps planned }
+        Step = Step { before begin }
+        Momentum = MomentumRow { t factor square restarts }
+        Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
+        Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
+        Params = Params {
+            substep inverse_substep restitution_threshold inertia_count movable fixed joint
+            body_count point_count slop relaxation tolerance joint_count patches
+        }
+        PassColors = PassColors { first end }
+        Preload = Preload { movable_compliance fixed_compliance share warm_start }
+        ResidentParams = ResidentParams {
+            preload body_count contact_count order written_count patches has_points
+        }
+        Written = Written { row points_before }
+    }
+}
+
+/// The layout of each struct of `types`.
+fn in_wgsl(types: &str) -> BTreeMap<String, Layout> {
+    let module = parsed(types);
+    let structs = module.types.iter().filter_map(|(_, t)| match &t.inner {
+        naga::TypeInner::Struct { members, span } => Some((t.name.clone()?, members, *span)),
+        _ => None,
+    });
+    let field = |m: &naga::StructMember| (m.name.clone().expect("a field has a name"), m.offset as usize);
+    structs
+        .map(|(name, members, span)| {
+            (name, Layout { size: span as usize, fields: members.iter().map(field).collect() })
+        })
+        .collect()
+}
+
+/// Names of the structs whose two layouts differ. A uniform may be larger in Rust: it stands in no array.
+fn differing(types: &str) -> Vec<String> {
+    let (ours, theirs) = (in_rust(), in_wgsl(types));
+    let names: BTreeSet<_> = ours.keys().chain(theirs.keys()).collect();
+    let agree = |name: &str| match (ours.get(name), theirs.get(name)) {
+        (Some(a), Some(b)) if name.ends_with("Params") => a.fields == b.fields && a.size >= b.size,
+        (a, b) => a == b,
+    };
+    names.into_iter().filter(|name| !agree(name)).cloned().collect()
+}
+
+#[test]
+fn every_row_has_the_layout_of_its_twin() {
+    assert_eq!(differing(TYPES), [""; 0]);
+}
+
+#[test]
+fn a_changed_twin_is_found() {
+    for (before, after, name) in [
+        ("v: vec3f, w: vec3f", "w: vec3f, v: vec3f", "Body"),
+        ("first_point: u32, point_count: u32", "point_count: u32, first_point: u32", "Contact"),
+        ("peak: f32 }", "peak: f32, more: f32 }", "Impulse"),
+        ("push_limit: f32", "limit: f32", "Softness"),
+        ("struct PassColors", "struct Colors", "Colors"),
+    ] {
+        let changed = TYPES.replace(before, after);
+        assert_ne!(changed, TYPES, "{before} is not in the text");
+        assert!(differing(&changed).iter().any(|n| n == name), "{after}");
+    }
+}
