@@ -160,6 +160,11 @@ impl Simulation {
         self.on_device = false;
     }
 
+    /// The world, without all that the next step would begin from.
+    pub fn into_world(self) -> World {
+        self.world
+    }
+
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
     pub fn is_asleep(&self, body: usize) -> bool {
         self.stages.sleep.asleep().get(body) == Some(&true)

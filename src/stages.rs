@@ -47,6 +47,11 @@ pub mod backend {
     }
 }
 
+/// The generator of random numbers that scenes and tests share.
+pub mod random {
+    pub use crate::random::SplitMix64;
+}
+
 /// Two backends on the same scene.
 pub mod compare {
     pub use crate::compare::*;

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use drystone::metrics::Penetration;
+use drystone::stages::random::SplitMix64;
 use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
 use glam::{DQuat, DVec2, DVec3, EulerRot, Quat, Vec3};
 use parry3d::query::PointQuery;
@@ -15,15 +16,12 @@ const STEPS: usize = 200;
 /// Steps from one comparison of the reported overlap with the true one to the next.
 const CHECK: usize = 10;
 
-/// SplitMix64.
-struct Random(u64);
+/// SplitMix64, with the numbers that drops need.
+struct Random(SplitMix64);
 
 impl Random {
     fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        (self.0.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -398,7 +396,7 @@ impl std::iter::Sum for Outcome {
 
 /// Drops bodies of one shape and about one size on one floor.
 fn run(shape: &str, kind: &str, seed: u64) -> Outcome {
-    let mut random = Random(seed);
+    let mut random = Random(SplitMix64::new(seed));
     let size = 0.05 * 100_f64.powf(random.unit());
     // What is smaller than 12 cm topples further within a sixtieth of a second than its thinnest is thick.
     let dt = if size < 0.12 { 1.0 / 120.0 } else { 1.0 / 60.0 };

@@ -22,9 +22,6 @@ pub struct Draft {
 
 impl Draft {
     /// Nothing is made yet.
-    ///
-    /// # Errors
-    /// No file can have that name.
     pub fn of(path: &Path) -> Result<Self> {
         let there = std::fs::metadata(path);
         if there.as_ref().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
@@ -44,18 +41,12 @@ impl Draft {
     }
 
     /// Begins a file.
-    ///
-    /// # Errors
-    /// It cannot be written, or a folder has its name.
     pub fn create(&self) -> Result<File> {
         let made = if self.target.is_dir() { Err(ErrorKind::IsADirectory.into()) } else { File::create(self.place()) };
         made.map_err(Error::file(&self.path))
     }
 
     /// Gives it its name: what had that name is gone.
-    ///
-    /// # Errors
-    /// It cannot be renamed; what had that name is still there.
     pub fn keep(mut self) -> Result<()> {
         let Some(hidden) = &self.hidden else { return Ok(()) };
         std::fs::rename(hidden, &self.target).map_err(Error::file(&self.path))?;
@@ -77,6 +68,13 @@ impl Drop for Draft {
         }
         self.forget();
     }
+}
+
+/// Rows with a line of headings, as CSV.
+pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| writer.serialize(row)).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
+    writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))
 }
 
 /// Removes all drafts, right before the process ends.
@@ -101,18 +99,12 @@ pub struct Writer {
 
 impl Writer {
     /// Begins a file.
-    ///
-    /// # Errors
-    /// As [`Draft::create`].
     pub fn create(path: &Path) -> Result<Self> {
         let draft = Draft::of(path)?;
         Ok(Self { file: draft.create()?, draft })
     }
 
     /// Ends the file.
-    ///
-    /// # Errors
-    /// As [`Draft::keep`].
     pub fn finish(self) -> Result<()> {
         self.draft.keep()
     }
@@ -129,9 +121,6 @@ impl Write for Writer {
 }
 
 /// Writes a file: a reader finds all of it, or what was there before.
-///
-/// # Errors
-/// It cannot be written; what was there before is still there.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut writer = Writer::create(path)?;
     writer.write_all(bytes).map_err(Error::file(path))?;

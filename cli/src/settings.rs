@@ -8,9 +8,6 @@ use drystone::{Error, Result};
 use toml::{Table, Value};
 
 /// Reads settings from a TOML file; what it leaves out takes its default.
-///
-/// # Errors
-/// The file cannot be read, is not TOML, names an unknown setting or gives one an impossible value.
 pub fn read(path: &Path) -> Result<SolverConfig> {
     let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
     let config: SolverConfig = toml::from_str(&text).map_err(|e| {
@@ -50,9 +47,6 @@ fn table(config: &SolverConfig) -> Table {
 }
 
 /// Changes one setting, written `key=value` as in TOML; bare words need no quotes.
-///
-/// # Errors
-/// No `=`, an unknown key, or a value that does not fit.
 pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
     let (key, value) =
         assignment.split_once('=').ok_or_else(|| Error::input(format!("--set {assignment}: write it as key=value")))?;

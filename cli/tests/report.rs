@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use drystone::{Error, Result, Scene, SolverConfig};
-use drystone_cli::report::front::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
+use drystone_cli::report::comparison::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
 
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
@@ -34,7 +34,7 @@ fn origin(build: &str) -> Origin {
 /// Scene and setting of every row, and the runs, in the order of the file.
 fn rows(out: &Path) -> (Vec<String>, Vec<String>) {
     let mut reader = csv::Reader::from_path(out.join("scenes.csv")).expect("rows");
-    let rows: Vec<drystone_cli::report::front::Row> =
+    let rows: Vec<drystone_cli::report::comparison::Row> =
         reader.deserialize().collect::<std::result::Result<_, _>>().unwrap();
     let mut runs: Vec<_> = rows.iter().map(|row| row.run.clone()).collect();
     runs.dedup();
@@ -44,7 +44,7 @@ fn rows(out: &Path) -> (Vec<String>, Vec<String>) {
 #[test]
 fn a_report_that_was_stopped_goes_on_where_it_stopped() {
     let whole = tempfile::tempdir().unwrap();
-    survey(&three, whole.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    survey(&three, whole.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     let (wanted, runs) = rows(whole.path());
     assert_eq!((wanted.len(), runs.len()), (9, 3));
 
@@ -55,11 +55,11 @@ fn a_report_that_was_stopped_goes_on_where_it_stopped() {
         asked.set(asked.get() + 1);
         if asked.get() == 3 { Err(Error::input("stop")) } else { three(scene, extent) }
     };
-    survey(&stops, folder.path()).run(&origin("a"), &mut |_| ()).map(|_| ()).unwrap_err();
+    survey(&stops, folder.path()).run(&origin("a"), &mut |_, _, _| ()).map(|_| ()).unwrap_err();
     let (part, before) = rows(folder.path());
     assert_eq!(part, wanted[..6]);
 
-    let report = survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    let report = survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     let (all, after) = rows(folder.path());
     assert_eq!((all, &after[..2]), (wanted.clone(), &before[..]));
     report.write(folder.path()).unwrap();
@@ -67,7 +67,7 @@ fn a_report_that_was_stopped_goes_on_where_it_stopped() {
     assert!(after.iter().all(|run| html.contains(run)));
 
     // Nothing is left to run, and drawing what is there gives the same page.
-    survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     assert_eq!(rows(folder.path()).1, after);
     Report::read(folder.path()).unwrap().write(folder.path()).unwrap();
     assert_eq!(std::fs::read_to_string(folder.path().join("index.html")).unwrap(), html);
@@ -78,7 +78,7 @@ fn rows_of_another_scene_program_or_setting_are_not_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let run = |scenes: Vec<Scene>, team: &Team, build: &str| {
         let survey = Survey { scenes, ..survey(team, folder.path()) };
-        survey.run(&origin(build), &mut |_| ()).unwrap();
+        survey.run(&origin(build), &mut |_, _, _| ()).unwrap();
         rows(folder.path()).1.len()
     };
     let first = || scenes()[..1].to_vec();
@@ -105,7 +105,8 @@ fn a_folder_with_other_rows_is_refused_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scenes.csv");
     std::fs::write(&path, "scene,hash\ntower,12\n").unwrap();
-    let message = survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).map(|_| ()).unwrap_err().to_string();
+    let message =
+        survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("scenes.csv: line 2"), "{message}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "scene,hash\ntower,12\n");
     let empty = tempfile::tempdir().unwrap();
@@ -117,7 +118,7 @@ fn a_folder_with_other_rows_is_refused_and_left_alone() {
 #[test]
 fn a_page_is_drawn_of_any_numbers() {
     let folder = tempfile::tempdir().unwrap();
-    survey(&three, folder.path()).run(&origin("a"), &mut |_| ()).unwrap();
+    survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     let text = std::fs::read_to_string(folder.path().join("scenes.csv")).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     let first: Vec<&str> = lines[1].split(',').collect();

@@ -8,21 +8,19 @@ use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
 };
+use drystone::stages::random::SplitMix64;
 use glam::{Mat3, Quat, Vec3};
 
-/// SplitMix64: the same numbers everywhere and forever.
-pub struct Random(u64);
+/// SplitMix64, with the numbers that problems need.
+pub struct Random(SplitMix64);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(SplitMix64::new(seed))
     }
 
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     /// A whole number below `end`.

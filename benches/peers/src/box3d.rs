@@ -9,7 +9,7 @@ use box3d_sys::*;
 use drystone::glam::{Mat3, Quat, Vec3};
 use drystone::world::{BodyKind, Collider};
 use drystone::{Body, Error, Result, Scene, World};
-use drystone_cli::report::front::{Contender, Setting};
+use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::parry::shape::{TriMesh, TypedShape};
 
 use crate::entrant::setting;

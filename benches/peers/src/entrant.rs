@@ -1,7 +1,7 @@
 //! An engine and how it is set, before it has a scene.
 
 use drystone::{Result, Scene, SolverConfig};
-use drystone_cli::report::front::{Contender, Drystone, Setting};
+use drystone_cli::report::comparison::{Contender, Drystone, Setting};
 use drystone_cli::settings;
 
 use crate::{box3d::Box3d, rapier::Rapier};

@@ -1,5 +1,5 @@
 //! Other engines on drystone's scenes: each takes the same [`World`](drystone::World), steps it by itself and gives poses and
-//! velocities back, so that drystone's own [`race`](drystone_cli::report::front::race) times and scores all of them.
+//! velocities back, so that drystone's own [`measure`](drystone_cli::report::comparison::measure) times and scores all of them.
 //!
 //! What is the same for all: shapes, masses and inertias, friction (geometric mean) and restitution (larger), joints,
 //! gravity, forces, the length of a step. Nothing sleeps and nothing is damped. Everything else (speculative margins, reuse of

@@ -1,13 +1,14 @@
 //! `drystone-peers SCENE...`: drystone, Rapier and Box3D on the same scenes, time beside errors.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
 use drystone::{Error, Result, Scene};
 use drystone_cli::commands::SurveyArgs;
-use drystone_cli::report::front::{Origin, Row, blocks, race, scene};
+use drystone_cli::files;
+use drystone_cli::report::comparison::{Origin, Row, blocks, measure, scene};
 use drystone_peers::{Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -111,13 +112,13 @@ impl Args {
                 ProgressStyle::with_template("{msg} {bar:40} {percent} %  {eta} left").expect("a fixed template");
             let bar = ProgressBar::new(contenders.len() as u64 * u64::from(blocks(scene.steps))).with_style(style);
             bar.set_message(scene.name.clone());
-            let rows = race(scene, &mut contenders, &origin, &mut || bar.inc(1))?;
+            let rows = measure(scene, &mut contenders, &origin, &mut || bar.inc(1))?;
             bar.finish_and_clear();
             print_table(scene, &rows);
             all.extend(rows);
         }
         match &self.csv {
-            Some(path) => write_csv(path, &all),
+            Some(path) => files::write(path, &files::csv(&all)?),
             None => Ok(()),
         }
     }
@@ -157,16 +158,6 @@ fn print_table(scene: &Scene, rows: &[Row]) {
     }
     table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     println!("{table}\n");
-}
-
-/// Whole or not at all: written next to the file, then moved there.
-fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    rows.iter().try_for_each(|row| writer.serialize(row)).map_err(Error::input)?;
-    let text = writer.into_inner().map_err(Error::input)?;
-    let unfinished = path.with_extension("part");
-    std::fs::write(&unfinished, text).map_err(Error::file(&unfinished))?;
-    std::fs::rename(&unfinished, path).map_err(Error::file(path))
 }
 
 fn main() -> ExitCode {

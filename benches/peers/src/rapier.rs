@@ -3,7 +3,7 @@
 use drystone::world::{BodyKind, MassProperties as Mass};
 use drystone::{Body, Error, Result, Scene, World};
 use drystone_cli::maze;
-use drystone_cli::report::front::{Contender, Setting};
+use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::prelude::*;
 
 use crate::entrant::setting;

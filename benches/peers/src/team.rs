@@ -1,7 +1,7 @@
 //! Rapier and Box3D as a report has them: at their defaults, and over their substeps and the stiffness of their contacts.
 
 use drystone::{Result, Scene};
-use drystone_cli::report::front::{Contender, Extent, substeps};
+use drystone_cli::report::comparison::{Contender, Extent, substeps};
 
 use crate::{Engine, Entrant};
 

@@ -3,15 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 
+use super::output::{plain_table, print, print_json};
+use super::progress::Progress;
 use super::words;
-use super::{print, print_json, progress};
+use crate::files;
 use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
 use crate::settings;
+use drystone::Result;
 use drystone::backend::{Backend, BackendChoice, choose};
 use drystone::config::SolverConfig;
-use drystone::{Error, Result};
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]
@@ -72,14 +74,14 @@ impl BenchArgs {
             // Nothing but `auto` asks how many bodies there are.
             self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
         };
-        let bar = progress(specs.len() as u32 * (1 + u32::from(turns)), self.json || self.csv);
+        let bar = Progress::steps(specs.len() as u32 * (1 + u32::from(turns)), self.json || self.csv);
         let now = bench(&specs, &config, &threads, &open, turns.into(), &mut || bar.inc())?;
         bar.finish();
         if self.json {
             return print_json(&now);
         }
         if self.csv {
-            return print(csv(&now.rows)?.trim_end());
+            return print(String::from_utf8_lossy(&files::csv(&now.rows)?).trim_end());
         }
         let changes = baseline.map(|then| compare_with(&now, &then));
         print(now.machine.line())?;
@@ -95,7 +97,7 @@ impl BenchArgs {
 
     fn print_limits(&self, threads: &[usize]) -> Result<()> {
         let turns = self.turns.unwrap_or(9);
-        let bar = progress(threads.len() as u32 * u32::from(turns), self.json);
+        let bar = Progress::steps(threads.len() as u32 * u32::from(turns), self.json);
         let rows = limits(15_000, threads, turns.into(), &mut || bar.inc())?;
         bar.finish();
         let machine = Machine::this();
@@ -126,18 +128,8 @@ impl BenchArgs {
     }
 }
 
-fn csv(rows: &[BenchRow]) -> Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
-    }
-    let bytes = writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
 fn table(rows: &[BenchRow], changes: Option<&[Change]>) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    let mut table = plain_table();
     let usual =
         "scene,backend,threads,bodies,manifolds,ms,quartiles,detect,color,prepare,run,store,overlap mm,residual,hash";
     let header: Vec<_> = usual.split(',').chain(changes.map(|_| "to baseline")).collect();

@@ -2,8 +2,10 @@
 
 use clap::Args;
 
+use super::output::{print, print_json};
+use super::progress::Progress;
+use super::scene::SceneArgs;
 use super::words;
-use super::{SceneArgs, print, print_json, progress};
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
 use drystone::stages::compare::{Difference, compare};
@@ -41,7 +43,7 @@ impl CompareArgs {
             named[which] = format!("{} ({})", backend.name(), backend.adapter());
             Ok(backend)
         };
-        let bar = progress(scene.steps, self.scene.json);
+        let bar = Progress::steps(scene.steps, self.scene.json);
         let found = compare(&scene, &config, &mut open, scene.steps, || bar.inc())?;
         bar.finish();
         if self.scene.json {

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{print, replacing, step_with_contacts};
+use super::output::{print, replacing};
+use super::scene::step_with_contacts;
 use crate::files;
 use drystone::Simulation;
 use drystone::backend::cpu::Cpu;

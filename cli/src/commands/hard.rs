@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::output::{print, print_json};
+use super::progress::Progress;
 use super::words;
-use super::{print, print_json};
 use crate::hard::{Case, Check, Limit, Setup};
 use crate::report::hard_cases;
 use crate::settings;
@@ -58,7 +59,7 @@ impl HardArgs {
             return cases.iter().try_for_each(|c| print(format_args!("{:<10}  {}", c.name, c.summary)));
         }
         if let Some(directory) = &self.page {
-            let bar = super::Progress::new("case", hard_cases::count(&cases), false);
+            let bar = Progress::new("case", hard_cases::count(&cases), false);
             let page = hard_cases::page(&cases, |what| {
                 bar.set_message(what);
                 bar.inc();

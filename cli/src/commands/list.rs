@@ -1,11 +1,10 @@
 //! `drystone scenes` and `drystone adapters`.
 
 use clap::Args;
-use comfy_table::{Table, presets};
 use serde_json::Value;
 
+use super::output::{plain_table, print, print_json};
 use super::words;
-use super::{print, print_json};
 use drystone::Result;
 use drystone::backend::gpu::adapters;
 use drystone::config::SolverConfig;
@@ -127,15 +126,8 @@ impl AdaptersArgs {
         if found.is_empty() {
             return print("none; everything runs on the CPU");
         }
-        let mut table = Table::new();
-        table.load_preset(presets::NOTHING).set_header([
-            "name",
-            "api",
-            "kind",
-            "driver",
-            "exact mode",
-            "largest buffer",
-        ]);
+        let mut table = plain_table();
+        table.set_header(["name", "api", "kind", "driver", "exact mode", "largest buffer"]);
         for a in found {
             let exact = if a.exact { "yes" } else { "no" };
             table.add_row([

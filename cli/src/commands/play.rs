@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{BackendArgs, print, print_json, replacing};
+use super::output::{print, print_json, replacing};
+use super::scene::BackendArgs;
 use crate::files;
 use crate::maze::{Game, Map, Outcome, Script, pilot, play};
 use crate::settings;

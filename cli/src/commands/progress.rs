@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::say;
+use super::output::say;
 
 /// Time between two lines where standard error is no terminal.
 const BETWEEN: Duration = Duration::from_secs(10);
@@ -34,6 +34,11 @@ impl Progress {
         let bar = if quiet || !terminal { ProgressBar::hidden() } else { ProgressBar::no_length() };
         bar.set_length(count);
         Self { bar: bar.with_style(style), unit, last: (!terminal).then(|| Cell::new(Instant::now())) }
+    }
+
+    /// Over the steps of a run.
+    pub fn steps(steps: u32, quiet: bool) -> Self {
+        Self::new("step", steps.into(), quiet)
     }
 
     /// One more is done.

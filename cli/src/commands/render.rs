@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::output::{print, replacing, say};
+use super::progress::Progress;
+use super::scene::{MACHINE, SceneArgs, SleepArgs};
 use super::words;
-use super::{MACHINE, SceneArgs, SleepArgs, print, progress, replacing, say};
 use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
 use drystone::Simulation;
@@ -109,7 +111,7 @@ impl RenderArgs {
         let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();
         memory::check(FRAME * (scene.world.bodies.len() * kept.len()) as f64, format_args!("{} pictures", kept.len()))?;
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
-        let bar = progress(scene.steps, quiet);
+        let bar = Progress::steps(scene.steps, quiet);
         let (steps, dt) = (scene.steps, scene.dt);
         let mut film = Film::new(scene, self.color);
         for step in 0..=steps {
@@ -135,8 +137,8 @@ impl RenderArgs {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
         let (width, height) = self.size;
         let mut page = format!(
-            "# Every scene of the catalogue\n\nMade by `drystone render --gallery {} --size {width}x{height}`: each scene a \
-             third of the way through its run.\n",
+            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page. Each picture shows a \
+             scene after a third of its steps.\n",
             folder.display()
         );
         for entry in CATALOGUE {

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{print, progress};
+use super::output::print;
+use super::progress::{PERCENT, Progress};
 use crate::files;
-use crate::report::front::{Extent, Origin, Progress, Report, Survey, Team, course, drystone, scene};
+use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
 use crate::report::{RUNS, convergence, problems, rules};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
@@ -71,14 +72,14 @@ impl ReportArgs {
         match &self.page {
             None => self.survey.run(&[]),
             Some(Page::Rules { out }) => {
-                let bar = super::progress(RUNS as u32, false);
+                let bar = Progress::steps(RUNS as u32, false);
                 let report = rules(|| bar.inc())?;
                 bar.finish();
                 report.write(out)?;
                 print(out.join("rules.md").display())
             }
             Some(Page::Convergence { out, problems }) => {
-                let bar = super::progress(0, false);
+                let bar = Progress::steps(0, false);
                 let page = convergence(problems.as_deref(), |problems| {
                     bar.set_length(problems as u64);
                     bar.inc();
@@ -100,20 +101,17 @@ impl SurveyArgs {
     }
 
     /// Runs drystone and whoever else takes part, and makes the page.
-    ///
-    /// # Errors
-    /// A scene that there is not, a directory that cannot be written, or an engine that gives up.
     pub fn run(&self, others: &[&Team]) -> Result<()> {
-        let report = if self.draw { Report::read(&self.out)? } else { self.race(others)? };
+        let report = if self.draw { Report::read(&self.out)? } else { self.measure(others)? };
         print(report.write(&self.out)?.display())
     }
 
-    fn race(&self, others: &[&Team]) -> Result<Report> {
+    fn measure(&self, others: &[&Team]) -> Result<Report> {
         // Fails only if it was set before, which nothing does. This thread is one of them.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
         let extent = if self.quick { Extent::Quick } else { Extent::Full };
         let scenes = match self.scene.is_empty() {
-            true => course(extent)?,
+            true => scenes(extent)?,
             false => self.scene.iter().map(|word| scene(word)).collect::<Result<_>>()?,
         };
         let some = self.scene.is_empty() || self.problems.is_some();
@@ -121,9 +119,9 @@ impl SurveyArgs {
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();
         let adapter = adapters().into_iter().next().map(|a| a.to_string());
-        let bar = progress::Progress::new(progress::PERCENT, 1, false);
+        let bar = Progress::new(PERCENT, 1, false);
         let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
-        let report = survey.run(&Origin::here(adapter), &mut |&Progress { what, done, total }| {
+        let report = survey.run(&Origin::here(adapter), &mut |what, done, total| {
             bar.set_message(what);
             bar.set(done, total);
         })?;

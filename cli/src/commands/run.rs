@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::CellAlignment;
 
-use super::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs};
-use super::{print, print_json, progress, replacing, say, step_with_contacts};
+use super::output::{plain_table, print, print_json, replacing, say};
+use super::progress::Progress;
+use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, step_with_contacts};
 use crate::files;
 use crate::report::{RunReport, Trajectory};
 use drystone::Simulation;
@@ -89,7 +90,7 @@ impl SaveProblem {
 impl RunArgs {
     /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
-        let (scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
+        let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
@@ -97,10 +98,10 @@ impl RunArgs {
         let mut trajectory = self.out.as_deref().map(Trajectory::create).transpose()?;
         say(why);
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
-        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
-        let mut report = RunReport::new(&scene, &simulation);
+        let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
-        let bar = progress(scene.steps, self.scene.json);
+        let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
+        let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
                 let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
@@ -122,7 +123,7 @@ impl RunArgs {
         if let (Some(trajectory), Some(path)) = (trajectory, &self.out) {
             replacing(path, || trajectory.finish())?;
         }
-        report.measure(&scene, &mut simulation);
+        report.measure(&scene, simulation);
         if self.scene.json {
             print_json(&report)?;
         } else {
@@ -138,8 +139,7 @@ impl RunArgs {
 }
 
 fn print_table(report: &RunReport) -> Result<()> {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    let mut table = plain_table();
     for (what, value) in report.rows() {
         table.add_row([what, value]);
     }

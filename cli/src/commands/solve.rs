@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::output::{print, print_json};
 use super::words;
-use super::{print, print_json};
 use crate::report::{CurveRow, SolveReport, SolveSettings};
 use drystone::backend::Numbers;
 use drystone::config::Method;

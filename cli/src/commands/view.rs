@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{BackendArgs, SceneArgs, SleepArgs};
+use super::scene::{BackendArgs, SceneArgs, SleepArgs};
 use crate::view::{ColorBy, Live, window};
 use drystone::Result;
 

@@ -2,14 +2,13 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Check, DT, Setup, is_broken};
+use super::{Checks, DT, Setup, cube, floor};
 use drystone::Result;
 use drystone::scenes::Scene;
 use drystone::stats::largest;
-use drystone::world::{Body, Shape, World};
+use drystone::world::{Body, World};
 
-pub(super) fn far_and_bad(setup: &Setup) -> Result<Vec<Check>> {
-    let mut checks = Vec::new();
+pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let at_origin = settled(setup, 0.0)?;
     for (km, most) in [(10.0, 2.0), (100.0, 20.0_f32)] {
         let far = settled(setup, 1e3 * km)?;
@@ -18,40 +17,22 @@ pub(super) fn far_and_bad(setup: &Setup) -> Result<Vec<Check>> {
         };
         let worst = at_origin.bodies.iter().zip(&far.bodies).map(off);
         // Twice the distance between neighboring numbers there.
-        checks.push(Check::at_most(
+        checks.at_most(
             format!("{km} km from the origin: a tower of 5, off the one at the origin [mm]"),
             1e3 * largest(0.0, worst),
             most.into(),
-        ));
-        checks.push(Check::at_most(
-            format!("{km} km from the origin: bodies that are no numbers"),
-            is_broken(&far),
-            0.0,
-        ));
+        );
+        checks.finite(&format!("{km} km from the origin: "), &far);
     }
     let taken = bad_bodies().into_iter().filter(|(_, body)| is_taken(setup, body.clone())).count();
-    checks.push(Check::at_most(
-        format!("of {} bodies that are no input: taken", bad_bodies().len()),
-        taken as f64,
-        0.0,
-    ));
-    let mut world = floor();
+    checks.at_most(format!("of {} bodies that are no input: taken", bad_bodies().len()), taken as f64, 0.0);
+    let mut world = floor(0.5);
     let tiny = f32::MIN_POSITIVE / 8.0;
-    world.add(cube(0.5).velocity(Vec3::splat(tiny), Vec3::splat(tiny)).position(tiny, 0.5, tiny));
+    world.add(cube(0.0, 0.5).velocity(Vec3::splat(tiny), Vec3::splat(tiny)).position(tiny, 0.5, tiny));
     let mut simulation = setup.simulation(world)?;
     (0..60).try_for_each(|_| simulation.step(DT).map(drop))?;
-    checks.push(Check::at_most("numbers next to zero: bodies that are no numbers", is_broken(&simulation.world), 0.0));
-    Ok(checks)
-}
-
-fn floor() -> World {
-    let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    world
-}
-
-fn cube(y: f32) -> Body {
-    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0)
+    checks.finite("numbers next to zero: ", &simulation.world);
+    Ok(())
 }
 
 /// A tower of five, `x` from the origin, after 5 s.
@@ -68,7 +49,7 @@ fn bad_bodies() -> Vec<(&'static str, Body)> {
     let mut bad = Vec::new();
     for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let with = |change: fn(&mut Body, f32)| {
-            let mut body = cube(0.5);
+            let mut body = cube(0.0, 0.5);
             change(&mut body, number);
             body
         };
@@ -82,16 +63,16 @@ fn bad_bodies() -> Vec<(&'static str, Body)> {
         bad.push(("friction", with(|b, x| b.material.friction = x)));
         bad.push(("restitution", with(|b, x| b.material.restitution = x)));
     }
-    let mut negative = cube(0.5);
+    let mut negative = cube(0.0, 0.5);
     negative.mass.mass = -1.0;
     bad.push(("mass", negative));
-    bad.push(("friction", cube(0.5).friction(-0.1)));
+    bad.push(("friction", cube(0.0, 0.5).friction(-0.1)));
     bad
 }
 
 /// Whether a simulation takes a body, or refuses it without its name.
 fn is_taken(setup: &Setup, body: Body) -> bool {
-    let mut world = floor();
+    let mut world = floor(0.5);
     world.add(body.named("culprit"));
     setup.simulation(world).map_or_else(|e| !e.to_string().contains("culprit"), |_| true)
 }

@@ -1,6 +1,6 @@
 //! What stands, or should.
 
-use super::{Check, DT, Setup};
+use super::{Checks, DT, Setup};
 use drystone::config::Method;
 use drystone::load::Load;
 use drystone::residuals::Measure;
@@ -15,71 +15,62 @@ const SWEEPS: u32 = 4096;
 /// Ten seconds.
 const TEN: u32 = 600;
 
-pub(super) fn light_under_heavy(setup: &Setup) -> Result<Vec<Check>> {
-    let mut checks = Vec::new();
+pub(super) fn light_under_heavy(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for ratio in [10.0, 100.0, 1e3, 1e4, 1e5, 1e6_f64] {
         let parameters = ["n=2".to_owned(), format!("top_ratio={ratio}")];
         let world = Scene::find("tower", &parameters)?.world;
         let law =
             Load::heaviest(&world, &setup.config).expect("a load").overlap(setup.config.substeps, DT, &setup.config);
         let outcome = setup.outcome(world, TEN)?;
-        checks.push(outcome.stands(format!("1 under {ratio}")));
-        checks.push(Check::at_most(
-            format!("1 under {ratio}: overlap at rest over the static law"),
-            outcome.at_rest / law,
-            1.2,
-        ));
+        checks.stands(&outcome, format!("1 under {ratio}"));
+        checks.at_most(format!("1 under {ratio}: overlap at rest over the static law"), outcome.at_rest / law, 1.2);
         if ratio == 1e3 {
-            checks.push(Check::at_most("1 under 1000: overlap at rest [mm]", 1e3 * outcome.at_rest, 5.0));
+            checks.at_most("1 under 1000: overlap at rest [mm]", 1e3 * outcome.at_rest, 5.0);
         }
     }
-    Ok(checks)
+    Ok(())
 }
 
-pub(super) fn towers(setup: &Setup) -> Result<Vec<Check>> {
-    let mut checks = Vec::new();
+pub(super) fn towers(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for n in [20, 40] {
         let outcome = setup.run("tower", &[&format!("n={n}"), "offset=0.01"], TEN)?;
-        checks.push(outcome.stands(format!("{n} cubes")));
-        checks.push(Check::at_most(format!("{n} cubes: drift [m]"), outcome.drift, 0.1));
-        checks.push(Check::at_most(format!("{n} cubes: rms speed at the end [m/s]"), outcome.rms, 0.05));
+        checks.stands(&outcome, format!("{n} cubes"));
+        checks.at_most(format!("{n} cubes: drift [m]"), outcome.drift, 0.1);
+        checks.at_most(format!("{n} cubes: rms speed at the end [m/s]"), outcome.rms, 0.05);
     }
-    Ok(checks)
+    Ok(())
 }
 
-pub(super) fn heavy_tops(setup: &Setup) -> Result<Vec<Check>> {
-    let mut checks = Vec::new();
+pub(super) fn heavy_tops(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for (n, top) in [(20, 100), (10, 1000), (20, 1000)] {
         let parameters = [&format!("n={n}"), &format!("top_ratio={top}"), "offset=0.01"];
-        checks.push(
-            setup.run("tower", &parameters.map(|p| p as &str), TEN)?.stands(format!("{n} cubes, top {top} times")),
-        );
+        let outcome = setup.run("tower", &parameters.map(|p| p as &str), TEN)?;
+        checks.stands(&outcome, format!("{n} cubes, top {top} times"));
     }
     let alternating = setup.run("mass-ratio", &["n=10", "ratio=1000"], TEN)?;
-    checks.push(alternating.stands("10 cubes, 1 and 1000 in turn"));
-    checks.push(Check::at_most("10 cubes, 1 and 1000 in turn: rms speed at the end [m/s]", alternating.rms, 0.05));
-    Ok(checks)
+    checks.stands(&alternating, "10 cubes, 1 and 1000 in turn");
+    checks.at_most("10 cubes, 1 and 1000 in turn: rms speed at the end [m/s]", alternating.rms, 0.05);
+    Ok(())
 }
 
-pub(super) fn redundancy(setup: &Setup) -> Result<Vec<Check>> {
-    let mut checks = Vec::new();
+pub(super) fn redundancy(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for side in [1, 2, 4] {
         let mut simulation = setup.simulation(cube_on_pads(side))?;
         for _ in 0..300 {
             simulation.step(DT)?;
         }
         let (points, asymmetry) = asymmetry(simulation.manifolds(), side);
-        checks.push(Check::at_most(format!("{points} points: asymmetry of the forces"), asymmetry, 0.05));
+        checks.at_most(format!("{points} points: asymmetry of the forces"), asymmetry, 0.05);
     }
     let planks = Scene::find("kapla", &["storeys=9".into()])?.world;
     for (what, world) in
         [("64 points".to_owned(), cube_on_pads(4)), (format!("{} planks", planks.dynamic_count()), planks)]
     {
         let (growth, left) = convergence(setup, world)?;
-        checks.push(Check::at_most(format!("{what}: largest growth of e_vel as sweeps double"), growth, 1.0));
-        checks.push(Check::at_most(format!("{what}: e_vel after {SWEEPS} sweeps"), left, 1e-3));
+        checks.at_most(format!("{what}: largest growth of e_vel as sweeps double"), growth, 1.0);
+        checks.at_most(format!("{what}: e_vel after {SWEEPS} sweeps"), left, 1e-3);
     }
-    Ok(checks)
+    Ok(())
 }
 
 /// A cube of 2 m on `side` x `side` fixed pads of 0.2 m.
@@ -133,36 +124,42 @@ fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
     Ok((growth, before))
 }
 
-pub(super) fn cards(setup: &Setup) -> Result<Vec<Check>> {
+pub(super) fn cards(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("card-house", &["storeys=5", "length=0.4", "thickness=0.002"], TEN)?;
-    Ok(vec![outcome.stands("34 cards"), Check::at_most("34 cards: deepest overlap [mm]", 1e3 * outcome.deepest, 1.0)])
+    checks.stands(&outcome, "34 cards");
+    checks.at_most("34 cards: deepest overlap [mm]", 1e3 * outcome.deepest, 1.0);
+    Ok(())
 }
 
-pub(super) fn kapla(setup: &Setup) -> Result<Vec<Check>> {
+pub(super) fn kapla(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("kapla", &[], 3600)?;
-    Ok(vec![outcome.stands("105 planks"), Check::at_most("105 planks: drift [m]", outcome.drift, 0.1)])
+    checks.stands(&outcome, "105 planks");
+    checks.at_most("105 planks: drift [m]", outcome.drift, 0.1);
+    Ok(())
 }
 
-pub(super) fn arches(setup: &Setup) -> Result<Vec<Check>> {
+pub(super) fn arches(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let thick = setup.run("arch", &["voussoirs=31", "thickness=0.12"], TEN)?;
     let thin = setup.run("arch", &["voussoirs=31", "thickness=0.095"], TEN)?;
-    let fallen = Check::at_least("0.095 of the radius: stones out of place", thin.fallen, 1.0);
-    Ok(vec![thick.stands("0.12 of the radius"), fallen])
+    checks.stands(&thick, "0.12 of the radius");
+    checks.at_least("0.095 of the radius: stones out of place", thin.fallen, 1.0);
+    Ok(())
 }
 
-pub(super) fn aqueduct(setup: &Setup) -> Result<Vec<Check>> {
+pub(super) fn aqueduct(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("aqueduct", &["arches=8"], TEN)?;
-    Ok(vec![outcome.stands("stones"), Check::at_most("stones: rms speed at the end [m/s]", outcome.rms, 1e-3)])
+    checks.stands(&outcome, "stones");
+    checks.at_most("stones: rms speed at the end [m/s]", outcome.rms, 1e-3);
+    Ok(())
 }
 
-pub(super) fn large_pyramid(setup: &Setup) -> Result<Vec<Check>> {
+pub(super) fn large_pyramid(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("pyramid", &["base=100"], 10_000)?;
-    Ok(vec![
-        outcome.stands("boxes"),
-        Check::at_most("boxes: drift [m]", outcome.drift, 0.1),
-        Check::at_most("boxes: rms speed at the end [m/s]", outcome.rms, 0.05),
-        Check::at_most("boxes: overlap at the end [mm]", 1e3 * outcome.at_rest, 5.0),
-    ])
+    checks.stands(&outcome, "boxes");
+    checks.at_most("boxes: drift [m]", outcome.drift, 0.1);
+    checks.at_most("boxes: rms speed at the end [m/s]", outcome.rms, 0.05);
+    checks.at_most("boxes: overlap at the end [mm]", 1e3 * outcome.at_rest, 5.0);
+    Ok(())
 }
 
 #[cfg(test)]

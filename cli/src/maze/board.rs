@@ -35,9 +35,6 @@ pub const BALL: usize = 3;
 
 /// The world of a map: board, goal and lids of the walls (kinematic, around the origin), and the ball at rest on the start. Rows go
 /// along z, columns along x; the floor is at y = 0.
-///
-/// # Errors
-/// None for a map that [`Map::parse`] gives.
 pub fn scene(map: &Map) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::kinematic().named("board").shape(surface(map)?));

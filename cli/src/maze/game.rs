@@ -57,9 +57,6 @@ pub trait Engine {
     /// The same, to write the velocities of the kinematic ones.
     fn world_mut(&mut self) -> &mut World;
     /// Moves them by `dt` seconds.
-    ///
-    /// # Errors
-    /// It cannot.
     fn step(&mut self, dt: f32) -> Result<()>;
 }
 
@@ -100,17 +97,11 @@ pub struct Game {
 
 impl Game {
     /// A game that has not begun.
-    ///
-    /// # Errors
-    /// A setting is out of range.
     pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         Self::with(map, |scene| Ok(Box::new(Simulation::new(scene.world, config, backend)?)))
     }
 
     /// A game that has not begun, moved by the engine that `build` makes for its scene.
-    ///
-    /// # Errors
-    /// What `build` returns.
     pub fn with(map: Map, build: impl FnOnce(Scene) -> Result<Box<dyn Engine>>) -> Result<Self> {
         let scene = scene(&map)?;
         Ok(Self {
@@ -148,9 +139,6 @@ impl Game {
     }
 
     /// Tilts the board towards `wanted` (right and front, degrees) and moves everything by one step, unless the game has ended.
-    ///
-    /// # Errors
-    /// The backend cannot run the step.
     pub fn step(&mut self, wanted: [f32; 2]) -> Result<()> {
         if self.outcome.is_some() {
             return Ok(());
@@ -246,9 +234,6 @@ const SAMPLE: u32 = 6;
 pub const SAMPLES: f64 = 20.0;
 
 /// Plays `script` to its end, or until the game is won or lost. `game` has not begun; `watch` sees every sample of the track.
-///
-/// # Errors
-/// The backend cannot run a step.
 pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Result<Played> {
     let mut track = Vec::new();
     loop {

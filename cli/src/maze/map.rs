@@ -44,9 +44,6 @@ const MOST: usize = 64;
 
 impl Map {
     /// Finds a board by its name, else reads the file of that name.
-    ///
-    /// # Errors
-    /// Neither a known name nor a readable file with a map.
     pub fn find(name_or_path: &str) -> Result<Self> {
         if let Some((name, text)) = BOARDS.iter().find(|b| b.0 == name_or_path) {
             return Self::parse(name, text);
@@ -63,9 +60,6 @@ impl Map {
 
     /// Reads a map: `.` floor, `#` wall, `O` hole, `S` start, `G` goal; one line a row, all of one length. Lines that begin with
     /// `;` and empty lines are left out. Beyond the map is wall.
-    ///
-    /// # Errors
-    /// The first thing that is wrong, with `name`, line and column.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let refuse = |line: usize, column: usize, what: String| {
             Err(Error::input(format!("{name}: line {line}, column {column}: {what}")))

@@ -22,9 +22,6 @@ const ROLLING: f32 = 9.81 * 5.0 / 7.0;
 const PATIENCE: f32 = 120.0;
 
 /// Plays `game`, which has not begun, and returns the script that wins it, with 3 s to spare.
-///
-/// # Errors
-/// There is no way to the goal, or the ball did not keep to it.
 pub fn pilot(mut game: Game) -> Result<Script> {
     let way: Vec<Vec2> = way(&game.map).iter().map(|&cell| center_of(&game.map, cell).xz()).collect();
     if way.is_empty() {

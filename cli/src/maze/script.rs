@@ -16,9 +16,6 @@ pub struct Script {
 
 impl Script {
     /// Reads a script: one `time right front` a line, seconds and degrees; `#` begins a comment.
-    ///
-    /// # Errors
-    /// The first line that is not three numbers, goes back in time or tilts too far, with `name`, line and column.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let mut script = Self::default();
         for (line, row) in (1..).zip(text.lines()) {

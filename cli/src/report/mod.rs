@@ -1,11 +1,11 @@
 //! What runs came to: one run for people and programs, its motion, and pages made from many runs.
 
 pub mod bench;
-mod clock;
+pub mod comparison;
 mod convergence;
-pub mod front;
 pub mod hard_cases;
 mod plot;
+pub mod rounds;
 mod rules;
 mod run;
 mod solve;

@@ -1,18 +1,22 @@
 //! What one run was and what it came to: rows for people, JSON for programs.
 
+mod rows;
+
 use std::ops::Range;
 
 use serde::Serialize;
 
 use drystone::Simulation;
+use drystone::backend::Backend;
 use drystone::config::SolverConfig;
-use drystone::metrics::{fastest, in_place, rms_speed};
+use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::scenes::{Group, Scene};
 use drystone::stats::{KernelTime, StepStats, median};
-use drystone::world::{BodyKind, World};
+use drystone::world::{Body, BodyKind, World};
+use glam::Vec3;
 
 /// Report of one run; its fields are the keys of the JSON object.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
     /// Name of the scene.
     pub scene: String,
@@ -108,6 +112,9 @@ pub struct RunReport {
     kernel_times: Vec<(KernelTime, Vec<f64>)>,
     #[serde(skip)]
     energy_before: f64,
+    /// Center of mass and half the height (m) of each body at the start.
+    #[serde(skip)]
+    places: Vec<(Vec3, f64)>,
     #[serde(skip)]
     stands: bool,
 }
@@ -151,10 +158,9 @@ impl std::fmt::Display for Spread {
 pub struct KernelRow {
     /// Name of the kernel.
     pub kernel: &'static str,
-    /// Median over the steps that it was in.
-    pub median: f64,
-    /// Least over them.
-    pub min: f64,
+    /// Over the steps that it was in.
+    #[serde(flatten)]
+    pub ms: Spread,
     /// Bytes that it read and wrote in the last step that it was in; 0 if it is not of the plan.
     pub bytes: u64,
     /// Bytes a second of that step, as a share of what copying reaches.
@@ -166,64 +172,27 @@ pub struct KernelRow {
 pub struct StageRow {
     /// Name of the stage.
     pub stage: &'static str,
-    /// Median over the steps.
-    pub median: f64,
-    /// Least over the steps.
-    pub min: f64,
+    /// Over the steps.
+    #[serde(flatten)]
+    pub ms: Spread,
 }
 
 impl RunReport {
-    /// The report of a run that has not begun.
-    pub fn new(scene: &Scene, simulation: &Simulation) -> Self {
+    /// The report of a run of `scene` that has not begun. It keeps the places of the bodies, so the world itself may go to the simulation.
+    pub fn new(scene: &Scene, config: &SolverConfig, backend: &dyn Backend) -> Self {
         Self {
             scene: scene.name.clone(),
-            backend: simulation.backend().name().into(),
-            adapter: simulation.backend().adapter(),
+            backend: backend.name().into(),
+            adapter: backend.adapter(),
             worlds: scene.world.worlds().len(),
             bodies: scene.world.dynamic_count(),
-            steps: 0,
             dt: scene.dt,
-            config: simulation.config().clone(),
-            step_ms: Vec::new(),
-            awake_steps: 0,
-            awake_ms: None,
-            stage_ms: Vec::new(),
-            kernel_ms: Vec::new(),
-            copy_bandwidth: None,
-            manifolds: 0,
-            points: 0,
-            asleep: 0,
-            first_asleep_step: None,
-            all_asleep_step: None,
+            config: config.clone(),
             joints: scene.world.joints.len(),
-            joint_gap: None,
-            sweeps: None,
-            planned_sweeps: None,
-            colors: 0,
-            overflow: 0,
-            reused: 0.0,
-            dispatches: 0,
-            bytes_moved: 0,
-            bytes_up: 0,
-            bytes_down: 0,
-            penetration_max: 0.0,
-            penetration_p95: 0.0,
-            penetration_mean: 0.0,
-            speed_max: 0.0,
-            fastest: None,
-            speed_rms: 0.0,
-            kinetic_energy: 0.0,
-            energy_gained: 0.0,
-            escaped: None,
-            in_place: 0,
-            standing: Vec::new(),
-            non_finite: 0,
-            first_non_finite: None,
-            awake_times: Vec::new(),
-            stage_times: Vec::new(),
-            kernel_times: Vec::new(),
             energy_before: energy(&scene.world),
+            places: scene.world.bodies.iter().map(|body| (body.center_of_mass(), half_height(body))).collect(),
             stands: scene.stands,
+            ..Self::default()
         }
     }
 
@@ -270,13 +239,14 @@ impl RunReport {
         self.bytes_down = stats.traffic.down;
     }
 
-    /// Measures how the run ended.
-    pub fn measure(&mut self, scene: &Scene, simulation: &mut Simulation) {
+    /// Measures how the run ended. Only the world of the simulation is left when contacts are computed anew: both together would take half as much
+    /// memory again as the steps.
+    pub fn measure(&mut self, scene: &Scene, mut simulation: Simulation) {
         self.awake_ms = Spread::of(&self.awake_times);
         let names = StepStats::default().times.stages().map(|s| s.0);
         let stage = |(i, stage): (usize, &'static str)| {
             let times: Vec<f64> = self.stage_times.iter().map(|t| t[i]).collect();
-            Spread::of(&times).map(|Spread { median, min }| StageRow { stage, median, min })
+            Spread::of(&times).map(|ms| StageRow { stage, ms })
         };
         self.stage_ms = names.into_iter().enumerate().filter_map(stage).collect();
         let bandwidth = self.copy_bandwidth;
@@ -284,18 +254,17 @@ impl RunReport {
             let share = |bandwidth: f64| last.bytes as f64 / last.time.as_secs_f64() / bandwidth;
             KernelRow {
                 kernel: last.kernel,
-                median: median(times),
-                min: times.iter().copied().fold(f64::INFINITY, f64::min),
+                ms: Spread::of(times).expect("a kernel has a time"),
                 bytes: last.bytes,
                 share_of_copying: bandwidth.filter(|_| last.bytes > 0 && !last.time.is_zero()).map(share),
             }
         };
         self.kernel_ms = self.kernel_times.iter().map(kernel).collect();
         if self.asleep > 0 {
-            (self.manifolds, self.points) = contacts(simulation);
+            (self.manifolds, self.points) = contacts(&mut simulation);
         }
-        let penetration = simulation.penetration();
-        let world = &simulation.world;
+        let world = &simulation.into_world();
+        let penetration = Penetration::of_world(world, &self.config);
         let (speed, body) = fastest(world);
         self.penetration_max = penetration.max;
         self.penetration_p95 = penetration.p95;
@@ -309,116 +278,23 @@ impl RunReport {
         self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
         let counted = |bodies: Range<usize>| {
             let dynamic = bodies.filter(|&i| world.bodies.get(i).is_some_and(|b| b.kind == BodyKind::Dynamic));
-            let in_place = dynamic.clone().filter(|&i| in_place(&scene.world.bodies[i], &world.bodies[i])).count();
+            let in_place = dynamic.clone().filter(|&i| self.is_in_place(i, &world.bodies[i])).count();
             (dynamic.count(), in_place)
         };
-        self.in_place = counted(0..world.bodies.len()).1;
+        let in_place = counted(0..world.bodies.len()).1;
         let standing = |group: &Group| {
             let (bodies, in_place) = counted(group.bodies.clone());
             Standing { group: group.name.clone(), bodies, in_place }
         };
-        self.standing = scene.groups.iter().map(standing).collect();
+        (self.in_place, self.standing) = (in_place, scene.groups.iter().map(standing).collect());
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
         self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
     }
 
-    /// The report as names and values for people.
-    pub fn rows(&self) -> Vec<(String, String)> {
-        let mut rows = Vec::new();
-        let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
-        let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
-        row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
-        if self.worlds > 1 {
-            let steps = self.worlds as f64 / (1e-3 * median(&self.awake_times));
-            row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
-        }
-        row("backend", format!("{}: {}", self.backend, self.adapter));
-        row(
-            "steps",
-            format!("{} of {:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps", self.steps, self.dt * 1e3),
-        );
-        let (manifolds, points) = (self.manifolds, self.points);
-        if self.asleep == 0 {
-            let (colors, reused) = (self.colors, 100.0 * self.reused);
-            row("contacts", format!("{manifolds} manifolds, {points} points, {colors} colors, {reused:.0} % reused"));
-        } else {
-            row("contacts", format!("{manifolds} manifolds, {points} points, with those that bodies sleep on"));
-            let after = |step: u32| format!("after {:.2} s", f64::from(step) * f64::from(self.dt));
-            let first =
-                self.first_asleep_step.map_or_else(String::new, |first| format!(", the first {}", after(first)));
-            row(
-                "asleep",
-                match self.all_asleep_step {
-                    Some(all) if self.first_asleep_step == Some(all) => format!("all bodies {}", after(all)),
-                    Some(all) => format!("all bodies {}{first}", after(all)),
-                    None => format!("{} of {} bodies{first}", self.asleep, self.bodies),
-                },
-            );
-        }
-        if let Some(gap) = self.joint_gap {
-            row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
-        }
-        if let (Some(sweeps), Some(planned)) = (self.sweeps, self.planned_sweeps) {
-            row("sweeps", format!("{sweeps} of {planned}"));
-        }
-        if self.overflow > 0 {
-            row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
-        }
-        if let Some(times) = self.awake_ms {
-            let which = match self.steps - self.awake_steps {
-                0 => String::new(),
-                _ => format!(", of {} steps with a body awake", self.awake_steps),
-            };
-            row("ms a step", format!("{times}{which}"));
-        }
-        for stage in &self.stage_ms {
-            row(&format!("  {}", stage.stage), format!("{:.3} median, {:.3} least", stage.median, stage.min));
-        }
-        for kernel in &self.kernel_ms {
-            let share = kernel.share_of_copying.map(|s| format!(", {:.1} % of copying", 100.0 * s)).unwrap_or_default();
-            row(
-                &format!("    {}", kernel.kernel),
-                format!("{:.3} median, {:.3} least{share}", kernel.median, kernel.min),
-            );
-        }
-        if self.bytes_up > 0 {
-            let kb = |bytes: u64| bytes as f64 / 1e3;
-            let (up, down) = (kb(self.bytes_up), kb(self.bytes_down));
-            row("last step", format!("{up:.1} kB to the device, {down:.1} kB back, {} dispatches", self.dispatches));
-        }
-        row(
-            "penetration",
-            format!(
-                "{:.3} mm deepest, 95 % within {:.3}, mean {:.3}",
-                self.penetration_max * 1e3,
-                self.penetration_p95 * 1e3,
-                self.penetration_mean * 1e3
-            ),
-        );
-        let (rms, most) = (self.speed_rms * 1e3, self.speed_max * 1e3);
-        row(
-            "speed",
-            match &self.fastest {
-                Some(body) => format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})"),
-                None => "0 mm/s: nothing moves".into(),
-            },
-        );
-        row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
-        if let Some(escaped) = self.escaped {
-            row("container", format!("{escaped} bodies outside"));
-        }
-        if self.stands {
-            row("in place", format!("{} of {}", self.in_place, self.bodies));
-        }
-        if !self.standing.is_empty() {
-            let up = || self.standing.iter().filter(|s| s.in_place == s.bodies);
-            let largest = up().max_by_key(|s| s.bodies).map_or("none", |s| &s.group);
-            row("standing", format!("{} of {} groups; the largest is {largest}", up().count(), self.standing.len()));
-        }
-        if let Some(body) = &self.first_non_finite {
-            row("non-finite", format!("{} bodies, first {body}", self.non_finite));
-        }
-        rows
+    /// As [`drystone::metrics::in_place`], from the place of the body at the start.
+    fn is_in_place(&self, index: usize, body: &Body) -> bool {
+        let (center, half_height) = self.places[index];
+        center.as_dvec3().distance(body.center_of_mass().as_dvec3()) < half_height
     }
 }
 

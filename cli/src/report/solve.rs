@@ -11,7 +11,7 @@ use drystone::contacts::ContactProblem;
 use drystone::residuals::{Measure, Residuals};
 use drystone::solver::{Order, Solver};
 
-use super::clock::Clock;
+use super::rounds::Clock;
 
 /// Errors `e_vel` whose sweeps are reported.
 const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
@@ -92,9 +92,6 @@ impl SolveReport {
     }
 
     /// Solves a problem in f64, or in f32 on a backend.
-    ///
-    /// # Errors
-    /// A contact that no kernel takes ([`Solver::new`]), or a backend that cannot run.
     pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
         let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;
         let measure = Measure::new(problem);

@@ -15,9 +15,6 @@ pub struct Trajectory {
 
 impl Trajectory {
     /// Begins a file.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
         let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(files::Writer::create(path)?) };
         let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
@@ -27,9 +24,6 @@ impl Trajectory {
     }
 
     /// Writes the bodies that can move.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
         for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
             let (p, q) = (body.center_of_mass(), body.rotation);
@@ -43,9 +37,6 @@ impl Trajectory {
     }
 
     /// Ends the file and gives it its name.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn finish(self) -> Result<()> {
         let unwritten = |e: csv::IntoInnerError<_>| Error::file(&self.path)(e.into_error());
         self.writer.into_inner().map_err(unwritten)?.finish()

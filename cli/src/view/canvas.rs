@@ -1,6 +1,7 @@
 //! Pictures without a window: drawn into a texture and read back.
 
-use super::renderer::{Quality, Renderer, Shot};
+use super::pipeline::Quality;
+use super::renderer::{Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
 use drystone::world::World;
 use drystone::{Error, Result};
@@ -31,9 +32,6 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Canvas {
     /// A canvas on the best adapter there is.
-    ///
-    /// # Errors
-    /// No adapter, or a size that it cannot draw.
     pub fn new(world: &World, (width, height): (u32, u32)) -> Result<Self> {
         let (device, queue, summary) = open_device(AdapterChoice::Best)?;
         let most = device.limits().max_texture_dimension_2d;
@@ -71,9 +69,6 @@ impl Canvas {
     }
 
     /// Draws `shot`.
-    ///
-    /// # Errors
-    /// The device was lost.
     pub fn draw(&mut self, shot: &Shot) -> Result<Picture> {
         let view = self.texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.renderer.draw(&view, self.size, shot);

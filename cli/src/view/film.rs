@@ -79,9 +79,6 @@ impl Film {
     }
 
     /// Reads the motion that `drystone run --out` wrote.
-    ///
-    /// # Errors
-    /// The file cannot be read, or is not such a motion of this scene; the line is named.
     pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
         if color.needs_run() {
             return Err(Error::input(
@@ -131,9 +128,6 @@ impl Film {
     }
 
     /// Draws every frame from one place, in order, on a canvas for the film's world.
-    ///
-    /// # Errors
-    /// The device was lost, or what `show` returns.
     pub fn draw(&self, canvas: &mut Canvas, look: &Look, mut show: impl FnMut(&Picture) -> Result<()>) -> Result<()> {
         let world = &self.scene.world;
         let bounds = self.bounds();

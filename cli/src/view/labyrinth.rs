@@ -7,7 +7,7 @@ use super::camera::{Bounds, Camera};
 use super::canvas::{Canvas, Picture};
 use super::colors::Rgba;
 use super::renderer::Shot;
-use super::window::{Pointer, Show};
+use super::show::{Pointer, Show};
 use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
 use drystone::Result;
 use drystone::backend::{BackendChoice, choose};
@@ -40,9 +40,6 @@ fn camera_for(map: &Map, aspect: f32) -> Camera {
 }
 
 /// Draws a game that was played, from the poses of its bodies.
-///
-/// # Errors
-/// The device was lost, or what `show` returns.
 pub fn draw_game(
     canvas: &mut Canvas,
     map: &Map,
@@ -74,9 +71,6 @@ pub struct Labyrinth {
 
 impl Labyrinth {
     /// A game that begins with the first tilt.
-    ///
-    /// # Errors
-    /// No such backend, or a setting out of range.
     pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
         let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
         let held = [false; 4];

@@ -10,7 +10,7 @@ use super::colors::{ColorBy, Rgba};
 use super::film::bounds;
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
-use super::window::{Pointer, Show};
+use super::show::{Pointer, Show};
 use drystone::Result;
 use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
@@ -66,9 +66,6 @@ struct Grabbed {
 
 impl Live {
     /// A scene that is about to run.
-    ///
-    /// # Errors
-    /// No such backend, or a world or settings that cannot be run.
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;

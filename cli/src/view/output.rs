@@ -41,9 +41,6 @@ impl Drop for Ffmpeg {
 
 impl Output {
     /// Refuses a name whose ending says no form, before anything is made for it.
-    ///
-    /// # Errors
-    /// It is such a name.
     pub fn check(path: &Path) -> Result<()> {
         let known = path.extension().is_some_and(|e| e == "png" || e == "gif" || e == "mp4");
         if path.file_name().is_some() && (known || is_folder(path)) { Ok(()) } else { Err(unknown(path)) }
@@ -51,9 +48,6 @@ impl Output {
 
     /// Opens `path` for pictures of `size`, `rate` of them a second; its ending says in which form: `.png`, `.gif`, `.mp4`, or a
     /// slash for a folder of numbered PNGs.
-    ///
-    /// # Errors
-    /// Another ending, a place that cannot be written, or no ffmpeg for `.mp4`.
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
         Self::check(path)?;
         let draft = Draft::of(path)?;
@@ -83,9 +77,6 @@ impl Output {
     }
 
     /// Adds a picture.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn add(&mut self, picture: &Picture) -> Result<()> {
         let path = &self.path;
         match &mut self.kind {
@@ -111,9 +102,6 @@ impl Output {
     }
 
     /// Ends the file and gives it its name.
-    ///
-    /// # Errors
-    /// It cannot be written, or ffmpeg says no.
     pub fn finish(self) -> Result<()> {
         let Self { path, draft, kind, .. } = self;
         match kind {

@@ -12,27 +12,9 @@ use super::camera::{Bounds, Camera};
 use super::colors::Rgba;
 use super::mesh::{Instance, Meshes, Poses, Vertex};
 use super::overlay::LineEnd;
+use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
 use drystone::world::World;
 
-/// How much work goes into a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Quality {
-    /// Samples of a pixel, 1 or 4.
-    samples: u32,
-    /// Side of the shadow map in texels.
-    shadow_size: u32,
-    /// Places of the shadow map that are compared on either side of a point.
-    shadow_reach: u32,
-}
-
-impl Quality {
-    /// For pictures, and for windows on hardware.
-    pub const FINE: Self = Self { samples: 4, shadow_size: 2048, shadow_reach: 1 };
-    /// For windows on a software adapter.
-    pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
-}
-
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
@@ -283,113 +265,5 @@ fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
         let above = eye[k] > container.high[k] && b.low[k] > container.high[k] - slack;
         let below = eye[k] < container.low[k] && b.high[k] < container.low[k] + slack;
         (above || below) && is_wide((k + 1) % 3) && is_wide((k + 2) % 3)
-    })
-}
-
-fn texture(
-    device: &wgpu::Device,
-    (width, height): (u32, u32),
-    format: wgpu::TextureFormat,
-    sample_count: u32,
-    usage: wgpu::TextureUsages,
-) -> wgpu::TextureView {
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn cleared_depth(view: &wgpu::TextureView, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
-    let depth_ops = Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store });
-    wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
-}
-
-fn bind(
-    device: &wgpu::Device,
-    kinds: &[wgpu::BindingType],
-    resources: &[wgpu::BindingResource],
-) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
-    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty,
-        count: None,
-    };
-    let entries: Vec<_> = (0..).zip(kinds).map(entry).collect();
-    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
-    let bound = (0..).zip(resources).map(|(binding, r)| wgpu::BindGroupEntry { binding, resource: r.clone() });
-    let entries: Vec<_> = bound.collect();
-    let group =
-        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
-    (layout, group)
-}
-
-fn layout_of<T>(step_mode: wgpu::VertexStepMode, attributes: &[wgpu::VertexAttribute]) -> wgpu::VertexBufferLayout<'_> {
-    wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
-}
-
-/// What tells one pipeline from another.
-struct Drawing<'a> {
-    layout: &'a wgpu::BindGroupLayout,
-    module: &'a wgpu::ShaderModule,
-    vertex: &'a str,
-    /// None draws depth only.
-    fragment: Option<&'a str>,
-    buffers: &'a [wgpu::VertexBufferLayout<'a>],
-    topology: wgpu::PrimitiveTopology,
-    depth: wgpu::CompareFunction,
-    format: wgpu::TextureFormat,
-    quality: Quality,
-}
-
-fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(d.vertex),
-        bind_group_layouts: &[Some(d.layout)],
-        immediate_size: 0,
-    });
-    let targets = [Some(d.format.into())];
-    let buffers: Vec<_> = d.buffers.iter().cloned().map(Some).collect();
-    let constants = [("SHADOW_REACH", f64::from(d.quality.shadow_reach))];
-    let compilation_options = wgpu::PipelineCompilationOptions::default;
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(d.vertex),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: d.module,
-            entry_point: Some(d.vertex),
-            compilation_options: compilation_options(),
-            buffers: &buffers,
-        },
-        fragment: d.fragment.map(|entry| wgpu::FragmentState {
-            module: d.module,
-            entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: if entry == "shade" { &constants } else { &[] },
-                ..Default::default()
-            },
-            targets: &targets,
-        }),
-        primitive: wgpu::PrimitiveState { topology: d.topology, ..Default::default() },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(d.depth == wgpu::CompareFunction::Less),
-            depth_compare: Some(d.depth),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: if d.fragment.is_some() { d.quality.samples } else { 1 },
-            ..Default::default()
-        },
-        multiview_mask: None,
-        cache: None,
     })
 }

@@ -129,7 +129,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "rolling",
-        summary: "balls on a plate that is pushed over the ground: they roll on it, all along the push, as on paper",
+        summary: "balls on a plate that is pushed over the ground: they roll in the direction of the push, as theory predicts",
         parameters: &[Parameter::real("angle", 60.0, (0.0, 360.0), "direction of the push, from x to z [degrees]")],
         bodies: |_| 26.0,
         build: |v| Ok(basics::rolling(v[0] as f32)),
@@ -143,7 +143,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "tallest",
-        summary: "towers of step, 2 step, ... n cubes, one group each: the report names the largest that stands",
+        summary: "towers of step, 2 step, ... n cubes: the report names the highest tower that stands",
         parameters: &[
             Parameter::whole("n", 30, (1.0, 2000.0), "cubes of the tallest tower"),
             Parameter::whole("step", 2, (1.0, 2000.0), "how many more cubes each tower has; at most n"),
@@ -156,7 +156,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of cubes, every other one heavy, a light one lowest: it stands, 1.5 mm deep, or 0.01 with substeps=32",
+        summary: "a stack of cubes, light and heavy in turn, a light one lowest: it stands with 1.5 mm of overlap, or 0.01 mm with substeps=32",
         parameters: &[
             CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
@@ -207,7 +207,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "arch",
-        summary: "a semicircular arch of wedges without mortar, mu 0.6: it stands from a thickness of 0.12 on",
+        summary: "a semicircular arch of wedges without mortar, mu 0.6: it stands from a thickness of 0.12 of the radius on",
         parameters: &[
             Parameter::whole("voussoirs", 17, (3.0, 201.0), "number of wedges"),
             Parameter::real("thickness", 0.15, (0.05, 0.5), "thickness relative to the mean radius"),
@@ -217,7 +217,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "card-house",
-        summary: "pairs of thin plates lean at each other, plates across them carry the next storey: it stands",
+        summary: "pairs of thin plates lean against each other, and plates across them carry the next storey: the house stands",
         parameters: &[
             Parameter::whole("storeys", 3, (1.0, 100.0), "number of storeys"),
             Parameter::real("angle", 20.0, (5.0, 45.0), "lean of the cards from the vertical [degrees]"),

@@ -20,9 +20,6 @@ pub enum Change {
 
 impl Bench {
     /// Reads what `drystone bench --json` printed.
-    ///
-    /// # Errors
-    /// The file cannot be read, or holds something else.
     pub fn read(path: &std::path::Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
         serde_json::from_str(&text).map_err(|e| {

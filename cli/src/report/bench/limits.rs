@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use drystone::Result;
 use drystone::backend::Backend;
 use drystone::backend::cpu::Cpu;
 use drystone::config::{FrictionRule, SolverConfig};
@@ -17,9 +18,9 @@ use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
 use drystone::stages::math::Lane;
 use drystone::stages::plan::StepPlan;
 use drystone::stages::problem::StepProblem;
-use drystone::{Error, Result};
 
 use super::settled;
+use crate::report::rounds::interleave;
 
 /// Bytes that a sweep of the lanes streams a point of a manifold of four: a row of the point, its impulses there and back, and a
 /// quarter of the header. Bodies, which stay in a cache while a pile is small, are not in it.
@@ -60,19 +61,11 @@ impl LimitRow {
 const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
 
 /// Measures a settled pile of `boxes` with each number of `threads`, over so many `turns`.
-///
-/// # Errors
-/// The pile is none, a pool cannot be made.
 pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
     let config = SolverConfig::default().without_sleep();
     let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;
     let problem = simulation.next_problem(dt)?.0;
-    let pools: Result<Vec<_>> = threads
-        .iter()
-        .map(|&t| rayon::ThreadPoolBuilder::new().num_threads(t).build().map_err(|e| Error::input(format!("{t}: {e}"))))
-        .collect();
-    let pools = pools?;
-    let row = |&threads: &usize| LimitRow {
+    let row = |threads: usize| LimitRow {
         threads,
         manifolds: problem.swept_contacts().count(),
         points: problem.swept_contacts().map(|contact| contact.point_count as usize).sum(),
@@ -81,25 +74,25 @@ pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dy
         peak: 0.0,
         triads: SIZES.map(|size| (size, 0.0)).to_vec(),
     };
-    let mut rows: Vec<_> = threads.iter().map(row).collect();
-    let mut best = vec![[f64::INFINITY; 2]; rows.len()];
-    for _ in 0..turns {
-        for ((row, pool), best) in rows.iter_mut().zip(&pools).zip(&mut best) {
-            let mut cpu = Cpu::new();
-            for (best, sweeps) in best.iter_mut().zip([FEW, MANY]) {
-                *best = best.min(pool.install(|| seconds(&mut cpu, &problem, sweeps))?);
-            }
-            row.peak = row.peak.max(peak(pool));
-            for (size, rate) in &mut row.triads {
-                *rate = rate.max(triad(pool, *size / row.threads));
-            }
-            after_turn();
+    let participant = |&threads: &usize| Ok((super::pool(threads)?, row(threads), [f64::INFINITY; 2]));
+    let mut all = threads.iter().map(participant).collect::<Result<Vec<_>>>()?;
+    interleave(turns, &mut all, |_, (pool, row, best)| {
+        let mut cpu = Cpu::new();
+        for (best, sweeps) in best.iter_mut().zip([FEW, MANY]) {
+            *best = best.min(pool.install(|| seconds(&mut cpu, &problem, sweeps))?);
         }
-    }
-    for (row, [few, many]) in rows.iter_mut().zip(best) {
+        row.peak = row.peak.max(peak(pool));
+        for (size, rate) in &mut row.triads {
+            *rate = rate.max(triad(pool, *size / row.threads));
+        }
+        after_turn();
+        Ok(())
+    })?;
+    let swept = |(_, mut row, [few, many]): (_, LimitRow, [f64; 2])| {
         row.sweeps = f64::from(MANY - FEW) * row.points as f64 / (many - few);
-    }
-    Ok(rows)
+        row
+    };
+    Ok(all.into_iter().map(swept).collect())
 }
 
 /// Sweeps whose times are subtracted, so that all that is done once a step drops out.

@@ -14,6 +14,7 @@ pub use machine::Machine;
 
 use serde::{Deserialize, Serialize};
 
+use crate::report::rounds::{interleave, quartiles};
 use crate::settings;
 use drystone::Simulation;
 use drystone::backend::Backend;
@@ -23,7 +24,7 @@ use drystone::metrics::rms_speed;
 use drystone::residuals::Residuals;
 use drystone::scenes::Scene;
 use drystone::stages::plan::Kernel;
-use drystone::stats::{StageTimes, quantile};
+use drystone::stats::{StageTimes, median};
 use drystone::{Error, Result};
 
 /// The scenes of a whole bench: `name:key=value,...`, see [`Scene::find_spec`].
@@ -129,7 +130,7 @@ struct Way {
 }
 
 /// One scene that is measured.
-struct Course {
+struct Case {
     spec: String,
     hash: String,
     dt: f32,
@@ -140,9 +141,6 @@ struct Course {
 
 /// Measures `specs` over `turns` turns on each of the backends that `open` makes, with each number of `threads`. `after_turn` is
 /// called after each turn of each scene, those to settle included.
-///
-/// # Errors
-/// A scene cannot be found, a pool cannot be made, a backend cannot run.
 pub fn bench(
     specs: &[String],
     config: &SolverConfig,
@@ -151,18 +149,17 @@ pub fn bench(
     turns: usize,
     after_turn: &mut dyn FnMut(),
 ) -> Result<Bench> {
-    let mut courses = Vec::new();
+    let mut cases = Vec::new();
     for spec in specs {
-        courses.push(Course::new(spec, config, threads, open)?);
+        cases.push(Case::new(spec, config, threads, open)?);
         after_turn();
     }
-    for _ in 0..turns {
-        for course in &mut courses {
-            course.turn()?;
-            after_turn();
-        }
-    }
-    let rows = courses.into_iter().flat_map(|course| course.rows(config)).collect();
+    interleave(turns, &mut cases, |_, case| {
+        case.turn()?;
+        after_turn();
+        Ok(())
+    })?;
+    let rows = cases.into_iter().flat_map(|case| case.rows(config)).collect();
     Ok(Bench { machine: Machine::this(), rows })
 }
 
@@ -184,7 +181,12 @@ fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32
     Ok((simulation, hash, dt))
 }
 
-impl Course {
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| Error::input(format!("{threads} threads: {e}")))
+}
+
+impl Case {
     fn new(
         spec: &str,
         config: &SolverConfig,
@@ -194,9 +196,7 @@ impl Course {
         let mut ways = Vec::new();
         for &threads in threads {
             for backend in open()? {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                let pool = pool.map_err(|e| Error::input(format!("{threads} threads: {e}")))?;
-                ways.push(Way { backend: Some(backend), pool, turns: Vec::new() });
+                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
             }
         }
         let (simulation, hash, dt) = settled(spec, config)?;
@@ -219,7 +219,7 @@ impl Course {
             });
             way.backend = Some(simulation.set_backend(before));
             stepped?;
-            way.turns.push(std::array::from_fn(|i| middle(steps.iter().map(|s| s[i]), 0.5)));
+            way.turns.push(std::array::from_fn(|i| median(&column(&steps, i))));
         }
         Ok(())
     }
@@ -230,7 +230,8 @@ impl Course {
         let residual = residual(&mut simulation, dt);
         let world = &simulation.world;
         let row = |mut way: Way| {
-            let over_turns = |i: usize, q: f64| middle(way.turns.iter().map(|t| t[i]), q);
+            let [detect, color, prepare, run, store] = std::array::from_fn(|i| median(&column(&way.turns, i)));
+            let [ms_low, ms, ms_high] = quartiles(&column(&way.turns, 5));
             let backend = way.backend.take().expect("given back after each turn");
             let name = backend.name().into();
             BenchRow {
@@ -247,14 +248,14 @@ impl Course {
                 joints: stats.joints,
                 colors: stats.colors,
                 reused: 1.0 - stats.computed as f64 / stats.pairs.max(1) as f64,
-                ms: over_turns(5, 0.5),
-                ms_low: over_turns(5, 0.25),
-                ms_high: over_turns(5, 0.75),
-                detect: over_turns(0, 0.5),
-                color: over_turns(1, 0.5),
-                prepare: over_turns(2, 0.5),
-                run: over_turns(3, 0.5),
-                store: over_turns(4, 0.5),
+                ms,
+                ms_low,
+                ms_high,
+                detect,
+                color,
+                prepare,
+                run,
+                store,
                 penetration_max: penetration.max,
                 penetration_mean: penetration.mean,
                 speed_rms: rms_speed(world),
@@ -271,8 +272,8 @@ fn milliseconds(times: &StageTimes) -> [f64; 6] {
     [detect, color, prepare, run, store, times.total().as_secs_f64() * 1e3]
 }
 
-fn middle(values: impl Iterator<Item = f64>, q: f64) -> f64 {
-    quantile(&values.collect::<Vec<_>>(), q)
+fn column(rows: &[[f64; 6]], column: usize) -> Vec<f64> {
+    rows.iter().map(|row| row[column]).collect()
 }
 
 /// How far the impulses of the next step are from solving its first substep when that ends; takes that step.

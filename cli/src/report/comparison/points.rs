@@ -30,10 +30,7 @@ const LARGE: usize = 2000;
 const LARGE_STEPS: u32 = 300;
 
 /// The scenes of the report.
-///
-/// # Errors
-/// Never: the catalogue has them.
-pub fn course(extent: Extent) -> Result<Vec<Scene>> {
+pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
     let named = |name: &&str| {
         let scene = scene(name)?;
@@ -44,9 +41,6 @@ pub fn course(extent: Extent) -> Result<Vec<Scene>> {
 }
 
 /// A scene by one word as [`Scene::find_spec`] has it, which is its name then too.
-///
-/// # Errors
-/// As there.
 pub fn scene(word: &str) -> Result<Scene> {
     Ok(Scene { name: word.to_owned(), ..Scene::find_spec(word)? })
 }
@@ -73,9 +67,6 @@ const SWEEPS: [(u32, u32); 8] = [(1, 16), (4, 4), (1, 4), (2, 4), (2, 16), (4, 2
 /// Not the product of all axes, which is some hundred settings a scene: the line of substeps, and from it one step along each
 /// other axis. The reference gives the bits of the CPU's lanes, so its errors are theirs: it stands for itself at the defaults
 /// only, to show its time. Shaders on a software adapter run at the defaults only, for the same reason.
-///
-/// # Errors
-/// The scene is not fit to be simulated.
 pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>> {
     let few = is_large(scene) || extent == Extent::Quick;
     let default = SolverConfig::default().substeps;

@@ -1,11 +1,11 @@
-//! Runs all scenes with all contenders, one race after another; what is finished is kept and not run again.
+//! Runs all contenders on one scene after another; what is finished is kept and not run again.
 
 use std::path::{Path, PathBuf};
 
 use super::contender::{Contender, Extent, Setting, Team};
+use super::measure::{Row, blocks, measure};
 use super::origin::Origin;
 use super::page;
-use super::race::{Row, blocks, race};
 use super::solves::{self, SolveRow, solves};
 use super::table::Table;
 use crate::files;
@@ -27,42 +27,29 @@ pub struct Survey<'a> {
     pub out: PathBuf,
 }
 
-/// How far a survey is.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
-    /// What is running.
-    pub what: &'a str,
-    /// How much is done, in some unit.
-    pub done: u64,
-    /// How much there is.
-    pub total: u64,
-}
-
-/// Races of one survey, ready to be drawn.
+/// Rows of one survey, ready to be drawn.
 pub struct Report {
-    races: Vec<Vec<Row>>,
+    results: Vec<Vec<Row>>,
     solves: Vec<Vec<SolveRow>>,
 }
 
 impl Survey<'_> {
-    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each race.
+    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each scene. `progress` is told what runs, how much is done, and how much
+    /// there is in all.
     ///
-    /// A race counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
+    /// A scene counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
     /// on the same machine with as many threads.
-    ///
-    /// # Errors
-    /// The folder cannot be written, holds other files of these names, or a contender gives up.
-    pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&Progress)) -> Result<Report> {
+    pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(scenes_path(&self.out))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
         let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
         let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
-        let (mut before, mut races) = (0, Vec::new());
+        let (mut before, mut results) = (0, Vec::new());
         for scene in &self.scenes {
             let mut contenders = self.contenders(scene)?;
             let settings: Vec<_> = contenders.iter().map(|c| c.setting()).collect();
-            progress(&Progress { what: &scene.name, done: before, total });
+            progress(&scene.name, before, total);
             let rows = match finished(table.rows(), scene, origin, &settings) {
                 Some(rows) => rows,
                 None => {
@@ -71,20 +58,20 @@ impl Survey<'_> {
                     let mut after_block = || {
                         turn += 1;
                         let done = before + weight(scene) * turn / turns;
-                        progress(&Progress { what: &scene.name, done, total });
+                        progress(&scene.name, done, total);
                     };
-                    let rows = race(scene, &mut contenders, origin, &mut after_block)?;
+                    let rows = measure(scene, &mut contenders, origin, &mut after_block)?;
                     table.add(rows.clone())?;
                     rows
                 }
             };
-            races.push(rows);
+            results.push(rows);
             before += weight(scene);
         }
         let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
         let mut all = Vec::new();
         for problem in &self.problems {
-            progress(&Progress { what: &problem.name, done: before, total });
+            progress(&problem.name, before, total);
             let rows = match solved(table.rows(), &solves::hash(problem), origin) {
                 Some(rows) => rows,
                 None => {
@@ -96,7 +83,7 @@ impl Survey<'_> {
             all.push(rows);
             before += problem_weight(problem);
         }
-        Ok(Report { races, solves: all })
+        Ok(Report { results, solves: all })
     }
 
     fn contenders(&self, scene: &Scene) -> Result<Vec<Box<dyn Contender>>> {
@@ -107,7 +94,7 @@ impl Survey<'_> {
 
 /// The rows of `settings`, in their order, of the last run that has all of them.
 fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) -> Option<Vec<Row>> {
-    let (hash, steps) = (scene.content_hash(), super::race::steps(scene));
+    let (hash, steps) = (scene.content_hash(), super::measure::steps(scene));
     let fit = |row: &&Row| {
         let Origin { build, commit: _, machine, threads } = origin;
         row.hash == hash
@@ -142,27 +129,21 @@ fn scenes_path(folder: &Path) -> PathBuf {
 }
 
 impl Report {
-    /// The last race of each scene that the folder has.
-    ///
-    /// # Errors
-    /// There are no rows in it, or they cannot be read.
+    /// The last run of each scene that the folder has.
     pub fn read(folder: &Path) -> Result<Self> {
         let (rows, solved) =
             (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
         if rows.rows().is_empty() && solved.rows().is_empty() {
             return Err(Error::input(format!("{}: no rows to draw", scenes_path(folder).display())));
         }
-        let races = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
+        let results = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
         let solves = last_of_each(solved.rows(), |row| (&row.problem, &row.run));
-        Ok(Self { races, solves })
+        Ok(Self { results, solves })
     }
 
     /// Writes `index.html` and `speed-against-error.svg` into the folder, and says where the page is.
-    ///
-    /// # Errors
-    /// A file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
-        let page = page::page(&self.races, &self.solves)?;
+        let page = page::page(&self.results, &self.solves)?;
         let path = folder.join("index.html");
         files::write(&folder.join("speed-against-error.svg"), page.main.as_bytes())?;
         files::write(&path, page.html.as_bytes())?;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
-use crate::report::clock::Clock;
+use crate::report::rounds::{Clock, interleave, quartiles};
 use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
 use drystone::scenes::Scene;
@@ -94,9 +94,6 @@ impl Row {
     }
 
     /// How long it took relative to another row.
-    ///
-    /// # Errors
-    /// The other row is of another run or another scene: such times say nothing about each other.
     pub fn time_ratio(&self, other: &Self) -> Result<f64> {
         for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
             if own != others {
@@ -113,7 +110,7 @@ impl Row {
     }
 }
 
-/// Times and errors of one contender while the race is on.
+/// Times and errors of one contender while it is measured.
 #[derive(Default)]
 struct Lane {
     ms: Vec<f64>,
@@ -125,45 +122,38 @@ struct Lane {
 
 /// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called after
 /// every block of every contender, [`blocks`] times a contender.
-///
-/// # Errors
-/// A contender gave up.
-pub fn race(
+pub fn measure(
     scene: &Scene,
     contenders: &mut [Box<dyn Contender + '_>],
     origin: &Origin,
     after_block: &mut dyn FnMut(),
 ) -> Result<Vec<Row>> {
-    let blocks = blocks(scene.steps);
+    let blocks = blocks(scene.steps) as usize;
     let run = Origin::now();
-    let mut lanes: Vec<_> = contenders.iter().map(|_| Lane { finite: true, ..Lane::default() }).collect();
-    for block in 0..blocks {
-        for (contender, lane) in contenders.iter_mut().zip(&mut lanes) {
-            if lane.finite {
-                let clock = Clock::of(&contender.setting().backend);
-                let begin = clock.now();
-                for _ in 0..BLOCK {
-                    contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
-                }
-                let ms = (clock.now() - begin).as_secs_f64() * 1e3 / f64::from(BLOCK);
-                let world = contender.world();
-                lane.finite = world.first_non_finite().is_none();
-                if lane.finite && 2 * block >= blocks {
-                    lane.ms.push(ms);
-                    lane.penetration.push(Penetration::of_world(world, &SolverConfig::default()));
-                    lane.speed.push(rms_speed(world));
-                    lane.gap.push(world.joint_gap().into());
-                }
+    let lane = |contender| (contender, Lane { finite: true, ..Lane::default() });
+    let mut lanes: Vec<_> = contenders.iter_mut().map(lane).collect();
+    interleave(blocks, &mut lanes, |block, (contender, lane)| {
+        if lane.finite {
+            let clock = Clock::of(&contender.setting().backend);
+            let begin = clock.now();
+            for _ in 0..BLOCK {
+                contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
             }
-            after_block();
+            let ms = (clock.now() - begin).as_secs_f64() * 1e3 / f64::from(BLOCK);
+            let world = contender.world();
+            lane.finite = world.first_non_finite().is_none();
+            if lane.finite && 2 * block >= blocks {
+                lane.ms.push(ms);
+                lane.penetration.push(Penetration::of_world(world, &SolverConfig::default()));
+                lane.speed.push(rms_speed(world));
+                lane.gap.push(world.joint_gap().into());
+            }
         }
-    }
-    let first = lanes[0].ms.clone();
-    Ok(contenders
-        .iter_mut()
-        .zip(lanes)
-        .map(|(c, lane)| row(scene, c.setting(), c.world(), &lane, &first, origin, &run))
-        .collect())
+        after_block();
+        Ok(())
+    })?;
+    let first = lanes[0].1.ms.clone();
+    Ok(lanes.iter_mut().map(|(c, lane)| row(scene, c.setting(), c.world(), lane, &first, origin, &run)).collect())
 }
 
 /// Blocks of a run of so many steps.
@@ -171,15 +161,15 @@ pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(2)
 }
 
-/// Steps that a race over the scene takes.
+/// Steps that each contender takes on the scene.
 pub(super) fn steps(scene: &Scene) -> u32 {
     blocks(scene.steps) * BLOCK
 }
 
 fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64], origin: &Origin, run: &str) -> Row {
     let ratios: Vec<f64> = lane.ms.iter().zip(first).map(|(ms, first)| ms / first).collect();
-    let [ms_low, ms, ms_high] = [0.25, 0.5, 0.75].map(|q| quantile(&lane.ms, q));
-    let [ratio_low, ratio, ratio_high] = [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q));
+    let [ms_low, ms, ms_high] = quartiles(&lane.ms);
+    let [ratio_low, ratio, ratio_high] = quartiles(&ratios);
     let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
     let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
     let clock = Clock::of(&setting.backend).name().into();

@@ -1,14 +1,25 @@
-//! Time against error as SVG, and performance profiles.
+//! Pictures of points and lines as SVG text.
 
-use std::ops::Range;
+mod axis;
 
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::coord::ranged1d::Ranged;
 use plotters::prelude::*;
 
-use super::super::plot::COLORS;
+pub use axis::Scale;
+use axis::{Axis, plain};
 
-/// Points of one kind, and the line along the best of them.
+/// Colors that differ for the color-blind too (Okabe and Ito).
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+
+/// Points of one kind, and a line.
 pub struct Series {
     /// What the legend calls it.
     pub name: String,
@@ -16,7 +27,7 @@ pub struct Series {
     pub look: usize,
     /// All points, with what is written beside them.
     pub points: Vec<(f64, f64, String)>,
-    /// Corners of the line.
+    /// Corners of the line: straight from one to the next where x is linear, else in stairs.
     pub line: Vec<(f64, f64)>,
 }
 
@@ -28,97 +39,30 @@ pub struct Frame<'a> {
     pub x: &'a str,
     /// What y is, with its unit.
     pub y: &'a str,
-    /// Whether y goes from 0 to 1 instead of over decades.
-    pub share: bool,
+    /// How x and y are divided.
+    pub scales: (Scale, Scale),
     /// Width and height (pixels).
     pub size: (u32, u32),
 }
 
-/// An axis over decades, with a key point at each and at its half.
-struct Decades(Range<f64>);
-
-/// Most decades that have a key point each.
-const MOST_DECADES: usize = 12;
-
-/// An axis from 0 to 1.
-struct Share;
-
-impl Ranged for Decades {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let (low, high) = (self.0.start.log10(), self.0.end.log10());
-        // What lies beyond the axis, such as infinity, is drawn at its end: pixels have no room for more.
-        let value = value.clamp(self.0.start, self.0.end);
-        limit.0 + ((value.log10() - low) / (high - low) * f64::from(limit.1 - limit.0)).round() as i32
-    }
-
-    fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
-        let decades = |r: &Range<f64>| (r.start.log10().floor() as i32, r.end.log10().ceil() as i32);
-        let (low, high) = decades(&self.0);
-        // Between decades only where there are few of them, and some decades only where there are many.
-        let steps: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let every = ((high - low) as usize).div_ceil(MOST_DECADES).max(1);
-        let all = (low..=high).step_by(every).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
-        all.filter(|x| *x >= 0.999 * self.0.start && *x <= 1.001 * self.0.end).collect()
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.0.clone()
-    }
-}
-
-impl Ranged for Share {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        limit.0 + (value * f64::from(limit.1 - limit.0)).round() as i32
-    }
-
-    fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
-        vec![0.0, 0.25, 0.5, 0.75, 1.0]
-    }
-
-    fn range(&self) -> Range<f64> {
-        0.0..1.0
-    }
-}
-
-/// Draws the series into one picture. Both axes are over decades, but for shares.
+/// Draws the series into one picture.
 pub fn svg(frame: &Frame, series: &[Series]) -> String {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, frame.size).into_drawing_area();
     let points = || series.iter().flat_map(|s| s.points.iter().map(|p| (p.0, p.1)).chain(s.line.iter().copied()));
-    let x = decades(points().map(|p| p.0));
+    let (x, y) = (Axis::of(frame.scales.0, points().map(|p| p.0)), Axis::of(frame.scales.1, points().map(|p| p.1)));
     // Writing to memory does not fail.
-    let drawn = match frame.share {
-        true => draw(&root, frame, series, x, Share),
-        false => draw(&root, frame, series, x, decades(points().map(|p| p.1))),
-    };
+    let drawn = draw(&root, frame, series, x, y);
     debug_assert!(drawn.is_ok(), "{drawn:?}");
     drop(root);
     text
 }
 
-/// From a little below the least to a little above the largest of the values.
-fn decades(values: impl Iterator<Item = f64>) -> Decades {
-    let fit = values.filter(|v| *v > 0.0 && v.is_finite());
-    let (low, high) = fit.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    // Both ends stay numbers that have a logarithm: 1.8e308 times 1.3 is infinite, and 1e-323 has lost its digits.
-    let ends = || (low / 1.3).max(f64::MIN_POSITIVE)..(high * 1.3).min(f64::MAX);
-    if low <= high { Decades(ends()) } else { Decades(0.1..10.0) }
-}
-
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw<'a, Y>(root: &DrawingArea<SVGBackend<'a>, Shift>, frame: &Frame, series: &[Series], x: Decades, y: Y) -> Drawn
-where
-    Y: Ranged<ValueType = f64, FormatOption = DefaultFormatting>,
-{
+fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series], x: Axis, y: Axis) -> Drawn {
     root.fill(&WHITE)?;
-    let right = x.0.end;
+    let right = x.range().end;
     let mut chart = ChartBuilder::on(root)
         .caption(frame.title, ("sans-serif", 16))
         .margin(8)
@@ -141,9 +85,12 @@ where
     let mut taken: Vec<(i32, i32)> = Vec::new();
     for Series { name, look, points, line } in series {
         let color = COLORS[look % COLORS.len()];
-        let stairs = stairs(line, right, frame.share);
+        let path = match frame.scales {
+            (Scale::Linear, _) => line.clone(),
+            (_, y) => stairs(line, right, y == Scale::Share),
+        };
         chart
-            .draw_series(LineSeries::new(stairs, color.stroke_width(2)))?
+            .draw_series(LineSeries::new(path, color.stroke_width(2)))?
             .label(name)
             .legend(move |at| EmptyElement::at(at) + marker(*look, (10, 0), color.filled()));
         for (px, py, label) in points {
@@ -162,8 +109,11 @@ where
         }
     }
     let places = series.iter().flat_map(|s| &s.points).map(|p| chart.backend_coord(&(p.0, p.1)));
-    let corner =
-        if frame.share { SeriesLabelPosition::LowerRight } else { emptiest(frame.size, &places.collect::<Vec<_>>()) };
+    let corner = if frame.scales.1 == Scale::Share {
+        SeriesLabelPosition::LowerRight
+    } else {
+        emptiest(frame.size, &places.collect::<Vec<_>>())
+    };
     chart
         .configure_series_labels()
         .position(corner)
@@ -228,38 +178,9 @@ fn marker<'a>(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'sta
     }
 }
 
-/// A number as people write it: 0.001, 0.5, 20, 1e12.
-fn plain(x: &f64) -> String {
-    if (1e-9..1e9).contains(x) || *x == 0.0 { format!("{}", (x * 1e9).round() / 1e9) } else { format!("{x:.0e}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn axes_are_labelled_with_what_lies_between_their_ends() {
-        let keys = |low: f64, high: f64| {
-            Decades(low..high)
-                .key_points(plotters::coord::ranged1d::BoldPoints(10))
-                .iter()
-                .map(plain)
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(keys(0.015, 0.6), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
-        assert_eq!(keys(1e-3, 1e3), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
-        assert_eq!(Decades(1e-3..1e3).map(&1.0, (0, 600)), 300);
-        assert_eq!(keys(1e-30, 1e6).len(), 13, "every third of 36 decades");
-    }
-
-    #[test]
-    fn an_axis_holds_the_least_and_the_largest_number() {
-        let Decades(ends) = decades([f64::MAX, f64::from_bits(1), f64::INFINITY].into_iter());
-        assert_eq!(ends, f64::MIN_POSITIVE..f64::MAX);
-        let axis = Decades(ends);
-        assert!(axis.key_points(plotters::coord::ranged1d::BoldPoints(10)).len() <= 13);
-        assert_eq!([0.0, 1e-320, 1.0, f64::MAX, f64::INFINITY].map(|x| axis.map(&x, (0, 616))), [0, 0, 308, 616, 616]);
-    }
 
     #[test]
     fn stairs_go_along_the_axes() {
@@ -269,9 +190,10 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_names_its_series_and_survives_what_is_not_a_number() {
-        for share in [false, true] {
-            let frame = Frame { title: "T & t", x: "ms", y: "mm", share, size: (400, 300) };
+    fn a_picture_names_its_axes_and_series_and_survives_what_is_not_a_number() {
+        use Scale::{Decades, Linear, Share};
+        for scales in [(Decades, Decades), (Decades, Share), (Linear, Linear), (Linear, Decades)] {
+            let frame = Frame { title: "T & t", x: "time ms", y: "depth mm", scales, size: (400, 300) };
             let of = |name: &str, look| Series {
                 name: name.into(),
                 look,
@@ -280,7 +202,7 @@ mod tests {
             };
             let all: Vec<_> = (0..6).map(|look| of(&format!("name {look}"), look)).collect();
             let text = svg(&frame, &all);
-            for part in ["<svg", "T &amp; t", "8x1", "name 0", "name 5"] {
+            for part in ["<svg", "T &amp; t", "time ms", "depth mm", "8x1", "name 0", "name 5"] {
                 assert!(text.contains(part), "{part} is missing");
             }
             assert!(svg(&frame, &[]).contains("<svg"));

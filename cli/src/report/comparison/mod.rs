@@ -1,22 +1,23 @@
 //! `drystone report`: speed against error.
 
 mod contender;
-mod course;
+mod html;
+mod measure;
 mod origin;
 mod page;
 mod pareto;
-mod picture;
-mod race;
+mod points;
+mod problems;
 mod solves;
 mod survey;
 mod table;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
-pub use course::{course, drystone, scene, substeps};
+pub use measure::{Row, blocks, measure};
 pub use origin::Origin;
-pub use race::{Row, blocks, race};
+pub use points::{drystone, scene, scenes, substeps};
 pub use solves::SolveRow;
-pub use survey::{Progress, Report, Survey};
+pub use survey::{Report, Survey};
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
-//! What the rows of one race say: who is fastest at an error, and who errs least in a time.
+//! What the rows of one run say: who is fastest at an error, and who errs least in a time.
 
-use super::race::Row;
+use super::measure::Row;
 use drystone::Result;
 
 /// Errors below this are taken as this (m), (m/s): poses in f32 some ten meters from the origin say no more.
@@ -105,10 +105,7 @@ pub struct Duel {
 }
 
 impl Duel {
-    /// Of two sides of one race.
-    ///
-    /// # Errors
-    /// Rows are not of one race.
+    /// Of two sides of one run.
     pub fn new(own: &[&Row], others: &[&Row], fault: Fault) -> Result<Self> {
         let mut duel = Self { worst: 0.0, best: f64::INFINITY, own: f64::INFINITY, others: f64::INFINITY };
         for theirs in front(others, fault) {
@@ -164,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_duel_is_at_equal_error_and_only_within_one_race() {
+    fn a_duel_is_at_equal_error_and_only_within_one_run() {
         let own = [row("own", 1.0, 2e-3), row("own", 6.0, 1e-4)];
         let others = [row("other", 2.0, 3e-3), row("other", 4.0, 1e-3), row("other", 9.0, 5e-5)];
         let (own, mut others): (Vec<_>, Vec<_>) = (own.iter().collect(), others.iter().collect());

@@ -1,4 +1,4 @@
-//! What takes part in a race: an engine with its settings.
+//! What takes part in a comparison: an engine with its settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +16,6 @@ pub trait Contender {
     fn setting(&self) -> Setting;
 
     /// One step of the scene's length; the only call that is timed.
-    ///
-    /// # Errors
-    /// The engine gave up.
     fn step(&mut self) -> Result<()>;
 
     /// The world after the last step: the bodies of the scene in their order, with their poses and velocities.
@@ -103,9 +100,6 @@ pub struct Drystone {
 
 impl Drystone {
     /// On `reference`, `cpu` or `gpu`.
-    ///
-    /// # Errors
-    /// No such backend, no adapter, or settings that contradict each other.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
         let runs = match backend {
             "reference" => Numbers::Reference,

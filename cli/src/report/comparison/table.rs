@@ -16,9 +16,6 @@ pub struct Table<R> {
 
 impl<R: Serialize + DeserializeOwned> Table<R> {
     /// The rows of a file; none if it is not there.
-    ///
-    /// # Errors
-    /// The file cannot be read, or a row of it is not one of these.
     pub fn open(path: PathBuf) -> Result<Self> {
         if !path.exists() {
             return Ok(Self { path, rows: Vec::new() });
@@ -34,14 +31,9 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
     }
 
     /// Adds a block of rows: to the file too, which has all of them afterwards or none.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn add(&mut self, block: Vec<R>) -> Result<()> {
         self.rows.extend(block);
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        self.rows.iter().try_for_each(|row| writer.serialize(row)).map_err(Error::input)?;
-        files::write(&self.path, &writer.into_inner().map_err(Error::input)?)
+        files::write(&self.path, &files::csv(&self.rows)?)
     }
 
     /// All rows, the oldest first.

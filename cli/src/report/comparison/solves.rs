@@ -7,6 +7,7 @@ use fnv::FnvHasher;
 use serde::{Deserialize, Serialize};
 
 use super::origin::Origin;
+use crate::report::rounds::interleave;
 use crate::report::solve::{SolveReport, SolveSettings};
 use drystone::Result;
 use drystone::backend::Backend;
@@ -67,19 +68,16 @@ impl SolveRow {
 }
 
 /// Solves a problem with all solvers in turns.
-///
-/// # Errors
-/// A contact that no kernel takes.
 pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>> {
     let run = Origin::now();
-    let mut reports: Vec<Vec<SolveReport>> = vec![Vec::new(); SOLVERS.len()];
-    for _ in 0..TURNS {
-        for (of, (method, backend)) in reports.iter_mut().zip(SOLVERS) {
-            let settings = SolveSettings { method, order: Order::Manifolds, passes: 1, sweeps: MOST, tolerance: 1e-4 };
-            let backend = (backend == "cpu").then(|| Box::new(Cpu::new()) as Box<dyn Backend>);
-            of.push(SolveReport::new(problem, &settings, backend)?);
-        }
-    }
+    let mut solvers = SOLVERS.map(|solver| (solver, Vec::new()));
+    interleave(TURNS, &mut solvers, |_, ((method, backend), reports)| {
+        let settings =
+            SolveSettings { method: *method, order: Order::Manifolds, passes: 1, sweeps: MOST, tolerance: 1e-4 };
+        let backend = (*backend == "cpu").then(|| Box::new(Cpu::new()) as Box<dyn Backend>);
+        reports.push(SolveReport::new(problem, &settings, backend)?);
+        Ok(())
+    })?;
     let row = |report: &SolveReport, (sweeps, e_vel): (u32, f64), ms: &[f64]| SolveRow {
         problem: problem.name.clone(),
         hash: hash(problem),
@@ -97,7 +95,7 @@ pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>
         e_vel,
     };
     let mut rows = Vec::new();
-    for of in &reports {
+    for (_, of) in &solvers {
         // Every turn does the same sweeps to the last bit; only times differ.
         let all: Vec<_> = of.iter().map(points).collect();
         for (i, &(sweeps, e_vel, _)) in all[0].iter().enumerate() {

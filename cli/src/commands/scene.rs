@@ -1,0 +1,226 @@
+//! Arguments that commands share: the scene, how to solve it, and what runs it.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::output::say;
+use super::words;
+use crate::settings;
+use drystone::Simulation;
+use drystone::backend::BackendChoice;
+use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP, SolverConfig};
+use drystone::contacts::ContactProblem;
+use drystone::load::Load;
+use drystone::preset::Preset;
+use drystone::scenes::{CATALOGUE, Scene};
+use drystone::stages::memory;
+use drystone::stats::StepStats;
+use drystone::{Error, Result};
+
+// Headings of options in the help.
+pub(super) const SCENE: &str = "Scene";
+pub(super) const SETTINGS: &str = "Settings of the solver";
+pub(super) const MACHINE: &str = "What it runs on";
+pub(super) const OUTPUT: &str = "Output";
+
+/// A scene, and how to solve it.
+#[derive(Args)]
+pub(super) struct SceneArgs {
+    /// A scene of the catalogue, or a scene file.
+    ///
+    /// `drystone scenes` lists the catalogue.
+    pub(super) scene: String,
+    /// Parameter of the scene; may be given several times.
+    #[arg(short, long = "parameter", value_name = "KEY=VALUE", help_heading = SCENE)]
+    pub(super) parameter: Vec<String>,
+    /// Steps, if not as many as the scene says.
+    #[arg(long, help_heading = SCENE, value_parser = clap::value_parser!(u32).range(0..))]
+    pub(super) steps: Option<u32>,
+    /// Length of a step, if not what the scene says.
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
+    pub(super) dt: Option<f32>,
+    /// Settings by name, before --set and the others.
+    #[arg(long, value_parser = words::preset(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
+    pub(super) preset: Preset,
+    /// Choose the substeps by the overlap of what stands, as 1mm.
+    ///
+    /// A bare number is in meters. A heavy load that comes on at once swings up to twice as deep.
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = length,
+        allow_hyphen_values = true,
+        conflicts_with = "substeps",
+        help_heading = SETTINGS
+    )]
+    pub(super) max_penetration: Option<f64>,
+    /// Substeps of a step.
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
+    pub(super) substeps: Option<u32>,
+    /// Biased sweeps of a substep.
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
+    pub(super) iterations: Option<u32>,
+    /// Relax sweeps of a substep.
+    #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
+    pub(super) relax: Option<u32>,
+    /// What the sweeps do.
+    #[arg(long, value_parser = words::method(), help_heading = SETTINGS)]
+    pub(super) method: Option<Method>,
+    /// Any setting; may be given several times.
+    ///
+    /// `drystone settings` lists them.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = SETTINGS)]
+    pub(super) set: Vec<String>,
+    /// Settings from a TOML file, before --set and the others.
+    #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
+    pub(super) config: Option<PathBuf>,
+    /// Threads on the CPU; 0 is one a core.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        value_parser = clap::value_parser!(u16).range(0..=1024),
+        help_heading = MACHINE
+    )]
+    pub(super) threads: u16,
+    /// Print one JSON object instead of a table.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(super) json: bool,
+}
+
+/// What runs the sweeps of one scene.
+#[derive(Args)]
+pub(super) struct BackendArgs {
+    /// What runs the sweeps.
+    #[arg(long = "backend", value_name = "BACKEND", value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
+    pub(super) choice: BackendChoice,
+    /// Ask the GPU for the reference's results to the last bit.
+    #[arg(long, help_heading = MACHINE)]
+    pub(super) exact: bool,
+}
+
+/// Scenes that run for their result.
+#[derive(Args)]
+pub(super) struct SleepArgs {
+    /// Let nothing fall asleep.
+    ///
+    /// Without it what was slow for half a second does, until it is touched: --set sleep_after=0.5, sleep_speed=0.01.
+    #[arg(long, help_heading = SETTINGS)]
+    pub(super) no_sleep: bool,
+}
+
+impl SleepArgs {
+    pub(super) fn apply(&self, config: &mut SolverConfig) {
+        if self.no_sleep {
+            config.sleep_after = 0.0;
+        }
+    }
+}
+
+impl SceneArgs {
+    /// The scene with its step length, and the settings for a comparison: nothing sleeps unless `--set sleep_after` says so.
+    pub(super) fn load_awake(&self) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?.without_sleep(), 1, None)
+    }
+
+    /// The scene, or some worlds of it ([`Scene::find_worlds`]), with its step length, and the settings.
+    pub(super) fn load(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?, worlds, vary)
+    }
+
+    /// The settings that the others change.
+    fn base(&self) -> Result<SolverConfig> {
+        self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
+    }
+
+    fn load_from(&self, mut config: SolverConfig, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
+        for assignment in &self.set {
+            settings::set(&mut config, assignment)?;
+        }
+        for (name, value) in [("substeps", self.substeps), ("iterations", self.iterations), ("relax", self.relax)] {
+            if let Some(value) = value {
+                settings::set(&mut config, &format!("{name}={value}"))?;
+            }
+        }
+        config.method = self.method.unwrap_or(config.method);
+        config.check()?;
+        if let Some(dt) = self.dt.filter(|dt| !(SHORTEST_STEP..=LONGEST_STEP).contains(dt)) {
+            return Err(Error::input(format!("--dt {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")));
+        }
+        announce(&self.scene, &self.parameter, worlds);
+        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
+        scene.dt = self.dt.unwrap_or(scene.dt);
+        scene.steps = self.steps.unwrap_or(scene.steps);
+        if let Some(most) = self.max_penetration {
+            choose_substeps(&mut config, &scene, most)?;
+        }
+        Ok((scene, config))
+    }
+
+    /// Sets the number of threads, once for the process: one a core unless told, and one for the reference.
+    pub(super) fn set_threads(&self, backend: BackendChoice) {
+        let unless_told = usize::from(backend == BackendChoice::Reference);
+        let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
+        // Fails only if it was set before, which nothing does.
+        // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+    }
+}
+
+/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
+pub(super) fn step_with_contacts(
+    simulation: &mut Simulation,
+    scene: &str,
+    dt: f32,
+    number: u32,
+) -> Result<(ContactProblem, StepStats)> {
+    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
+    match problem.contacts.is_empty() {
+        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
+        false => Ok((problem, stats)),
+    }
+}
+
+/// Worlds with fewer bodies are built within a second.
+const MANY_BODIES: u64 = 200_000;
+
+/// Says that a world is built, where that takes a while.
+fn announce(scene: &str, parameters: &[String], worlds: usize) {
+    let Some(entry) = CATALOGUE.iter().find(|e| e.name == scene) else { return };
+    // `Scene::find_worlds` refuses wrong parameters.
+    let bodies = entry.body_count(parameters).unwrap_or(0).saturating_mul(worlds as u64);
+    // What does not fit is refused before anything is built.
+    if bodies >= MANY_BODIES && memory::check(bodies as f64 * memory::BODY, scene).is_ok() {
+        say(format_args!("building {bodies} bodies ..."));
+    }
+}
+
+/// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
+fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
+    let Some(load) = Load::heaviest(&scene.world, config) else {
+        say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));
+        return Ok(());
+    };
+    config.substeps = load.substeps(most, scene.dt, config)?;
+    let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
+    let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
+    say(format_args!(
+        "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"
+    ));
+    Ok(())
+}
+
+/// A length as `1mm`, `0.1cm` or `0.001m`; a bare number is in meters.
+fn length(text: &str) -> std::result::Result<f64, String> {
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_alphabetic() && c != 'e').unwrap_or(text.len()));
+    let unit = match unit {
+        "" | "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" => 1e-3,
+        "um" => 1e-6,
+        _ => return Err("write it as 1mm, 0.1cm or 0.001m".into()),
+    };
+    let meters = number.trim().parse::<f64>().map_err(|_| "write it as 1mm, 0.1cm or 0.001m")? * unit;
+    if meters > 0.0 && meters.is_finite() { Ok(meters) } else { Err("must be more than 0".into()) }
+}

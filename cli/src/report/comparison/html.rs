@@ -1,0 +1,76 @@
+//! Parts of a page: tables, cells, numbers, pictures.
+
+use std::fmt::{Display, Write as _};
+
+use super::pareto::profile;
+use crate::report::plot::Scale::{Decades, Share};
+use crate::report::plot::{Frame, Series, svg};
+
+/// A table: the headings, and the cells of each row with their marks.
+pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoIterator<Item = Vec<String>>) {
+    let headings = headings.iter().map(|heading| format!("<th>{heading}</th>")).collect::<String>();
+    let _ = writeln!(html, "<div class=\"wide\"><table><tr>{headings}</tr>");
+    for cells in rows {
+        let _ = writeln!(html, "<tr>{}</tr>", cells.concat());
+    }
+    html.push_str("</table></div>\n");
+}
+
+/// A cell, marked with a class if that is not empty.
+pub(super) fn cell(class: &str, text: impl Display) -> String {
+    if class.is_empty() { format!("<td>{text}</td>") } else { format!("<td class=\"{class}\">{text}</td>") }
+}
+
+/// A profile of what each of some solvers costs on each of `count` problems.
+pub(super) fn profile_picture(
+    title: &str,
+    y: &str,
+    count: usize,
+    names: &[String],
+    costs: &[Vec<Option<f64>>],
+) -> String {
+    let named = names.iter().enumerate().zip(profile(costs));
+    let series = |((look, name), ratios): ((usize, &String), Vec<f64>)| {
+        let share = |n: usize| n as f64 / count as f64;
+        let line = ratios.iter().enumerate().map(|(i, &ratio)| (ratio, share(i + 1))).collect();
+        Series { name: name.clone(), look, points: Vec::new(), line }
+    };
+    let frame = Frame { title, x: "time, relative to the fastest", y, scales: (Decades, Share), size: (400, 280) };
+    svg(&frame, &named.map(series).collect::<Vec<_>>())
+}
+
+/// Three digits.
+pub(super) fn number(x: f64) -> String {
+    if !x.is_finite() || x == 0.0 {
+        return if x.is_nan() { "-".into() } else { x.to_string() };
+    }
+    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{x:.digits$}")
+}
+
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// A picture as part of a page: it needs no name space there.
+pub(super) fn inline(svg: &str) -> String {
+    svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
+}
+
+/// Pictures of one size in rows of so many.
+pub(super) fn grid(pictures: &[String], columns: usize) -> String {
+    let size = |name: &str| {
+        let of = |p: &String| p.split(&format!(" {name}=\"")).nth(1)?.split('"').next()?.parse::<usize>().ok();
+        pictures.first().and_then(of).unwrap_or(0)
+    };
+    let (width, height) = (size("width"), size("height"));
+    let rows = pictures.len().div_ceil(columns);
+    let (w, h) = (width * columns.min(pictures.len()), height * rows);
+    let mut all =
+        format!("<svg width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" xmlns=\"http://www.w3.org/2000/svg\">\n");
+    for (i, picture) in pictures.iter().enumerate() {
+        let (x, y) = (i % columns * width, i / columns * height);
+        all.push_str(&picture.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1));
+    }
+    all + "</svg>\n"
+}

@@ -1,0 +1,119 @@
+//! `drystone report rules`: what each rule of the course sheet does, from runs.
+
+mod friction;
+mod stacks;
+mod substeps;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::files;
+use crate::settings;
+use drystone::Simulation;
+use drystone::backend::cpu::Reference;
+use drystone::config::SolverConfig;
+use drystone::metrics::{drift, in_place_count, rms_speed};
+use drystone::world::World;
+use drystone::{Error, Result};
+
+use super::plot::{Frame, Scale, Series, svg};
+
+/// The page and its pictures.
+pub struct RulesReport {
+    /// Markdown.
+    pub page: String,
+    /// Name and SVG text of each picture.
+    pub pictures: Vec<(&'static str, String)>,
+}
+
+impl RulesReport {
+    /// Writes `rules.md` and the pictures into a directory, which is made if need be.
+    pub fn write(&self, directory: &Path) -> Result<()> {
+        let pictures = directory.join("rules");
+        std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
+        for (name, text) in &self.pictures {
+            files::write(&pictures.join(name), text.as_bytes())?;
+        }
+        files::write(&directory.join("rules.md"), self.page.as_bytes())
+    }
+}
+
+/// Length of every step here (s).
+const DT: f32 = 1.0 / 60.0;
+
+/// Runs everything and makes the page; `after_run` is called as often as [`RUNS`] says.
+pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
+    let mut report = RulesReport { page: include_str!("../rules_head.md").to_owned(), pictures: Vec::new() };
+    stacks::clamping(&mut report, &mut after_run)?;
+    stacks::stabilization(&mut report, &mut after_run)?;
+    friction::friction(&mut report, &mut after_run)?;
+    substeps::heights(&mut report, &mut after_run)?;
+    substeps::ratios(&mut report, &mut after_run)?;
+    report.page.push_str(include_str!("../rules_tail.md"));
+    Ok(report)
+}
+
+fn settings(text: &str) -> Result<SolverConfig> {
+    let mut config = SolverConfig::default().without_sleep();
+    text.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
+    config.check()?;
+    Ok(config)
+}
+
+fn simulate(world: World, settings_text: &str) -> Result<Simulation> {
+    Simulation::new(world, settings(settings_text)?, Box::new(Reference::<f32>::new()))
+}
+
+/// How a standing scene fared.
+struct Standing {
+    /// Until some body was out of its place, or the run was over (s).
+    seconds: f64,
+    /// Largest horizontal distance of a body from where it began (m).
+    drift: f64,
+    /// Speed at the end (m/s).
+    rms_speed: f64,
+    /// Deepest overlap at the end (m).
+    penetration: f64,
+}
+
+/// Runs until a body left its place, or for `seconds`.
+fn stand(world: &World, settings_text: &str, seconds: f64) -> Result<Standing> {
+    let mut simulation = simulate(world.clone(), settings_text)?;
+    let steps = (seconds / f64::from(DT)).round() as u32;
+    let mut time = 0.0;
+    for step in 1..=steps {
+        simulation.step(DT)?;
+        time = f64::from(step) * f64::from(DT);
+        if in_place_count(world, &simulation.world) < world.dynamic_count() {
+            break;
+        }
+    }
+    Ok(Standing {
+        seconds: time,
+        drift: drift(world, &simulation.world),
+        rms_speed: rms_speed(&simulation.world),
+        penetration: simulation.penetration().max,
+    })
+}
+
+/// How often `after_run` is called.
+pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
+
+impl RulesReport {
+    /// Adds a picture of lines over time, each with its name. A scale over decades leaves out what is not above 0.
+    fn picture(
+        &mut self,
+        file: &'static str,
+        title: &str,
+        (y, scale): (&str, Scale),
+        lines: Vec<(String, Vec<(f64, f64)>)>,
+    ) {
+        let _ = writeln!(self.page, "\n![{file}](rules/{file})");
+        let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {
+            line.retain(|p| scale != Scale::Decades || p.1 > 0.0);
+            Series { name, look, points: Vec::new(), line }
+        });
+        let frame = Frame { title, x: "time s", y, scales: (Scale::Linear, scale), size: (760, 420) };
+        self.pictures.push((file, svg(&frame, &series.collect::<Vec<_>>())));
+    }
+}

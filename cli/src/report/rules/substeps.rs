@@ -1,0 +1,86 @@
+//! Substeps: how high a tower stands, and under which load.
+
+use std::fmt::Write as _;
+
+use super::{RulesReport, Standing, stand};
+use drystone::Result;
+use drystone::scenes::Scene;
+
+/// Whether a tower of `n` boxes, with offsets of 1 cm, stands for 20 s.
+fn tower_stands(n: u32, text: &str) -> Result<bool> {
+    let scene = Scene::find("tower", &[format!("n={n}"), "offset=0.01".into()])?;
+    Ok(stand(&scene.world, text, 20.0)?.seconds > 19.99)
+}
+
+/// The largest n up to `most` for which `stands`, by doubling and bisection; it is taken to be monotone.
+fn largest(most: u32, mut stands: impl FnMut(u32) -> Result<bool>) -> Result<u32> {
+    let (mut good, mut bad) = (0, 1);
+    while bad <= most && stands(bad)? {
+        (good, bad) = (bad, bad * 2);
+    }
+    bad = bad.min(most + 1);
+    while bad - good > 1 {
+        let middle = (good + bad) / 2;
+        if stands(middle)? { good = middle } else { bad = middle }
+    }
+    Ok(good)
+}
+
+/// Tallest tower that is tried.
+const MOST_BOXES: u32 = 128;
+
+pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
+    let _ = writeln!(
+        report.page,
+        "\n## Substeps\n\nThe table has the number of boxes of the tallest tower that stands for 20 s, up to {MOST_BOXES}. Boxes are shifted by 1 cm to one side and to the other in turn.\n\n\
+         | substeps | soft, default | Baumgarte, as many sweeps |\n|---|---|---|"
+    );
+    for substeps in [1_u32, 4, 8, 16] {
+        let soft = largest(MOST_BOXES, |n| tower_stands(n, &format!("substeps={substeps}")))?;
+        after_run();
+        let hard = format!("substeps={substeps} iterations=2 relax=0 stabilization=baumgarte");
+        let hard = largest(MOST_BOXES, |n| tower_stands(n, &hard))?;
+        after_run();
+        let _ = writeln!(report.page, "| {substeps} | {soft} | {hard} |");
+    }
+    Ok(())
+}
+
+pub(super) fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
+    let _ = writeln!(
+        report.page,
+        "\nThe next table has the heaviest top, as a multiple of the other boxes, under which a tower of 10 stands for 20 s (of 1, 2, 5, 10, ... 10,000), and \
+         the overlap in two cases with a mass ratio of 1000.\n\n| substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n|---|---|---|---|"
+    );
+    let tried = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
+    for substeps in [4_u32, 16, 32, 64] {
+        let text = format!("substeps={substeps}");
+        let tower = |n: u32, ratio: u32| -> Result<Standing> {
+            let scene = Scene::find("tower", &[format!("n={n}"), format!("top_ratio={ratio}"), "offset=0.01".into()])?;
+            stand(&scene.world, &text, 20.0)
+        };
+        let mut heaviest = 0;
+        for ratio in tried {
+            if tower(10, ratio)?.seconds < 19.99 {
+                break;
+            }
+            heaviest = ratio;
+        }
+        after_run();
+        let overlap = |s: Standing| {
+            if s.seconds > 19.99 {
+                format!("{:.2} mm", s.penetration * 1e3)
+            } else {
+                format!("fell at {:.1} s", s.seconds)
+            }
+        };
+        let _ = writeln!(
+            report.page,
+            "| {substeps} | {heaviest} | {} | {} |",
+            overlap(tower(2, 1000)?),
+            overlap(tower(10, 1000)?)
+        );
+        after_run();
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! The report of a run as a table for people.
+
+use super::RunReport;
+use drystone::stats::median;
+
+impl RunReport {
+    /// The report as names and values for people.
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let mut rows = Vec::new();
+        let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
+        let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
+        row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
+        if self.worlds > 1 {
+            let steps = self.worlds as f64 / (1e-3 * median(&self.awake_times));
+            row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
+        }
+        row("backend", format!("{}: {}", self.backend, self.adapter));
+        row(
+            "steps",
+            format!("{} of {:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps", self.steps, self.dt * 1e3),
+        );
+        let (manifolds, points) = (self.manifolds, self.points);
+        if self.asleep == 0 {
+            let (colors, reused) = (self.colors, 100.0 * self.reused);
+            row("contacts", format!("{manifolds} manifolds, {points} points, {colors} colors, {reused:.0} % reused"));
+        } else {
+            row("contacts", format!("{manifolds} manifolds, {points} points, with those that bodies sleep on"));
+            let after = |step: u32| format!("after {:.2} s", f64::from(step) * f64::from(self.dt));
+            let first =
+                self.first_asleep_step.map_or_else(String::new, |first| format!(", the first {}", after(first)));
+            row(
+                "asleep",
+                match self.all_asleep_step {
+                    Some(all) if self.first_asleep_step == Some(all) => format!("all bodies {}", after(all)),
+                    Some(all) => format!("all bodies {}{first}", after(all)),
+                    None => format!("{} of {} bodies{first}", self.asleep, self.bodies),
+                },
+            );
+        }
+        if let Some(gap) = self.joint_gap {
+            row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
+        }
+        if let (Some(sweeps), Some(planned)) = (self.sweeps, self.planned_sweeps) {
+            row("sweeps", format!("{sweeps} of {planned}"));
+        }
+        if self.overflow > 0 {
+            row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
+        }
+        if let Some(times) = self.awake_ms {
+            let which = match self.steps - self.awake_steps {
+                0 => String::new(),
+                _ => format!(", of {} steps with a body awake", self.awake_steps),
+            };
+            row("ms a step", format!("{times}{which}"));
+        }
+        for stage in &self.stage_ms {
+            row(&format!("  {}", stage.stage), stage.ms.to_string());
+        }
+        for kernel in &self.kernel_ms {
+            let share = kernel.share_of_copying.map(|s| format!(", {:.1} % of copying", 100.0 * s)).unwrap_or_default();
+            row(&format!("    {}", kernel.kernel), format!("{}{share}", kernel.ms));
+        }
+        if self.bytes_up > 0 {
+            let kb = |bytes: u64| bytes as f64 / 1e3;
+            let (up, down) = (kb(self.bytes_up), kb(self.bytes_down));
+            row("last step", format!("{up:.1} kB to the device, {down:.1} kB back, {} dispatches", self.dispatches));
+        }
+        row(
+            "penetration",
+            format!(
+                "{:.3} mm deepest, 95 % within {:.3}, mean {:.3}",
+                self.penetration_max * 1e3,
+                self.penetration_p95 * 1e3,
+                self.penetration_mean * 1e3
+            ),
+        );
+        let (rms, most) = (self.speed_rms * 1e3, self.speed_max * 1e3);
+        row(
+            "speed",
+            match &self.fastest {
+                Some(body) => format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})"),
+                None => "0 mm/s: nothing moves".into(),
+            },
+        );
+        row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
+        if let Some(escaped) = self.escaped {
+            row("container", format!("{escaped} bodies outside"));
+        }
+        if self.stands {
+            row("in place", format!("{} of {}", self.in_place, self.bodies));
+        }
+        if !self.standing.is_empty() {
+            let up = || self.standing.iter().filter(|s| s.in_place == s.bodies);
+            let largest = up().max_by_key(|s| s.bodies).map_or("none", |s| &s.group);
+            row("standing", format!("{} of {} groups; the largest is {largest}", up().count(), self.standing.len()));
+        }
+        if let Some(body) = &self.first_non_finite {
+            row("non-finite", format!("{} bodies, first {body}", self.non_finite));
+        }
+        rows
+    }
+}

@@ -1,0 +1,135 @@
+//! Textures, bindings and pipelines of the renderer.
+
+/// How much work goes into a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quality {
+    /// Samples of a pixel, 1 or 4.
+    pub(super) samples: u32,
+    /// Side of the shadow map in texels.
+    pub(super) shadow_size: u32,
+    /// Places of the shadow map that are compared on either side of a point.
+    pub(super) shadow_reach: u32,
+}
+
+impl Quality {
+    /// For pictures, and for windows on hardware.
+    pub const FINE: Self = Self { samples: 4, shadow_size: 2048, shadow_reach: 1 };
+    /// For windows on a software adapter.
+    pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
+}
+
+/// Format of depth, and of the shadow map.
+pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(super) fn texture(
+    device: &wgpu::Device,
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+    sample_count: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+pub(super) fn cleared_depth(
+    view: &wgpu::TextureView,
+    store: wgpu::StoreOp,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store });
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
+}
+
+pub(super) fn bind(
+    device: &wgpu::Device,
+    kinds: &[wgpu::BindingType],
+    resources: &[wgpu::BindingResource],
+) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
+    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty,
+        count: None,
+    };
+    let entries: Vec<_> = (0..).zip(kinds).map(entry).collect();
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+    let bound = (0..).zip(resources).map(|(binding, r)| wgpu::BindGroupEntry { binding, resource: r.clone() });
+    let entries: Vec<_> = bound.collect();
+    let group =
+        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    (layout, group)
+}
+
+pub(super) fn layout_of<T>(
+    step_mode: wgpu::VertexStepMode,
+    attributes: &[wgpu::VertexAttribute],
+) -> wgpu::VertexBufferLayout<'_> {
+    wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
+}
+
+/// What tells one pipeline from another.
+pub(super) struct Drawing<'a> {
+    pub(super) layout: &'a wgpu::BindGroupLayout,
+    pub(super) module: &'a wgpu::ShaderModule,
+    pub(super) vertex: &'a str,
+    /// None draws depth only.
+    pub(super) fragment: Option<&'a str>,
+    pub(super) buffers: &'a [wgpu::VertexBufferLayout<'a>],
+    pub(super) topology: wgpu::PrimitiveTopology,
+    pub(super) depth: wgpu::CompareFunction,
+    pub(super) format: wgpu::TextureFormat,
+    pub(super) quality: Quality,
+}
+
+pub(super) fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(d.vertex),
+        bind_group_layouts: &[Some(d.layout)],
+        immediate_size: 0,
+    });
+    let targets = [Some(d.format.into())];
+    let buffers: Vec<_> = d.buffers.iter().cloned().map(Some).collect();
+    let constants = [("SHADOW_REACH", f64::from(d.quality.shadow_reach))];
+    let compilation_options = wgpu::PipelineCompilationOptions::default;
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(d.vertex),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: d.module,
+            entry_point: Some(d.vertex),
+            compilation_options: compilation_options(),
+            buffers: &buffers,
+        },
+        fragment: d.fragment.map(|entry| wgpu::FragmentState {
+            module: d.module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: if entry == "shade" { &constants } else { &[] },
+                ..Default::default()
+            },
+            targets: &targets,
+        }),
+        primitive: wgpu::PrimitiveState { topology: d.topology, ..Default::default() },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(d.depth == wgpu::CompareFunction::Less),
+            depth_compare: Some(d.depth),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: if d.fragment.is_some() { d.quality.samples } else { 1 },
+            ..Default::default()
+        },
+        multiview_mask: None,
+        cache: None,
+    })
+}
