@@ -57,5 +57,10 @@ impl Error {
     }
 }
 
+/// Refuses the caller's input with a message unless a condition holds.
+pub(crate) fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::Input(message())) }
+}
+
 /// The result of every fallible call of this library.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -319,6 +319,10 @@ fn impossible_shapes_are_refused() {
             "position = [0, 0, 10000000000]: must be at most 1e9 m in size",
         ),
         (
+            json!({"type": "ball", "radius": 1, "position": [0, 0, 1e38]}),
+            "position = [0, 0, 1e38]: must be at most 1e9 m in size",
+        ),
+        (
             json!({"type": "ball", "radius": 1, "rotation": [1, 1, 0, 0]}),
             "rotation = [1, 1, 0, 0]: must be of length 1, but has length 1.4142135623730951",
         ),

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::{Result, ensure};
 
 mod rules;
 
@@ -111,10 +111,8 @@ pub const LONGEST_STEP: f32 = 1.0;
 /// # Errors
 /// One line with the length and the range.
 pub fn check_step_length(dt: f32) -> Result<()> {
-    if (SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
-        return Ok(());
-    }
-    Err(Error::input(format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")))
+    let message = || format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds");
+    ensure((SHORTEST_STEP..=LONGEST_STEP).contains(&dt), message)
 }
 
 impl Default for SolverConfig {
@@ -190,22 +188,20 @@ impl SolverConfig {
     /// One line that names the settings, their values and what to do.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
-        if self.stabilization != Stabilization::Soft && self.relax > 0 {
-            let (rule, relax) = (self.stabilization, self.relax);
-            return Err(Error::input(format!(
-                "stabilization = {rule} with relax = {relax}: relax sweeps belong to soft contacts; set relax=0"
-            )));
-        }
+        let (rule, relax) = (self.stabilization, self.relax);
+        ensure(rule == Stabilization::Soft || relax == 0, || {
+            format!("stabilization = {rule} with relax = {relax}: relax sweeps belong to soft contacts; set relax=0")
+        })?;
         if self.rules.clamping == Clamping::PerCorrection {
-            let refuse = |why: &str| Err(Error::input(format!("rules.clamping = per-correction with {why}")));
-            if self.stabilization == Stabilization::Soft {
-                return refuse(
+            let refused = |why: &str| format!("rules.clamping = per-correction with {why}");
+            ensure(rule != Stabilization::Soft, || {
+                refused(
                     "stabilization = soft: a soft contact acts on the accumulated impulse; set stabilization=baumgarte or none",
-                );
-            }
-            if self.method == Method::Accelerated {
-                return refuse("method = accelerated: momentum acts on accumulated impulses; set method=plain");
-            }
+                )
+            })?;
+            ensure(self.method == Method::Plain, || {
+                refused("method = accelerated: momentum acts on accumulated impulses; set method=plain")
+            })?;
         }
         Ok(())
     }
@@ -215,25 +211,18 @@ impl SolverConfig {
     /// # Errors
     /// One line that names the setting, its value and the range.
     pub fn check_ranges(&self) -> Result<()> {
-        if self.tolerance > 0.0 && self.iterations == 0 {
-            let tolerance = self.tolerance;
-            return Err(Error::input(format!("tolerance = {tolerance} with iterations = 0: no sweep would be tested")));
-        }
-        let refuse =
-            |name: &str, value: f64, range: &str| Err(Error::input(format!("{name} = {value}: must be {range}")));
-        for (name, value) in [("substeps", self.substeps), ("iterations", self.iterations)] {
-            if value == 0 || value > 4096 {
-                return refuse(name, value.into(), "1 to 4096");
-            }
-        }
-        if self.relax > 4096 {
-            return refuse("relax", self.relax.into(), "0 to 4096");
-        }
-        if !(1..=16).contains(&self.rules.manifold_passes) {
-            return refuse("rules.manifold_passes", self.rules.manifold_passes.into(), "1 to 16");
-        }
-        if !(1..=64).contains(&self.max_colors) {
-            return refuse("max_colors", self.max_colors.into(), "1 to 64");
+        let tolerance = self.tolerance;
+        ensure(!(tolerance > 0.0 && self.iterations == 0), || {
+            format!("tolerance = {tolerance} with iterations = 0: no sweep would be tested")
+        })?;
+        for (name, value, least, most) in [
+            ("substeps", self.substeps, 1, 4096),
+            ("iterations", self.iterations, 1, 4096),
+            ("relax", self.relax, 0, 4096),
+            ("rules.manifold_passes", self.rules.manifold_passes.into(), 1, 16),
+            ("max_colors", self.max_colors, 1, 64),
+        ] {
+            ensure((least..=most).contains(&value), || format!("{name} = {value}: must be {least} to {most}"))?;
         }
         for (name, value, least, most) in [
             ("baumgarte", self.baumgarte, 0.0, 1.0),
@@ -253,9 +242,7 @@ impl SolverConfig {
             ("sleep_speed", self.sleep_speed, 0.0, 1e3),
             ("recycle_distance", self.recycle_distance, 0.0, 1e3),
         ] {
-            if !(least..=most).contains(&value) {
-                return refuse(name, value.into(), &format!("{least} to {most}"));
-            }
+            ensure((least..=most).contains(&value), || format!("{name} = {value}: must be {least} to {most}"))?;
         }
         Ok(())
     }

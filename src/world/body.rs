@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::limits::{MOST_LENGTH, MOST_SPEED, is_place, is_rotation, is_within};
+use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::{Shape, pose};
-use crate::error::{Error, Result};
+use crate::error::{Result, ensure};
 
 /// How a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -248,54 +248,35 @@ impl Body {
     }
 
     fn check_motion(&self) -> Result<()> {
-        let refuse = |what: String| Err(Error::input(what));
-        if !is_place(self.position) {
-            return refuse(format!("position = {}: must be at most {MOST_LENGTH:e} m in size", self.position));
-        }
-        if !is_rotation(self.rotation) {
-            return refuse(format!("rotation = {}: must have unit length", self.rotation));
-        }
+        check_place("position", self.position)?;
+        check_rotation("rotation", self.rotation)?;
         for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
-            if !is_within(v, MOST_SPEED) {
-                return refuse(format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size"));
-            }
+            let message = || format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size");
+            ensure(is_within(v, MOST_SPEED), message)?;
         }
-        if !self.force.is_finite() {
-            return refuse(format!("force = {}: must be finite", self.force));
-        }
-        Ok(())
+        ensure(self.force.is_finite(), || format!("force = {}: must be finite", self.force))
     }
 
     fn check_shapes(&self) -> Result<()> {
-        for (k, Collider { shape, position, rotation }) in self.colliders.iter().enumerate() {
-            let refuse = |what: String| Err(Error::input(format!("shapes[{k}]: {what}")));
-            shape.check().map_err(|e| e.within(format_args!("shapes[{k}]")))?;
-            if !is_place(*position) {
-                return refuse(format!("position = {position}: must be at most {MOST_LENGTH:e} m in size"));
-            }
-            if !is_rotation(*rotation) {
-                return refuse(format!("rotation = {rotation}: must have unit length"));
-            }
-            if self.kind == BodyKind::Kinematic && shape.is_half_space() {
-                return refuse("half-spaces are for fixed bodies".into());
-            }
-            if self.kind == BodyKind::Dynamic && !shape.has_volume() {
-                return refuse("half-spaces, meshes and height fields have no mass: not for dynamic bodies".into());
-            }
-        }
-        Ok(())
+        let check = |c: &Collider| {
+            c.shape.check()?;
+            check_place("position", c.position)?;
+            check_rotation("rotation", c.rotation)?;
+            let fits = self.kind != BodyKind::Kinematic || !c.shape.is_half_space();
+            ensure(fits, || "half-spaces are for fixed bodies".into())?;
+            let fits = self.kind != BodyKind::Dynamic || c.shape.has_volume();
+            ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
+        };
+        let mut shapes = self.colliders.iter().enumerate();
+        shapes.try_for_each(|(k, c)| check(c).map_err(|e| e.within(format_args!("shapes[{k}]"))))
     }
 
     /// Refuses a mass or a material that cannot be simulated.
     pub(super) fn check_surface(&self) -> Result<()> {
-        let refuse = |what: String| Err(Error::input(what));
         let Material { friction, restitution } = self.material;
-        if !(friction >= 0.0 && friction.is_finite()) {
-            return refuse(format!("friction = {friction}: must be 0 or more"));
-        }
-        if !(0.0..=1.0).contains(&restitution) {
-            return refuse(format!("restitution = {restitution}: must be 0 to 1"));
-        }
+        let is_friction = friction >= 0.0 && friction.is_finite();
+        ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
+        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
         if self.kind == BodyKind::Dynamic { self.mass.check() } else { self.mass.check_frame() }
     }
 

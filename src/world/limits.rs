@@ -2,6 +2,8 @@
 
 use glam::{Quat, Vec3};
 
+use crate::error::{Result, ensure};
+
 /// Largest coordinate and size (m): its cube is still a number in single precision.
 pub const MOST_LENGTH: f32 = 1e9;
 /// Largest speed at the start (m/s), (rad/s).
@@ -22,4 +24,14 @@ pub(super) fn is_within(x: Vec3, most: f32) -> bool {
 /// Whether a quaternion is near unit length.
 pub(super) fn is_rotation(q: Quat) -> bool {
     (q.length() - 1.0).abs() <= 1e-3
+}
+
+/// Refuses a point that is no place.
+pub(super) fn check_place(name: &str, point: Vec3) -> Result<()> {
+    ensure(is_place(point), || format!("{name} = {point}: must be at most {MOST_LENGTH:e} m in size"))
+}
+
+/// Refuses a quaternion that is no rotation.
+pub(super) fn check_rotation(name: &str, q: Quat) -> Result<()> {
+    ensure(is_rotation(q), || format!("{name} = {q}: must have unit length"))
 }

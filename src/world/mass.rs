@@ -6,7 +6,7 @@ use glam::{Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
 
 use super::limits::{is_place, is_rotation};
-use crate::error::{Error, Result};
+use crate::error::{Result, ensure};
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,27 +38,24 @@ impl MassProperties {
         self.check_frame()?;
         let Self { mass, principal_inertia, .. } = *self;
         let moments = principal_inertia.to_array();
-        if !(Self::MASSES.contains(&mass)
+        let fits = Self::MASSES.contains(&mass)
             && moments.iter().all(|i| Self::MOMENTS.contains(i))
-            && principal_inertia.max_element() <= Self::MOST_RATIO * principal_inertia.min_element())
-        {
-            return Err(Error::input(format!(
+            && principal_inertia.max_element() <= Self::MOST_RATIO * principal_inertia.min_element();
+        ensure(fits, || {
+            format!(
                 "mass = {mass:e} kg, inertia = {moments:?} kg m²: must be 1e-15 to 1e15 kg, 1e-30 to 1e30 kg m² and moments within \
                  1e12 of each other"
-            )));
-        }
-        Ok(())
+            )
+        })
     }
 
     /// Refuses a center out of range, and a frame that is no rotation.
     pub(super) fn check_frame(&self) -> Result<()> {
         let Self { center, principal_frame, .. } = *self;
-        if is_place(center) && is_rotation(principal_frame) {
-            return Ok(());
-        }
-        Err(Error::input(format!(
-            "center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation"
-        )))
+        let message = || {
+            format!("center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation")
+        };
+        ensure(is_place(center) && is_rotation(principal_frame), message)
     }
 
     /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.

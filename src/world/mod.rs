@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure};
 use limits::{is_place, is_within};
 
 /// A set of rigid bodies under one gravity.
@@ -73,10 +73,8 @@ impl World {
     /// # Errors
     /// The gravity of the two is not the same.
     pub fn beside(&mut self, other: &Self) -> Result<()> {
-        if self.gravity != other.gravity {
-            let (here, there) = (self.gravity, other.gravity);
-            return Err(Error::input(format!("worlds of gravity {here} and {there}: all must have the same")));
-        }
+        let (here, there) = (self.gravity, other.gravity);
+        ensure(here == there, || format!("worlds of gravity {here} and {there}: all must have the same"))?;
         let first = self.bodies.len();
         self.begins.extend(other.worlds().map(|bodies| first + bodies.start));
         self.bodies.extend_from_slice(&other.bodies);
@@ -127,11 +125,9 @@ impl World {
 
     /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
     pub(crate) fn check_gravity(&self) -> Result<()> {
-        if is_within(self.gravity, MOST_GRAVITY) {
-            return Ok(());
-        }
         let gravity = self.gravity;
-        Err(Error::input(format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis")))
+        let message = || format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis");
+        ensure(is_within(gravity, MOST_GRAVITY), message)
     }
 
     /// Refuses masses and materials that cannot be simulated.
@@ -148,17 +144,14 @@ impl World {
 
     /// Refuses joints to bodies that do not exist, and anchors out of range.
     pub(crate) fn check_joints(&self) -> Result<()> {
+        let bodies = self.bodies.len();
         for (i, joint) in self.joints.iter().enumerate() {
-            let bodies = self.bodies.len();
-            if joint.body_a >= bodies || joint.body_b.is_some_and(|b| b >= bodies) {
-                return Err(Error::input(format!("joint {i}: names a body beyond the last of {bodies}")));
-            }
-            if joint.body_b == Some(joint.body_a) {
-                return Err(Error::input(format!("joint {i}: ties body {} to itself", joint.body_a)));
-            }
-            if ![joint.anchor_a, joint.anchor_b].into_iter().all(is_place) {
-                return Err(Error::input(format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size")));
-            }
+            let exist = joint.body_a < bodies && joint.body_b.is_none_or(|b| b < bodies);
+            ensure(exist, || format!("joint {i}: names a body beyond the last of {bodies}"))?;
+            let differ = joint.body_b != Some(joint.body_a);
+            ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a))?;
+            let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
+            ensure(are_places, || format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size"))?;
         }
         Ok(())
     }

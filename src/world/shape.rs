@@ -7,7 +7,7 @@ use parry3d::math::Pose;
 use parry3d::shape::{HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
 use super::limits::{MOST_LENGTH, is_place};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure};
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
 ///
@@ -53,12 +53,10 @@ impl Shape {
     /// # Errors
     /// Fewer than four points, or points that span no volume.
     pub fn convex_hull(points: &[Vec3]) -> Result<Self> {
-        let degenerate = || Error::input(format!("a convex hull of {} points that spans no volume", points.len()));
         // Checked here, because a flat cloud makes the hull code panic rather than refuse.
-        if !spans_volume(points) {
-            return Err(degenerate());
-        }
-        SharedShape::convex_hull(points).map(Self).ok_or_else(degenerate)
+        let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
+        hull.map(Self)
+            .ok_or_else(|| Error::input(format!("a convex hull of {} points that spans no volume", points.len())))
     }
 
     /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.
@@ -72,16 +70,11 @@ impl Shape {
     /// No triangle, an index that names no vertex, or a vertex that is no point.
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
-            return Err(Error::input(format!(
-                "mesh triangle {t:?} names a vertex beyond the last, {}",
-                vertices.len()
-            )));
+            let count = vertices.len();
+            return Err(Error::input(format!("mesh triangle {t:?} names a vertex beyond the last, {count}")));
         }
-        if let Some(k) = vertices.iter().position(|&v| !is_place(v)) {
-            return Err(Error::input(format!(
-                "mesh vertex {k}, {}: must be at most {MOST_LENGTH:e} m in size",
-                vertices[k]
-            )));
+        if let Some((k, v)) = vertices.iter().enumerate().find(|(_, v)| !is_place(**v)) {
+            return Err(Error::input(format!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size")));
         }
         let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
         SharedShape::trimesh_with_flags(vertices, triangles, flags)
@@ -101,11 +94,10 @@ impl Shape {
             return Err(Error::input("a height field needs at least 2 rows of equal length with at least 2 heights"));
         }
         let is_height = |h: &f32| (h * scale.y).abs() <= MOST_LENGTH;
-        if !(is_place(scale) && scale.min_element() > 0.0 && heights.iter().flatten().all(is_height)) {
-            return Err(Error::input(format!(
-                "a height field, scaled by {scale}: must be more than 0 and at most {MOST_LENGTH:e} m in size"
-            )));
-        }
+        let fits = is_place(scale) && scale.min_element() > 0.0 && heights.iter().flatten().all(is_height);
+        ensure(fits, || {
+            format!("a height field, scaled by {scale}: must be more than 0 and at most {MOST_LENGTH:e} m in size")
+        })?;
         // parry stores columns one after another.
         let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
         let data = parry3d::utils::Array2::new(rows, columns, data);
@@ -140,10 +132,8 @@ impl Shape {
             }
             _ => {
                 let extents = self.0.compute_local_aabb();
-                if is_place(extents.mins) && is_place(extents.maxs) {
-                    return Ok(());
-                }
-                Err(Error::input(format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size")))
+                let message = || format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size");
+                ensure(is_place(extents.mins) && is_place(extents.maxs), message)
             }
         }
     }

@@ -22,7 +22,7 @@ fn standing(name: &str, n: usize, cube: impl FnMut(usize) -> ([f32; 2], f32)) ->
 
 /// `offset` one way and the other in turn.
 fn in_turn(k: usize, offset: f32) -> f32 {
-    if k % 2 == 0 { offset } else { -offset }
+    if k.is_multiple_of(2) { offset } else { -offset }
 }
 
 /// A stack of `n` cubes, straight.

@@ -1,4 +1,4 @@
-//! From a scene file to a scene. The checks of the world check ranges; here is what only a file can get wrong.
+//! From a scene file to a scene. The world checks ranges; this file checks the rest.
 
 use std::fmt::Display;
 
@@ -64,14 +64,14 @@ fn body(file: &BodyFile) -> Result<Body> {
     let pushed = |x: f32| x == 0.0 || file.kind == BodyKind::Dynamic;
     let force = checked("force", file.force, "zero unless the body is dynamic", pushed)?;
     body.force = force.into();
-    let ([friction], [restitution]) =
-        (finite("friction", [file.friction])?, finite("restitution", [file.restitution])?);
+    let [friction, restitution] =
+        [("friction", file.friction), ("restitution", file.restitution)].map(|(name, x)| finite(name, [x]));
     let mut body = body
         .position(x, y, z)
         .rotation(rotation("rotation", file.rotation)?)
         .velocity(linear.into(), angular.into())
-        .friction(friction)
-        .restitution(restitution);
+        .friction(friction?[0])
+        .restitution(restitution?[0]);
     for (k, shape_file) in file.shapes.iter().enumerate() {
         let (shape, at, turned) = shape(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?;
         body = body.shape_at(shape, at, turned);
@@ -119,7 +119,7 @@ fn mass_properties(file: &MassFile) -> Result<MassProperties> {
     })
 }
 
-/// The shape, its position and its rotation. The world checks its extents before mass is computed from them.
+/// The shape, its position and its rotation, all checked before the body computes a mass from them.
 fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
     let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
     let shape = match &file.geometry {
@@ -151,7 +151,7 @@ fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
         }
     };
     shape.check()?;
-    Ok((shape, finite("position", file.position)?.into(), rotation("rotation", file.rotation)?))
+    Ok((shape, lengths("position", file.position)?.into(), rotation("rotation", file.rotation)?))
 }
 
 fn vertices(name: &str, points: &[[f64; 3]]) -> Result<Vec<Vec3>> {
