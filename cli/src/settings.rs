@@ -18,6 +18,14 @@ pub fn read(path: &Path) -> Result<SolverConfig> {
     Ok(config)
 }
 
+/// The default settings without sleep, and with each of `assignments` ([`set`]).
+pub fn awake<'a>(assignments: impl IntoIterator<Item = &'a str>) -> Result<SolverConfig> {
+    let mut config = SolverConfig::default().without_sleep();
+    assignments.into_iter().try_for_each(|assignment| set(&mut config, assignment))?;
+    config.check()?;
+    Ok(config)
+}
+
 /// The settings that are not at their defaults, as `key=value`, but for those that are `said` otherwise.
 pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
     let usual = list(&SolverConfig::default());

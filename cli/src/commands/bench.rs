@@ -13,7 +13,6 @@ use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, be
 use crate::settings;
 use drystone::Result;
 use drystone::backend::{Backend, BackendChoice, choose};
-use drystone::config::SolverConfig;
 
 /// Arguments of `drystone bench`.
 #[derive(Args)]
@@ -61,9 +60,7 @@ impl BenchArgs {
         if self.limits {
             return self.print_limits(&threads);
         }
-        let mut config = SolverConfig::default().without_sleep();
-        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
-        config.check()?;
+        let config = settings::awake(self.set.iter().map(String::as_str))?;
         // Read before minutes are spent.
         let baseline = self.baseline.as_deref().map(Bench::read).transpose()?;
         let usual = if self.quick { &QUICK[..] } else { &STANDARD[..] };

@@ -66,8 +66,7 @@ impl PlayArgs {
 impl MazeArgs {
     fn run(&self) -> Result<()> {
         let map = Map::find(&self.board)?;
-        let mut config = SolverConfig::default().without_sleep();
-        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
+        let config = settings::awake(self.set.iter().map(String::as_str))?;
         let begin = |map, config| Game::new(map, config, choose(self.backend.choice, 1, self.backend.exact)?.0);
         if let Some(path) = &self.script {
             let text = std::fs::read_to_string(path).map_err(Error::file(path))?;

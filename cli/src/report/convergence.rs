@@ -73,13 +73,11 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
             let (name, contacts) = (&problem.name, problem.contacts.len());
             let (name, contacts) =
                 if *kind == KINDS[0] { (name.as_str(), contacts.to_string()) } else { ("", String::new()) };
-            line(
+            let _ = writeln!(
                 page,
-                format_args!(
-                    "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
-                    kind_name(*kind),
-                    sweeps.join(" | ")
-                ),
+                "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
+                kind_name(*kind),
+                sweeps.join(" | ")
             );
         }
         after_problem();
@@ -87,7 +85,7 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
     page.push_str("\nMedians over these problems, relative to plain sweeps with one pass:\n\n");
     page.push_str("| sweeps | sweeps to 1e-3, times fewer | error after 32 sweeps, times smaller |\n|---|--:|--:|\n");
     for (kind, (fewer, lower)) in KINDS.iter().zip(&gains).skip(1) {
-        line(page, format_args!("| {} | {:.1} | {:.1} |", kind_name(*kind), median(fewer), median(lower)));
+        let _ = writeln!(page, "| {} | {:.1} | {:.1} |", kind_name(*kind), median(fewer), median(lower));
     }
     Ok(())
 }
@@ -122,21 +120,15 @@ fn runs(page: &mut String) -> Result<()> {
                 let method = format!("{method:?}").to_lowercase();
                 let in_place =
                     if scene.stands { format!("{} of {}", report.in_place, report.bodies) } else { String::new() };
-                line(
+                let _ = writeln!(
                     page,
-                    format_args!(
-                        "| {} | {substeps} | {sweeps} + {sweeps} | {method} | {deepest:.2} | {speed:.2} | {in_place} |",
-                        std::mem::take(&mut title)
-                    ),
+                    "| {} | {substeps} | {sweeps} + {sweeps} | {method} | {deepest:.2} | {speed:.2} | {in_place} |",
+                    std::mem::take(&mut title)
                 );
             }
         }
     }
     Ok(())
-}
-
-fn line(page: &mut String, text: std::fmt::Arguments) {
-    writeln!(page, "{text}").expect("a string takes everything");
 }
 
 fn kind_name((method, passes): (Method, u8)) -> String {

@@ -7,22 +7,6 @@ use drystone::Result;
 use drystone::backend::Numbers;
 use drystone::preset::Preset;
 
-/// What is behind the failures.
-const WHY: &str = "\n## Why cases fail\n\n\
-- **Mass ratios (H1, H3)**: a soft contact overlaps by F/(m w²). Beyond some mass ratio the overlap is larger than the body is high, or the tower\n  \
-on the body buckles. `--max-penetration` computes from this law how many substeps suffice.\n\
-- **64 points (H4)**: with stiff contacts the whole overlap is at most a micrometer, and a pose in single precision has a precision of a tenth of a\n  \
-micrometer. Rigid-body mechanics does not determine how the points share the load.\n\
-- **Chain (H6)**: the gap of a joint falls with the square of the substeps, as overlap does.\n\
-- **Many substeps in single precision (flip, rolling)**: a substep of 0.1 ms changes a velocity by little more than the rounding error of the velocity, so errors\n  \
-grow with the substeps from some number of substeps on. In f64 the errors fall.\n\
-- **A rod at 1000 rad/s (H7)**: the rod rotates by 17 rad in a step, and the arms of its contacts stay constant. With 128 substeps the rod gains energy, in f64 too.\n\
-- **Next to no inertia (H11)**: a cube of 1 kg and 1e-9 kg m² falls through the floor. The effective mass of each of its corners is 1e-7 kg, and one\n  \
-sweep a substep does not find the solution in which all four corners carry the cube together. All numbers stay finite.\n\
-- **Arch**: statics require a thickness of 0.1075 of the radius. Arches of 31 stones at 0.12 fall in some columns and stand in others, perhaps because their\n  \
-32 gaps of 0.1 mm close first. At 0.13 they stand from 8 substeps on.\n\
-- **Release**: the springs of the contacts below store the energy of the load. With 32 substeps the energy is 16 times less.\n";
-
 /// What the columns are run with.
 const COLUMNS: [(Preset, Numbers); 6] = [
     (Preset::Fast, Numbers::Cpu),
@@ -78,10 +62,11 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
          `drystone hard --page docs` makes this page; `drystone hard --case H3 --preset accurate` runs one case, and `drystone hard --list` describes\n\
          all. Failures are in bold. The columns are presets with their substeps: on the CPU lanes in single precision (`cpu`), on the reference with\n\
          sweeps in double precision (`f64`), and in the shaders (`gpu`: {gpu}).\n\n\
-         | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{WHY}",
+         | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
         heads.join(" | "),
         "---|".repeat(COLUMNS.len()),
-        totals.join(" | ")
+        totals.join(" | "),
+        include_str!("hard_cases_tail.md")
     ))
 }
 

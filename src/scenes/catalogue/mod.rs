@@ -156,7 +156,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of cubes, light and heavy in turn, a light one lowest: it stands with 1.5 mm of overlap, or 0.01 mm with substeps=32",
+        summary: "a stack of cubes, light and heavy in turn, a light one lowest: it stands 1.5 mm deep, 0.01 mm with substeps=32",
         parameters: &[
             CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),

@@ -9,9 +9,11 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use drystone::backend::{BackendChoice, choose};
+use drystone::stats::median;
 use drystone::{Error, Result, SolverConfig};
 use drystone_cli::files;
 use drystone_cli::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
+use drystone_cli::report::rounds::interleave;
 use drystone_peers::rapier_game;
 use plotters::prelude::*;
 
@@ -108,39 +110,33 @@ fn page(folder: &Path) -> Result<()> {
 
 /// Adds a table of what all players make of their scripts, or why there is none; returns the games.
 fn table(text: &mut String, title: &str, map: &Map, scripts: &[Result<Script>]) -> Result<Vec<Option<Played>>> {
-    let mut games: Vec<Option<Played>> = PLAYERS.iter().map(|_| None).collect();
-    let mut ratios = PLAYERS.each_ref().map(|_| Vec::new());
-    for round in 0..ROUNDS {
-        let mut first = f64::NAN;
-        for (k, (player, script)) in PLAYERS.iter().zip(scripts).enumerate() {
-            let Some(script) = script.as_ref().ok().filter(|_| k != GPU || round == 0) else { continue };
-            let game = (player.begin)(map.clone())?;
-            let start = Instant::now();
-            let played = play(game, script, |_| ())?;
-            let step = start.elapsed().as_secs_f64() / f64::from(played.steps.max(1));
-            first = if k == 0 { step } else { first };
-            ratios[k].push(step / first);
-            games[k] = Some(played);
-        }
-    }
+    let player = |(k, (player, script))| (k, player, script, Vec::new(), None);
+    let mut games: Vec<_> = PLAYERS.iter().zip(scripts).enumerate().map(player).collect();
+    let mut first = f64::NAN;
+    interleave(ROUNDS, &mut games, |round, (k, player, script, ratios, game)| {
+        let Some(script) = script.as_ref().ok().filter(|_| *k != GPU || round == 0) else { return Ok(()) };
+        let begun = (player.begin)(map.clone())?;
+        let start = Instant::now();
+        let played = play(begun, script, |_| ())?;
+        let step = start.elapsed().as_secs_f64() / f64::from(played.steps.max(1));
+        first = if *k == 0 { step } else { first };
+        ratios.push(step / first);
+        *game = Some(played);
+        Ok(())
+    })?;
     let _ = write!(
         text,
         "\n| {title} | ended | time s | slip rms mm/s | slip max mm/s | rolling | deepest mm | time a step |\n\
          |---|---|---|---|---|---|---|---|\n"
     );
-    for (k, Player { name, .. }) in PLAYERS.iter().enumerate() {
-        let _ = match (&games[k], &scripts[k]) {
-            (Some(played), _) => writeln!(text, "| {name} | {} | {:.2} |", row(played), median(&mut ratios[k])),
+    for (_, Player { name, .. }, script, ratios, game) in &games {
+        let _ = match (game, script) {
+            (Some(played), _) => writeln!(text, "| {name} | {} | {:.2} |", row(played), median(ratios)),
             (None, Err(e)) => writeln!(text, "| {name} | {e} | | | | | | |"),
             (None, Ok(_)) => writeln!(text, "| {name} | not played | | | | | | |"),
         };
     }
-    Ok(games)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    Ok(games.into_iter().map(|(.., game)| game).collect())
 }
 
 fn row(played: &Played) -> String {

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
+use drystone::Result;
 use drystone::Simulation;
 use drystone::backend::Numbers;
 use drystone::config::{Friction, Method, SolverConfig};
 use drystone::scenes::Scene;
 use drystone::world::World;
-use drystone::{Error, Result};
 
 /// An engine with its settings, stepping one scene.
 pub trait Contender {
@@ -94,27 +94,20 @@ fn unusual(config: &SolverConfig) -> Vec<String> {
 /// Drystone itself.
 pub struct Drystone {
     simulation: Simulation,
-    backend: String,
     dt: f32,
 }
 
 impl Drystone {
-    /// On `reference`, `cpu` or `gpu`.
+    /// On a backend by its name.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
-        let runs = match backend {
-            "reference" => Numbers::Reference,
-            "cpu" => Numbers::Cpu,
-            "gpu" => Numbers::Gpu,
-            other => return Err(Error::input(format!("backend {other:?}: must be reference, cpu or gpu"))),
-        };
-        let simulation = Simulation::new(scene.world.clone(), config.clone(), runs.open(false)?)?;
-        Ok(Self { simulation, backend: backend.into(), dt: scene.dt })
+        let backend = backend.parse::<Numbers>()?.open(false)?;
+        Ok(Self { simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?, dt: scene.dt })
     }
 }
 
 impl Contender for Drystone {
     fn setting(&self) -> Setting {
-        Setting::drystone(&self.backend, self.simulation.config())
+        Setting::drystone(self.simulation.backend().name(), self.simulation.config())
     }
 
     fn step(&mut self) -> Result<()> {

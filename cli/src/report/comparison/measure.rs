@@ -17,7 +17,7 @@ use drystone::{Error, Result};
 const BLOCK: u32 = 10;
 
 /// One contender on one scene: what it cost and what it got wrong. Everything is of the second half of the run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Name of the scene.
     pub scene: String,

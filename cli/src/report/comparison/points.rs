@@ -103,7 +103,5 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
 }
 
 fn contender(scene: &Scene, backend: &str, settings: &str) -> Result<Box<dyn Contender>> {
-    let mut config = SolverConfig::default().without_sleep();
-    settings.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
-    Ok(Box::new(Drystone::new(scene, backend, &config)?))
+    Ok(Box::new(Drystone::new(scene, backend, &settings::awake(settings.split_whitespace())?)?))
 }

@@ -11,7 +11,6 @@ use crate::files;
 use crate::settings;
 use drystone::Simulation;
 use drystone::backend::cpu::Reference;
-use drystone::config::SolverConfig;
 use drystone::metrics::{drift, in_place_count, rms_speed};
 use drystone::world::World;
 use drystone::{Error, Result};
@@ -53,15 +52,8 @@ pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     Ok(report)
 }
 
-fn settings(text: &str) -> Result<SolverConfig> {
-    let mut config = SolverConfig::default().without_sleep();
-    text.split_whitespace().try_for_each(|assignment| settings::set(&mut config, assignment))?;
-    config.check()?;
-    Ok(config)
-}
-
 fn simulate(world: World, settings_text: &str) -> Result<Simulation> {
-    Simulation::new(world, settings(settings_text)?, Box::new(Reference::<f32>::new()))
+    Simulation::new(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
 }
 
 /// How a standing scene fared.
