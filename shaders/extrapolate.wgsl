@@ -14,7 +14,7 @@ fn extrapolated(now: vec3f, before: vec3f) -> vec3f {
 // Goes on with an impulse, and remembers where it was and where it begins.
 fn extrapolated_impulse(i: u32, now: vec3f) -> vec3f {
     let begin = extrapolated(now, impulse_steps[i].before);
-    impulse_steps[i] = Step(now, begin);
+    impulse_steps[i] = ImpulseStep(now, begin);
     return begin;
 }
 

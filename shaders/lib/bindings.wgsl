@@ -16,7 +16,7 @@
 // These stay on the device: every step writes them before it reads them.
 @group(0) @binding(13) var<storage, read_write> free: array<Free>;
 @group(0) @binding(14) var<storage, read_write> velocities_before: array<Free>;
-@group(0) @binding(15) var<storage, read_write> impulse_steps: array<Step>;
+@group(0) @binding(15) var<storage, read_write> impulse_steps: array<ImpulseStep>;
 @group(0) @binding(16) var<storage, read_write> lengths: array<vec2f>;
 
 const WORKGROUP: u32 = 64u;

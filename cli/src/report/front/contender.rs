@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::settings;
 use drystone::Simulation;
-use drystone::backend::Numbers;
+use drystone::backend::BackendKind;
 use drystone::config::{FrictionRule, Method, SolverConfig};
 use drystone::scenes::Scene;
 use drystone::world::World;
@@ -108,9 +108,9 @@ impl Drystone {
     /// No such backend, no adapter, or settings that contradict each other.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
         let runs = match backend {
-            "reference" => Numbers::Reference,
-            "cpu" => Numbers::Cpu,
-            "gpu" => Numbers::Gpu,
+            "reference" => BackendKind::Reference,
+            "cpu" => BackendKind::Cpu,
+            "gpu" => BackendKind::Gpu,
             other => return Err(Error::input(format!("backend {other:?}: must be reference, cpu or gpu"))),
         };
         let simulation = Simulation::new(scene.world.clone(), config.clone(), runs.open(false)?)?;
