@@ -41,8 +41,8 @@ pub(super) struct Threads {
     over: AtomicBool,
 }
 
-/// Least groups of sixteen in a chunk: about a microsecond of work, ten times the cost of taking a chunk.
-const GROUPS_PER_CHUNK: usize = 4;
+/// Least groups of sixteen in a chunk: about a microsecond of work, ten times the cost of taking a chunk. Miri has small problems.
+const GROUPS_PER_CHUNK: usize = if cfg!(miri) { 1 } else { 4 };
 /// Chunks for each thread, so that one slow thread does not hold up all.
 const CHUNKS_PER_THREAD: usize = 4;
 /// Looks for work before a thread yields the processor. Miri runs threads in turns, so looking again is of no use there.
