@@ -11,7 +11,7 @@ fn extrapolated(is_first: bool, now: vec3f, before: vec3f) -> vec3f {
 // Extrapolates an impulse, and notes the impulse before and after.
 fn extrapolated_impulse(is_first: bool, i: u32, now: vec3f) -> vec3f {
     let begin = extrapolated(is_first, now, impulse_steps[i].before);
-    impulse_steps[i] = Step(now, begin);
+    impulse_steps[i] = ImpulseStep(now, begin);
     return begin;
 }
 

@@ -1,6 +1,6 @@
 //! The names of kinds in files, on command lines and in messages.
 
-use drystone::backend::{BackendChoice, Numbers};
+use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::{Method, Stabilization};
 use drystone::preset::Preset;
 use drystone::solver::Order;
@@ -8,7 +8,7 @@ use drystone::solver::Order;
 #[test]
 fn a_name_is_read_back_and_another_is_refused_with_the_list() {
     assert!(Preset::ALL.into_iter().all(|value| value.name().parse::<Preset>().ok() == Some(value)));
-    assert!(Numbers::ALL.into_iter().all(|value| value.name().parse::<Numbers>().ok() == Some(value)));
+    assert!(BackendKind::ALL.into_iter().all(|value| value.name().parse::<BackendKind>().ok() == Some(value)));
     assert!(Stabilization::ALL.into_iter().all(|value| value.name().parse::<Stabilization>().ok() == Some(value)));
     assert_eq!(format!("{:>9}", Order::Contacts), " contacts");
     let message = "gauss".parse::<Method>().expect_err("no method").to_string();
@@ -28,5 +28,5 @@ fn serde_knows_the_same_names() {
     same(Order::ALL);
     same(Method::ALL);
     same(Stabilization::ALL);
-    same(Numbers::ALL);
+    same(BackendKind::ALL);
 }

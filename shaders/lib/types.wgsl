@@ -1,4 +1,4 @@
-// The rows of a StepProblem. Layout, names and units: src/problem/layout.rs, held together by tests/shaders.rs.
+// The rows of a StepProblem. Layout, names and units: src/problem/rows.rs, held together by tests/shaders.rs.
 
 struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
 
@@ -33,7 +33,7 @@ struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
 struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
 
-struct Step { before: vec3f, begin: vec3f }
+struct ImpulseStep { before: vec3f, begin: vec3f }
 
 struct Momentum { t: f32, factor: f32, square: f32, restarts: u32 }
 

@@ -1,6 +1,6 @@
 // begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the
 // impulses of the step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::write_slot in src/problem/contacts.rs, preloaded in src/problem/carry.rs.
+// Doubles: Writer::write_slot in src/problem/write.rs, preloaded in src/problem/carry.rs.
 
 fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);

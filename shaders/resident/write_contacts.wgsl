@@ -1,7 +1,7 @@
 // write_contacts: one thread writes the rows of one manifold that the host computed anew, and moves its impulses to the new points
 // and tangents.
 // Reads written, written_contacts, written_points. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::bring_impulses and retangented in src/problem/contacts.rs.
+// Doubles: Writer::bring_impulses and retangented in src/problem/write.rs.
 
 // Rules and materials are those of the step before: where they change, no row stays on the device.
 fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {

@@ -63,7 +63,7 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
 }
 
 /// Unit cubes without weight that touch their neighbors in a grid of `side` along each axis, with four points each.
-fn pile(side: u32) -> StepProblem {
+pub(super) fn pile(side: u32) -> StepProblem {
     let count = (side * side * side) as usize;
     let inertia = 6.0;
     let mass = MassRow {

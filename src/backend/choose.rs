@@ -7,12 +7,12 @@ use super::gpu::{AdapterChoice, Gpu};
 use crate::error::Result;
 use crate::names::named;
 
-/// What a person asks for.
+/// The backend that a user asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BackendChoice {
-    /// A hardware GPU where there is one and the scene is large enough that it pays, as measured by some steps of a small pile on
-    /// both; else the CPU.
+    /// A hardware GPU, where there is one and the scene is so large that the GPU is faster, as some steps of a small pile on both
+    /// show; else the CPU.
     #[default]
     Auto,
     /// The compute shaders, on the best adapter there is.
@@ -25,11 +25,11 @@ pub enum BackendChoice {
 
 named!(BackendChoice { Auto = "auto", Gpu = "gpu", Cpu = "cpu", Reference = "reference", });
 
-/// What runs sweeps, by the numbers that it computes with.
+/// An implementation of the sweeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 #[non_exhaustive]
-pub enum Numbers {
+pub enum BackendKind {
     /// The reference in double precision.
     F64,
     /// The reference, one constraint at a time on one thread, in single precision.
@@ -40,13 +40,13 @@ pub enum Numbers {
     Gpu,
 }
 
-named!(Numbers { F64 = "f64", Reference = "reference", Cpu = "cpu", Gpu = "gpu", });
+named!(BackendKind { F64 = "f64", Reference = "reference", Cpu = "cpu", Gpu = "gpu", });
 
-impl Numbers {
-    /// Opens it. `exact` asks a GPU for the reference's bits.
+impl BackendKind {
+    /// Opens a backend of this kind. `exact` asks a GPU for the reference's bits.
     ///
     /// # Errors
-    /// No adapter, or one that cannot do what is asked.
+    /// There is no adapter, or the adapter cannot give the reference's bits.
     pub fn open(self, exact: bool) -> Result<Box<dyn Backend>> {
         Ok(match self {
             Self::F64 => Box::new(Reference::<f64>::new()),
@@ -63,19 +63,19 @@ const LEAST_BODIES: usize = 500;
 #[cfg(not(feature = "gpu"))]
 const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
 
-/// Opens the backend for a scene of `dynamic_bodies`, and says in one line what was taken and why.
+/// Opens the backend for a scene of `dynamic_bodies`, and gives the reason in one line.
 ///
 /// `exact` asks a GPU for the reference's bits.
 ///
 /// # Errors
-/// A GPU is asked for by name and there is none, or it cannot do what is asked.
+/// A GPU is asked for by name and there is none, or it cannot give the reference's bits.
 pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Result<(Box<dyn Backend>, String)> {
     let cpu = |why: String| -> (Box<dyn Backend>, String) { (Box::new(Cpu::new()), why) };
     match choice {
-        BackendChoice::Reference => Ok((Numbers::Reference.open(exact)?, "reference: asked for".into())),
+        BackendChoice::Reference => Ok((BackendKind::Reference.open(exact)?, "reference: asked for".into())),
         BackendChoice::Cpu => Ok(cpu("cpu: asked for".into())),
         BackendChoice::Gpu => {
-            let gpu = Numbers::Gpu.open(exact)?;
+            let gpu = BackendKind::Gpu.open(exact)?;
             let why = format!("gpu: asked for; {}", gpu.adapter());
             Ok((gpu, why))
         }

@@ -8,7 +8,7 @@ pub mod cpu;
 pub mod gpu;
 
 pub(crate) use checked::CheckedStep;
-pub use choose::{BackendChoice, Numbers, choose};
+pub use choose::{BackendChoice, BackendKind, choose};
 
 use crate::error::Result;
 use crate::plan::Pass;

@@ -1,22 +1,24 @@
 //! The Rust doubles of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
 //!
-//! `pair`, `contact`, `friction` and `joint` are the doubles of the parts of that name in `shaders/lib` and of the kernels
-//! that sweep constraints, `integrate` of those that go over bodies, `momentum` of those between accelerated sweeps. Branches on data are `select`s; branches on rules are
-//! plain `if`s, here and in WGSL.
+//! `pair`, `contact`, `friction` and `joint` are the doubles of the files of that name in `shaders/lib` and of the kernels that sweep
+//! constraints. `integrate` holds the doubles of kernels over bodies, `convergence` and `momentum` those between sweeps. Branches on
+//! data are `select`s; branches on rules are plain `if`s, here and in WGSL.
 
 pub mod contact;
+pub mod convergence;
 pub mod friction;
 pub mod integrate;
 pub mod joint;
+mod kernel_rows;
 pub mod momentum;
 pub mod pair;
 mod rows;
-mod state;
 
+pub use kernel_rows::KernelRows;
 pub use rows::{
-    Body, Contact, Free, Impulse, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, Step, StepParams, Sym3,
+    Body, Contact, Free, Impulse, ImpulseStep, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, StepParams,
+    Sym3,
 };
-pub use state::Rows;
 
 use crate::config::FrictionRule;
 

@@ -18,7 +18,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::rows::{Impulse, Momentum, Step};
+use super::rows::{Impulse, ImpulseStep, Momentum};
 use crate::math::{Lane, Scalar, Vec3, dot3, reciprocal, vec3};
 
 /// Threads of a workgroup: how many sums are taken side by side.
@@ -92,15 +92,15 @@ where
 
 /// Goes on with an impulse, and remembers where it was and where it begins.
 #[inline(always)]
-pub fn extrapolate<L: Lane>(first: bool, factor: L, impulse: Vec3<L>, step: &mut Step<L>) -> Vec3<L> {
+pub fn extrapolate<L: Lane>(first: bool, factor: L, impulse: Vec3<L>, step: &mut ImpulseStep<L>) -> Vec3<L> {
     let begin = if first { impulse } else { extrapolated(impulse, step.before, factor) };
-    *step = Step { before: impulse, begin };
+    *step = ImpulseStep { before: impulse, begin };
     begin
 }
 
 /// How far a sweep moved an impulse. Kernel `measure_step`.
 #[inline(always)]
-pub fn step_length<L: Lane>(impulse: Vec3<L>, step: &Step<L>) -> StepLength<L> {
+pub fn step_length<L: Lane>(impulse: Vec3<L>, step: &ImpulseStep<L>) -> StepLength<L> {
     let d = impulse - step.begin;
     StepLength { square: dot3(d, d), along: dot3(d, impulse - step.before) }
 }
@@ -180,10 +180,10 @@ mod tests {
 
     #[test]
     fn a_step_goes_from_where_the_sweep_began_and_along_the_way_from_the_sweep_before() {
-        let step = Step { before: vec3(1.0, 0.0, 0.0), begin: vec3(2.0, 1.0, 0.0) };
+        let step = ImpulseStep { before: vec3(1.0, 0.0, 0.0), begin: vec3(2.0, 1.0, 0.0) };
         let length = step_length(vec3(2.0, 3.0, 0.0), &step);
         assert_eq!(length, StepLength { square: 4.0, along: 6.0 });
-        let back = step_length(vec3(1.5, -1.0, 0.0), &Step { before: vec3(1.5, 2.0, 0.0), ..step });
+        let back = step_length(vec3(1.5, -1.0, 0.0), &ImpulseStep { before: vec3(1.5, 2.0, 0.0), ..step });
         assert_eq!(back, StepLength { square: 4.25, along: 6.0 });
         // Uphill: it turned round.
         let turned = step_length(vec3(1.5, 1.0, 0.0), &step);

@@ -135,9 +135,9 @@ pub struct Impulse<L> {
     pub peak: L,
 }
 
-/// Double of the WGSL struct `Step`: one impulse between two accelerated sweeps.
+/// Double of the WGSL struct `ImpulseStep`: one impulse between two accelerated sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Step<L> {
+pub struct ImpulseStep<L> {
     /// After the sweep before.
     pub before: Vec3<L>,
     /// Where the sweep begins.
@@ -208,17 +208,37 @@ pub struct Pair<L> {
     pub moving: L,
 }
 
-impl<S: Scalar> Body<S> {
-    /// From storage.
-    pub fn load(r: &BodyRow) -> Self {
-        Self { v: Vec3::load(r.v), w: Vec3::load(r.w), dp: Vec3::load(r.dp), dq: Quat::load(r.dq) }
-    }
+/// `load` and `store` of rows: first the vectors and quaternions, then the numbers.
+macro_rules! stored {
+    ($($Kernel:ident as $Row:ident { $($Type:ident: $($field:ident),+;)* [$($number:ident),*] })*) => {$(
+        impl<S: Scalar> $Kernel<S> {
+            /// From storage.
+            pub fn load(r: &$Row) -> Self {
+                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from_f32(r.$number),)* }
+            }
 
-    /// To storage.
-    pub fn store(&self) -> BodyRow {
-        let (v, w, dp) = (self.v.store(), self.w.store(), self.dp.store());
-        BodyRow { v, pad_v: 0.0, w, pad_w: 0.0, dp, pad_dp: 0.0, dq: self.dq.store() }
+            /// To storage, without indices.
+            #[allow(clippy::needless_update)]
+            pub fn store(&self) -> $Row {
+                $Row {
+                    $($($field: self.$field.store(),)+)*
+                    $($number: self.$number.to_f32(),)*
+                    ..bytemuck::Zeroable::zeroed()
+                }
+            }
+        }
+    )*};
+}
+
+stored! {
+    Body as BodyRow { Vec3: v, w, dp; Quat: dq; [] }
+    Inertia as InertiaRow { Vec3: principal, inv_principal; Quat: frame; [] }
+    Contact as ContactRow { Vec3: normal, tangent; [friction, restitution, radius_a, radius_b, preload] }
+    Point as PointRow {
+        Vec3: r_a, r_b; [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2]
     }
+    Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
+    Joint as JointRow { Vec3: r_a, r_b, gap; [] }
 }
 
 impl<S: Scalar> Mass<S> {
@@ -230,9 +250,7 @@ impl<S: Scalar> Mass<S> {
             acceleration: Vec3::load(r.acceleration),
         }
     }
-}
 
-impl<S: Scalar> Mass<S> {
     /// To storage.
     pub fn store(&self) -> MassRow {
         MassRow {
@@ -242,76 +260,6 @@ impl<S: Scalar> Mass<S> {
             acceleration: self.acceleration.store(),
             ..MassRow::default()
         }
-    }
-}
-
-impl<S: Scalar> Inertia<S> {
-    /// From storage.
-    pub fn load(r: &InertiaRow) -> Self {
-        Self {
-            principal: Vec3::load(r.principal),
-            inv_principal: Vec3::load(r.inv_principal),
-            frame: Quat::load(r.frame),
-        }
-    }
-}
-
-impl<S: Scalar> Contact<S> {
-    /// From storage.
-    pub fn load(r: &ContactRow) -> Self {
-        let [friction, restitution, radius_a, radius_b, preload] =
-            [r.friction, r.restitution, r.radius_a, r.radius_b, r.preload].map(S::from_f32);
-        let (normal, tangent) = (Vec3::load(r.normal), Vec3::load(r.tangent));
-        Self { normal, tangent, friction, restitution, radius_a, radius_b, preload }
-    }
-
-    /// To storage, indices left out.
-    pub fn store(&self) -> ContactRow {
-        let [friction, restitution, radius_a, radius_b, preload] =
-            [self.friction, self.restitution, self.radius_a, self.radius_b, self.preload].map(S::to_f32);
-        let (normal, tangent) = (self.normal.store(), self.tangent.store());
-        ContactRow { normal, friction, tangent, restitution, radius_a, radius_b, preload, ..ContactRow::default() }
-    }
-}
-
-impl<S: Scalar> Point<S> {
-    /// From storage.
-    pub fn load(r: &PointRow) -> Self {
-        let [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2] =
-            [r.separation, r.normal_mass, r.tangent_mass, r.approach_velocity, r.slip_1, r.slip_2].map(S::from_f32);
-        let (r_a, r_b) = (Vec3::load(r.r_a), Vec3::load(r.r_b));
-        Self { r_a, r_b, separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 }
-    }
-
-    /// To storage.
-    pub fn store(&self) -> PointRow {
-        let [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2] =
-            [self.separation, self.normal_mass, self.tangent_mass, self.approach_velocity, self.slip_1, self.slip_2]
-                .map(S::to_f32);
-        let (r_a, r_b) = (self.r_a.store(), self.r_b.store());
-        PointRow { r_a, r_b, separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 }
-    }
-}
-
-impl<S: Scalar> Joint<S> {
-    /// From storage.
-    pub fn load(r: &JointRow) -> Self {
-        Self { r_a: Vec3::load(r.r_a), r_b: Vec3::load(r.r_b), gap: Vec3::load(r.gap) }
-    }
-}
-
-impl<S: Scalar> Impulse<S> {
-    /// From storage.
-    pub fn load(r: &ImpulseRow) -> Self {
-        let [normal, tangent_1, tangent_2, peak] = [r.normal, r.tangent_1, r.tangent_2, r.peak].map(S::from_f32);
-        Self { normal, tangent_1, tangent_2, peak }
-    }
-
-    /// To storage.
-    pub fn store(&self) -> ImpulseRow {
-        let [normal, tangent_1, tangent_2, peak] =
-            [self.normal, self.tangent_1, self.tangent_2, self.peak].map(S::to_f32);
-        ImpulseRow { normal, tangent_1, tangent_2, peak }
     }
 }
 
@@ -329,25 +277,32 @@ impl<S: Scalar> Momentum<S> {
     }
 }
 
-impl<S: Scalar> StepParams<S> {
-    /// From storage.
-    pub fn load(p: &Params) -> Self {
-        let softness = |s: &Softness| SoftnessOf {
-            bias_rate: S::from_f32(s.bias_rate),
-            mass_scale: S::from_f32(s.mass_scale),
-            impulse_scale: S::from_f32(s.impulse_scale),
-            push_limit: S::from_f32(s.push_limit),
-        };
+impl<L: Lane> SoftnessOf<L> {
+    #[inline(always)]
+    fn load(s: &Softness) -> Self {
         Self {
-            substep: S::from_f32(p.substep),
-            inverse_substep: S::from_f32(p.inverse_substep),
-            restitution_threshold: S::from_f32(p.restitution_threshold),
-            movable: softness(&p.movable),
-            fixed: softness(&p.fixed),
-            joint: softness(&p.joint),
-            slop: S::from_f32(p.slop),
-            relaxation: S::from_f32(p.relaxation),
-            tolerance: S::from_f32(p.tolerance),
+            bias_rate: L::constant(s.bias_rate.into()),
+            mass_scale: L::constant(s.mass_scale.into()),
+            impulse_scale: L::constant(s.impulse_scale.into()),
+            push_limit: L::constant(s.push_limit.into()),
+        }
+    }
+}
+
+impl<L: Lane> StepParams<L> {
+    /// From storage, the same in every lane.
+    #[inline(always)]
+    pub fn load(p: &Params) -> Self {
+        Self {
+            substep: L::constant(p.substep.into()),
+            inverse_substep: L::constant(p.inverse_substep.into()),
+            restitution_threshold: L::constant(p.restitution_threshold.into()),
+            movable: SoftnessOf::load(&p.movable),
+            fixed: SoftnessOf::load(&p.fixed),
+            joint: SoftnessOf::load(&p.joint),
+            slop: L::constant(p.slop.into()),
+            relaxation: L::constant(p.relaxation.into()),
+            tolerance: L::constant(p.tolerance.into()),
         }
     }
 }

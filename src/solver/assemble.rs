@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Order, Sequence};
 use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
 use crate::error::{Error, Result};
-use crate::kernels::{Body, Contact, Impulse, Mass, Point, Rows, StepParams, Sym3};
+use crate::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::problem::effective::tangent_mass;
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem};
@@ -15,7 +15,7 @@ pub(super) struct Assembled {
     /// Rounded, with all indices.
     pub problem: StepProblem,
     /// The same in all digits.
-    pub rows: Rows<f64>,
+    pub rows: KernelRows<f64>,
     /// Which point, and so which impulse, belongs to each contact.
     pub points: Vec<u32>,
     /// 1, or -1 for a contact whose second tangent is the opposite of the one that the kernels form.
@@ -34,7 +34,7 @@ impl Assembled {
         let operator = Operator::new(contacts);
         let sequence = Sequence::new(order, contacts);
         let hands = contacts.contacts.iter().enumerate().map(|(i, c)| hand(i, c)).collect::<Result<Vec<_>>>()?;
-        let (mut problem, mut rows) = (StepProblem::default(), Rows::default());
+        let (mut problem, mut rows) = (StepProblem::default(), KernelRows::default());
         problem.params = Params {
             substep: 1.0,
             inverse_substep: 1.0,

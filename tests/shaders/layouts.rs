@@ -34,11 +34,11 @@ macro_rules! layouts {
 
 /// Stays on the device: Rust knows only how long it is.
 #[repr(C)]
-struct Step {
+struct ImpulseStep {
     before: [f32; 4],
     begin: [f32; 4],
 }
-const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<Step>() == SCRATCH_ROW);
+const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<ImpulseStep>() == SCRATCH_ROW);
 
 /// The layout of each row, under the name of its twin.
 fn in_rust() -> BTreeMap<String, Layout> {
@@ -55,7 +55,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Joint = JointRow { r_a body_a r_b body_b gap }
         JointImpulse = JointImpulseRow { linear }
         Convergence = ConvergenceRow { moving done sweeps planned }
-        Step = Step { before begin }
+        ImpulseStep = ImpulseStep { before begin }
         Momentum = MomentumRow { t factor square restarts }
         Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }

@@ -11,7 +11,7 @@ use crate::hard::{Case, Check, Limit, Setup};
 use crate::report::hard_cases;
 use crate::settings;
 use drystone::Result;
-use drystone::backend::Numbers;
+use drystone::backend::BackendKind;
 use drystone::preset::Preset;
 
 /// Arguments of `drystone hard`.
@@ -30,7 +30,7 @@ pub struct HardArgs {
     set: Vec<String>,
     /// What runs the sweeps.
     #[arg(long, value_parser = words::numbers(), default_value = "cpu")]
-    backend: Numbers,
+    backend: BackendKind,
     /// Leave out what takes minutes.
     #[arg(long)]
     short: bool,

@@ -7,7 +7,7 @@ use clap::Args;
 use super::output::{print, print_json};
 use super::words;
 use crate::report::{CurveRow, SolveReport, SolveSettings};
-use drystone::backend::Numbers;
+use drystone::backend::BackendKind;
 use drystone::config::Method;
 use drystone::contacts::ContactProblem;
 use drystone::solver::Order;
@@ -42,7 +42,7 @@ pub struct SolveArgs {
     passes: Option<u8>,
     /// What runs them; errors are always measured in f64.
     #[arg(long, value_parser = words::numbers(), default_value = "f64")]
-    backend: Numbers,
+    backend: BackendKind,
     /// Ask the GPU for the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
@@ -65,7 +65,7 @@ impl SolveArgs {
             sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps },
             tolerance: self.tolerance.unwrap_or(0.0),
         };
-        let backend = (self.backend != Numbers::F64).then(|| self.backend.open(self.exact)).transpose()?;
+        let backend = (self.backend != BackendKind::F64).then(|| self.backend.open(self.exact)).transpose()?;
         let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use drystone::backend::{BackendChoice, Numbers};
+use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::Method;
 use drystone::preset::Preset;
 use drystone::solver::Order;
@@ -47,7 +47,7 @@ const BACKENDS: [Word; BackendChoice::ALL.len()] = [
     ("reference", "The CPU reference, one constraint at a time on one thread"),
 ];
 
-const NUMBERS: [Word; Numbers::ALL.len()] = [
+const NUMBERS: [Word; BackendKind::ALL.len()] = [
     ("f64", "The reference in double precision"),
     ("reference", "The reference, one constraint at a time on one thread, in single precision"),
     ("cpu", "Sixteen constraints at a time, in single precision"),
@@ -79,7 +79,7 @@ pub(super) fn backend() -> impl TypedValueParser<Value = BackendChoice> {
     one_of(&BACKENDS)
 }
 
-pub(super) fn numbers() -> impl TypedValueParser<Value = Numbers> {
+pub(super) fn numbers() -> impl TypedValueParser<Value = BackendKind> {
     one_of(&NUMBERS)
 }
 
@@ -97,6 +97,6 @@ mod tests {
         same(&METHODS, &Method::ALL);
         same(&ORDERS, &Order::ALL);
         same(&BACKENDS, &BackendChoice::ALL);
-        same(&NUMBERS, &Numbers::ALL);
+        same(&NUMBERS, &BackendKind::ALL);
     }
 }

@@ -4,22 +4,22 @@ use std::fmt::Write;
 
 use crate::hard::{Case, Check, Limit, Setup};
 use drystone::Result;
-use drystone::backend::Numbers;
+use drystone::backend::BackendKind;
 use drystone::preset::Preset;
 
 /// What the columns are run with.
-const COLUMNS: [(Preset, Numbers); 6] = [
-    (Preset::Fast, Numbers::Cpu),
-    (Preset::Balanced, Numbers::Cpu),
-    (Preset::Accurate, Numbers::Cpu),
-    (Preset::Reference, Numbers::Cpu),
-    (Preset::Balanced, Numbers::F64),
-    (Preset::Balanced, Numbers::Gpu),
+const COLUMNS: [(Preset, BackendKind); 6] = [
+    (Preset::Fast, BackendKind::Cpu),
+    (Preset::Balanced, BackendKind::Cpu),
+    (Preset::Accurate, BackendKind::Cpu),
+    (Preset::Reference, BackendKind::Cpu),
+    (Preset::Balanced, BackendKind::F64),
+    (Preset::Balanced, BackendKind::Gpu),
 ];
 
 /// Whether a case is run in that column: what takes minutes on the CPU takes hours with many substeps or in a software adapter.
-fn is_run(case: &Case, (preset, numbers): (Preset, Numbers)) -> bool {
-    !case.long || numbers == Numbers::Cpu && preset.config().substeps <= Preset::Balanced.config().substeps
+fn is_run(case: &Case, (preset, numbers): (Preset, BackendKind)) -> bool {
+    !case.long || numbers == BackendKind::Cpu && preset.config().substeps <= Preset::Balanced.config().substeps
 }
 
 /// Runs that the page takes.
@@ -53,7 +53,7 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     }
     let of = |k: usize| cases.iter().filter(|c| is_run(c, COLUMNS[k])).count();
     let totals: Vec<_> = passed.iter().enumerate().map(|(k, passed)| format!("{passed} of {}", of(k))).collect();
-    let gpu = Numbers::Gpu.open(false)?.adapter();
+    let gpu = BackendKind::Gpu.open(false)?.adapter();
     let substeps = |preset: Preset| preset.config().substeps;
     let heads: Vec<_> =
         COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();

@@ -1,13 +1,13 @@
 //! The CPU reference: one thread, one constraint at a time, in the order of the plan.
 
 use super::super::{Backend, CheckedStep};
-use super::begin_sweep;
 use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
+use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Contact, Free, Impulse, Joint, Pair, Point, Rows, Rules, Step, StepParams};
+use crate::kernels::{Contact, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Point, Rules, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -15,14 +15,14 @@ use crate::problem::{ConvergenceRow, StepProblem};
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 #[derive(Debug, Default)]
 pub struct Reference<S> {
-    rows: Rows<S>,
+    rows: KernelRows<S>,
     free: Vec<Free<S>>,
     convergence: ConvergenceRow,
-    /// What accelerated sweeps leave for each other: velocities of the sweep before, impulses of points and joints, and how
-    /// far a sweep moved them.
+    /// State of accelerated sweeps: velocities of the sweep before, impulses of points and joints, and how far a sweep moved the
+    /// impulses.
     velocities_before: Vec<[Vec3<S>; 2]>,
-    point_steps: Vec<Step<S>>,
-    joint_steps: Vec<Step<S>>,
+    point_steps: Vec<ImpulseStep<S>>,
+    joint_steps: Vec<ImpulseStep<S>>,
     lengths: Vec<StepLength<S>>,
 }
 
@@ -33,17 +33,17 @@ impl<S: Scalar> Reference<S> {
     }
 
     /// A reference with these rows loaded, for [`Reference::advance`].
-    pub fn holding(rows: Rows<S>) -> Self {
+    pub fn holding(rows: KernelRows<S>) -> Self {
         Self { rows, ..Self::default() }
     }
 
     /// The rows as the last passes left them.
-    pub fn rows(&self) -> &Rows<S> {
+    pub fn rows(&self) -> &KernelRows<S> {
         &self.rows
     }
 
     /// The rows, to change before the next passes.
-    pub fn rows_mut(&mut self) -> &mut Rows<S> {
+    pub fn rows_mut(&mut self) -> &mut KernelRows<S> {
         &mut self.rows
     }
 
@@ -133,8 +133,8 @@ impl<S: Scalar> Reference<S> {
             self.rows.momentum.begin();
         }
         self.velocities_before.resize(self.rows.bodies.len(), Default::default());
-        self.point_steps.resize(self.rows.impulses.len(), Step::default());
-        self.joint_steps.resize(self.rows.joint_impulses.len(), Step::default());
+        self.point_steps.resize(self.rows.impulses.len(), ImpulseStep::default());
+        self.joint_steps.resize(self.rows.joint_impulses.len(), ImpulseStep::default());
         let factor = self.rows.momentum.factor;
         for (body, before) in self.rows.bodies.iter_mut().zip(&mut self.velocities_before) {
             let now = [body.v, body.w];

@@ -71,7 +71,7 @@ bindings! {
     /// Velocities before the last accelerated sweep.
     VelocitiesBefore "velocities_before": "array<Free>", Write;
     /// Impulses before the last accelerated sweep, and where the sweep began.
-    ImpulseSteps "impulse_steps": "array<Step>", Write;
+    ImpulseSteps "impulse_steps": "array<ImpulseStep>", Write;
     /// Sums over the steps of impulses.
     Lengths "lengths": "array<vec2f>", Write;
     /// Numbers of the programs that begin a step on the device.

@@ -1,7 +1,7 @@
 //! How far the sweeps are from what the machine can do: its memory and its arithmetic, measured in the same turns.
 
 use std::hint::black_box;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Mul, Neg, Range, Sub};
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -12,7 +12,7 @@ use drystone::Result;
 use drystone::backend::Backend;
 use drystone::backend::cpu::Cpu;
 use drystone::config::{FrictionRule, SolverConfig};
-use drystone::stages::backend::multiply_and_add;
+use drystone::stages::backend::{InstructionSet, Lanes, WIDTH, Work};
 use drystone::stages::kernels::contact::solve_contact;
 use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
 use drystone::stages::math::Lane;
@@ -115,9 +115,32 @@ fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
 
 /// Operations a second of all threads together.
 fn peak(pool: &rayon::ThreadPool) -> f64 {
+    const ROUNDS: usize = 1_000_000;
     let begin = Instant::now();
-    let done: u64 = pool.broadcast(|_| multiply_and_add(1_000_000)).into_iter().sum();
+    pool.broadcast(|_| InstructionSet::best().run(&Chains, 0..ROUNDS));
+    let done = pool.current_num_threads() * ROUNDS * 2 * CHAINS * WIDTH;
     done as f64 / begin.elapsed().as_secs_f64()
+}
+
+/// Chains of each kind, so that every unit of the processor always has one that waits for nothing.
+const CHAINS: usize = 6;
+
+/// Rounds of multiplications and additions on registers alone, apart as in the kernels, which never fuse them.
+struct Chains;
+
+impl Work for Chains {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, rounds: Range<usize>) {
+        let (factor, summand) = (black_box(L::constant(0.999_999)), black_box(L::constant(1e-3)));
+        let (mut products, mut sums) = ([L::constant(1.0); CHAINS], [L::constant(1.0); CHAINS]);
+        for _ in rounds {
+            for chain in 0..CHAINS {
+                products[chain] = products[chain] * factor;
+                sums[chain] = sums[chain] + summand;
+            }
+        }
+        black_box((products, sums));
+    }
 }
 
 /// Bytes a second of all threads together, each on arrays of its own of `size` bytes in all, from the first that begins to the

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::settings;
 use drystone::Result;
 use drystone::Simulation;
-use drystone::backend::Numbers;
+use drystone::backend::BackendKind;
 use drystone::config::{Friction, Method, SolverConfig};
 use drystone::scenes::Scene;
 use drystone::world::World;
@@ -100,7 +100,7 @@ pub struct Drystone {
 impl Drystone {
     /// On a backend by its name.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
-        let backend = backend.parse::<Numbers>()?.open(false)?;
+        let backend = backend.parse::<BackendKind>()?.open(false)?;
         Ok(Self { simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?, dt: scene.dt })
     }
 }

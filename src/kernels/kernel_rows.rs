@@ -6,7 +6,7 @@ use crate::problem::StepProblem;
 
 /// The rows of a problem over one kind of numbers, indices left out.
 #[derive(Clone, Debug, Default)]
-pub struct Rows<S> {
+pub struct KernelRows<S> {
     /// The same for all.
     pub params: StepParams<S>,
     /// State of the bodies.
@@ -29,7 +29,7 @@ pub struct Rows<S> {
     pub momentum: Momentum<S>,
 }
 
-impl<S: Scalar> Rows<S> {
+impl<S: Scalar> KernelRows<S> {
     /// From storage.
     pub fn load(&mut self, problem: &StepProblem) {
         fn refill<R, T>(rows: &[R], kept: &mut Vec<T>, load: impl Fn(&R) -> T) {
@@ -50,15 +50,10 @@ impl<S: Scalar> Rows<S> {
 
     /// What passes change, to storage.
     pub fn store(&self, problem: &mut StepProblem) {
-        for (row, body) in problem.bodies.iter_mut().zip(&self.bodies) {
-            *row = body.store();
-        }
-        for (row, impulse) in problem.impulses.iter_mut().zip(&self.impulses) {
-            *row = impulse.store();
-        }
-        for (row, impulse) in problem.joint_impulses.iter_mut().zip(&self.joint_impulses) {
-            row.linear = impulse.store();
-        }
+        problem.bodies.iter_mut().zip(&self.bodies).for_each(|(row, body)| *row = body.store());
+        problem.impulses.iter_mut().zip(&self.impulses).for_each(|(row, impulse)| *row = impulse.store());
+        let joints = problem.joint_impulses.iter_mut().zip(&self.joint_impulses);
+        joints.for_each(|(row, impulse)| row.linear = impulse.store());
         problem.momentum = self.momentum.store();
     }
 }

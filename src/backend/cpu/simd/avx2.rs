@@ -1,5 +1,5 @@
 //! Sixteen numbers in two AVX2 registers. Only for use inside functions that enable `avx2`, which
-//! [`super::super::sweep`] enters after it has asked the processor.
+//! [`super::instructions`] enters after it has asked the processor.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};

@@ -1,30 +1,29 @@
-//! Which bodies and constraints a thread works on by itself.
+//! The partition of bodies and constraints into parts, each for one thread.
 //!
-//! Nothing that happens to one island depends on another. So small islands are dealt out to parts that fit in a core's cache, and a
-//! thread does all passes to a part before it goes on to the next: rows and bodies are fetched once a step and not once a pass, and
-//! nobody waits for anybody. Islands that are too large for that, and bodies at rest for good, are the last part, which all threads
-//! work on together, color by color. Since every body and every constraint still gets the same passes in the same order, the result
-//! is the same to the last bit, whatever the parts are.
+//! Islands do not depend on each other. So small islands fill parts that fit in a core's cache, and a thread runs all passes over a
+//! part before it takes the next: rows and bodies are fetched once a step and not once a pass, and no thread waits. The last part holds
+//! larger islands and bodies that no pass changes; all threads work on it together, color by color. Every body and every constraint
+//! gets the same passes in the same order, so the result has the same bits for every partition.
 
 use std::ops::Range;
 
-use super::wide::WIDTH;
+use super::simd::WIDTH;
 use crate::graph::Islands;
 use crate::problem::{BodyRow, MassRow, StepProblem};
 
-/// How much a part holds, in bodies and constraints: about a megabyte.
+/// Bodies and constraints that a part holds: about a megabyte.
 const PART: u32 = 4096;
 /// Islands with more are worked on by all threads.
 const LARGE: u32 = 4 * PART;
 
-/// The part that each body is in, and what follows from it.
+/// The part of each body, and its place among the lanes.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(super) struct Partition {
     /// Number of parts, the last, for all threads, included.
     pub count: usize,
-    /// Where the lanes have each body, and after the last, nobody.
+    /// The slot of each body, and last that of the placeholder: a body at rest for lanes without a constraint.
     pub slots: Vec<u32>,
-    /// Where the bodies of each part begin, in groups of slots, and where the last end.
+    /// Where the bodies of each part begin, in groups of [`WIDTH`] slots, and where the last end.
     begins: Vec<u32>,
     of_body: Vec<u32>,
     islands: Islands,
@@ -34,8 +33,8 @@ pub(super) struct Parts {
     next: Vec<u32>,
 }
 
-impl Parts {
-    /// Deals out the bodies of a problem; one of at most `undivided` bodies and constraints is not divided.
+impl Partition {
+    /// Divides a problem of more than `undivided` bodies and constraints.
     pub fn update(&mut self, problem: &StepProblem, undivided: usize) {
         let bodies = problem.bodies.len();
         self.of_body.clear();
@@ -52,7 +51,7 @@ impl Parts {
 
     /// The part of a constraint of two bodies.
     pub fn of(&self, a: u32, b: u32) -> u32 {
-        // What cannot move is in the last.
+        // Bodies that cannot move are in the last part.
         self.of_body[a as usize].min(self.of_body[b as usize])
     }
 
@@ -104,7 +103,7 @@ impl Parts {
         self.count += usize::from(filled > 0);
     }
 
-    /// Bodies of different parts share no group, and nobody, whom all lanes read, has one alone.
+    /// Bodies of different parts share no group. The placeholder, which all lanes read, has a group of its own.
     fn give_slots(&mut self) {
         self.begins.clear();
         self.begins.resize(self.count + 1, 0);
@@ -137,80 +136,85 @@ fn moves(problem: &StepProblem, body: u32) -> bool {
     inv_mass > 0.0 || acceleration != [0.0; 3] || problem.bodies[body as usize] != BodyRow::AT_REST
 }
 
-/// Where the things of each color of each part begin, which stand part by part and color by color.
+/// Ranges of a list that stands part by part, and color by color in each part.
 #[derive(Default)]
-pub(super) struct Begins {
-    colors: usize,
-    begins: Vec<u32>,
+pub(super) struct ColorRanges {
+    colors: Range<u32>,
+    /// Where each color of each part starts, and where the last ends.
+    starts: Vec<u32>,
 }
 
-impl Begins {
-    /// Begins anew.
-    pub fn clear(&mut self, colors: usize) {
+impl ColorRanges {
+    /// Starts anew with some colors in each part.
+    pub fn reset(&mut self, colors: Range<u32>) {
         self.colors = colors;
-        self.begins.clear();
+        self.starts.clear();
     }
 
-    /// The next color of a part, or the end, is at `begin`.
-    pub fn push(&mut self, begin: usize) {
-        self.begins.push(begin as u32);
+    /// The next color of a part, or the end of the last, is at `start`.
+    pub fn push(&mut self, start: usize) {
+        self.starts.push(start as u32);
     }
 
-    /// Those of a color of a part.
-    pub fn of_color(&self, part: usize, color: usize) -> Range<usize> {
-        let cell = part * self.colors + color;
-        self.begins[cell] as usize..self.begins[cell + 1] as usize
+    /// How many colors all parts have together.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The range of a color of a part.
+    pub fn of(&self, part: usize, color: u32) -> Range<usize> {
+        self.at(part * self.colors.len() + (color - self.colors.start) as usize)
+    }
+
+    /// The range at an index below [`Self::len`].
+    pub fn at(&self, i: usize) -> Range<usize> {
+        self.starts[i] as usize..self.starts[i + 1] as usize
     }
 }
 
 /// Rows of a problem, part by part and color by color.
 #[derive(Default)]
-pub(super) struct Dealt {
+pub(super) struct PartitionedRows {
     rows: Vec<u32>,
-    begins: Vec<u32>,
+    pub ranges: ColorRanges,
     next: Vec<u32>,
 }
 
-impl Dealt {
-    /// Deals out the rows of some colors; `part_of` says to which part.
-    pub fn update(&mut self, problem: &StepProblem, colors: Range<u32>, parts: usize, part_of: impl Fn(usize) -> u32) {
+impl PartitionedRows {
+    /// Sorts the rows of some colors by part; `part_of` gives the part of a row.
+    pub fn update(&mut self, problem: &StepProblem, colors: Range<u32>, parts: usize, part_of: impl Fn(u32) -> u32) {
+        self.ranges.reset(colors.clone());
+        let all = problem.rows_of(&colors);
+        let starts = &mut self.ranges.starts;
+        if parts == 1 {
+            self.rows.clear();
+            self.rows.extend_from_slice(all);
+            let first = problem.colors.get(colors.start as usize).copied().unwrap_or(0);
+            starts.extend(colors.map(|color| problem.colors[color as usize] - first));
+            starts.push(all.len() as u32);
+            return;
+        }
         let rows = || {
             colors.clone().flat_map(|color| problem.rows_of(&(color..color + 1)).iter().map(move |&row| (color, row)))
         };
-        if parts == 1 {
-            self.rows.clear();
-            self.rows.extend_from_slice(problem.rows_of(&colors));
-            self.begins.clear();
-            let first = problem.colors.get(colors.start as usize).copied().unwrap_or(0);
-            self.begins.extend(colors.clone().map(|color| problem.colors[color as usize] - first));
-            self.begins.push(self.rows.len() as u32);
-            return;
+        let range_of = |(color, row)| part_of(row) as usize * colors.len() + (color - colors.start) as usize;
+        starts.resize(parts * colors.len() + 1, 0);
+        rows().for_each(|row| starts[range_of(row) + 1] += 1);
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
         }
-        let cell =
-            |(color, row): (u32, u32)| part_of(row as usize) as usize * colors.len() + (color - colors.start) as usize;
-        self.begins.clear();
-        self.begins.resize(parts * colors.len() + 1, 0);
-        rows().for_each(|row| self.begins[cell(row) + 1] += 1);
-        for i in 1..self.begins.len() {
-            self.begins[i] += self.begins[i - 1];
-        }
-        self.next.clone_from(&self.begins);
-        self.rows.resize(problem.rows_of(&colors).len(), 0);
+        self.next.clone_from(starts);
+        self.rows.resize(all.len(), 0);
         for row in rows() {
-            let place = &mut self.next[cell(row)];
-            self.rows[*place as usize] = row.1;
-            *place += 1;
+            let next = &mut self.next[range_of(row)];
+            self.rows[*next as usize] = row.1;
+            *next += 1;
         }
     }
 
-    /// How many colors of parts there are.
-    pub fn cells(&self) -> usize {
-        self.begins.len() - 1
-    }
-
-    /// The rows of a color of a part.
-    pub fn rows(&self, cell: usize) -> &[u32] {
-        &self.rows[self.begins[cell] as usize..self.begins[cell + 1] as usize]
+    /// The rows of the color of a part, by the index of its range.
+    pub fn at(&self, i: usize) -> &[u32] {
+        &self.rows[self.ranges.at(i)]
     }
 }
 
@@ -231,31 +235,32 @@ mod tests {
         problem
     }
 
-    fn parts(problem: &StepProblem) -> Parts {
-        let mut parts = Parts::default();
-        parts.update(problem, 0);
-        let mut slots = parts.slots.clone();
+    fn partition(problem: &StepProblem) -> Partition {
+        let mut partition = Partition::default();
+        partition.update(problem, 0);
+        let mut slots = partition.slots.clone();
         slots.sort_unstable();
         assert!(slots.is_sorted_by(|a, b| a < b), "a slot is given twice");
-        for (body, &slot) in parts.slots[..problem.bodies.len()].iter().enumerate() {
-            let part = parts.of_body[body] as usize;
+        for (body, &slot) in partition.slots[..problem.bodies.len()].iter().enumerate() {
+            let part = partition.of_body[body] as usize;
             assert!(
-                parts.bodies(part).contains(&(slot as usize / WIDTH)),
+                partition.bodies(part).contains(&(slot as usize / WIDTH)),
                 "body {body} is not among those of its part"
             );
         }
-        let nobody = parts.slots[problem.bodies.len()] as usize / WIDTH;
-        assert!(slots.iter().filter(|&&slot| slot as usize / WIDTH == nobody).count() == 1, "nobody is not alone");
-        parts
+        let placeholder = partition.slots[problem.bodies.len()] as usize / WIDTH;
+        let beside = slots.iter().filter(|&&slot| slot as usize / WIDTH == placeholder).count();
+        assert_eq!(beside, 1, "the placeholder shares its group");
+        partition
     }
 
     #[test]
     fn small_islands_fill_parts_and_are_not_cut() {
         // Chains of ten: 19 bodies and contacts each.
         let chains = problem(10_000, (0..10_000).filter(|i| i % 10 != 9).map(|i| (i, i + 1)));
-        let parts = parts(&chains);
-        assert_eq!(parts.count, 1000_usize.div_ceil(PART as usize / 19) + 1);
-        assert!(parts.of_body.chunks(10).all(|chain| chain.iter().all(|part| *part == chain[0])));
+        let partition = partition(&chains);
+        assert_eq!(partition.count, 1000_usize.div_ceil(PART as usize / 19) + 1);
+        assert!(partition.of_body.chunks(10).all(|chain| chain.iter().all(|part| *part == chain[0])));
     }
 
     #[test]
@@ -263,11 +268,11 @@ mod tests {
         let large = LARGE;
         let mut problem = problem(large as usize + 4, (0..large).map(|i| (i, i + 1)).chain([(large + 2, large + 3)]));
         problem.masses[large as usize + 3].inv_mass = 0.0;
-        let parts = parts(&problem);
-        assert_eq!(parts.count, 2);
-        assert!(parts.of_body[..=large as usize].iter().all(|&part| part == 1));
-        assert_eq!(parts.of_body[large as usize + 1..], [0, 0, 1]);
-        assert_eq!(parts.of(large + 3, large + 2), 0, "what stands still makes no island");
+        let partition = partition(&problem);
+        assert_eq!(partition.count, 2);
+        assert!(partition.of_body[..=large as usize].iter().all(|&part| part == 1));
+        assert_eq!(partition.of_body[large as usize + 1..], [0, 0, 1]);
+        assert_eq!(partition.of(large + 3, large + 2), 0, "what stands still makes no island");
     }
 
     #[test]
@@ -275,17 +280,17 @@ mod tests {
         let many = PART;
         let mut problem = problem(many as usize, (1..many).map(|i| (0, i)));
         problem.masses[0].inv_mass = 0.0;
-        assert!(parts(&problem).count > 2, "what lies on the floor are many islands");
+        assert!(partition(&problem).count > 2, "what lies on the floor are many islands");
         problem.bodies[0].w = [0.0, 0.0, 1.0];
-        let parts = parts(&problem);
-        assert_eq!((parts.count, parts.of_body[0], parts.of_body[many as usize - 1]), (2, 0, 0));
+        let partition = partition(&problem);
+        assert_eq!((partition.count, partition.of_body[0], partition.of_body[many as usize - 1]), (2, 0, 0));
     }
 
     #[test]
     fn a_small_problem_is_not_divided() {
-        let mut parts = Parts::default();
-        parts.update(&problem(100, (0..0).map(|i| (i, i))), 100);
-        assert_eq!(parts.count, 1);
-        assert_eq!(parts.slots, Vec::from_iter(0..100).into_iter().chain([112]).collect::<Vec<u32>>());
+        let mut partition = Partition::default();
+        partition.update(&problem(100, (0..0).map(|i| (i, i))), 100);
+        assert_eq!(partition.count, 1);
+        assert_eq!(partition.slots, Vec::from_iter(0..100).into_iter().chain([112]).collect::<Vec<u32>>());
     }
 }

@@ -3,8 +3,7 @@
 use std::ops::Range;
 use std::sync::Mutex;
 
-use super::super::sweep::{InstructionSet, Work};
-use super::{Lanes, Row8, WIDTH, Wide};
+use super::{InstructionSet, Lanes, Row8, WIDTH, Wide, Work};
 use crate::math::Lane;
 
 /// Zeros of both signs, the smallest and the largest, and what is no number.

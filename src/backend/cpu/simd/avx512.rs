@@ -1,5 +1,5 @@
 //! Sixteen numbers in one AVX-512 register. Only for use inside functions that enable `avx512f`, which
-//! [`super::super::sweep`] enters after it has asked the processor.
+//! [`super::instructions`] enters after it has asked the processor.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Neg, Sub};

@@ -1,0 +1,202 @@
+//! Bodies of the lanes: their states, and the passes over them.
+
+#![allow(unsafe_code)]
+
+use std::ops::Range;
+
+use super::shared::Shared;
+use super::simd::{Lanes, Row8, WIDTH, Work, lanes};
+use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
+use crate::kernels::momentum::extrapolated;
+use crate::kernels::{Body, Free, Inertia, Mass, StepParams};
+use crate::math::{Quat, Vec3, vec3};
+use crate::plan::Kernel;
+use crate::problem::{BodyRow, Params, StepProblem};
+
+/// The state of a body, and the mass that acts in sweeps.
+#[derive(Clone, Copy, Default)]
+#[repr(C)]
+pub(super) struct State {
+    /// v . w .
+    pub velocity: Row8,
+    /// dp . dq
+    pub movement: Row8,
+    /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz .
+    pub mass: Row8,
+}
+
+/// Where a body's state begins, in units of 8 bytes.
+pub(super) fn place(body: usize) -> u32 {
+    u32::try_from(body * size_of::<State>() / 8).expect("fewer than 268 million bodies")
+}
+
+impl State {
+    /// As the body of a kernel.
+    pub fn load(&self) -> Body<f32> {
+        let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (self.velocity.0, self.movement.0);
+        Body {
+            v: vec3(vx, vy, vz),
+            w: vec3(wx, wy, wz),
+            dp: vec3(px, py, pz),
+            dq: Quat { axis: vec3(qx, qy, qz), w: qw },
+        }
+    }
+}
+
+/// Two velocities in a row.
+fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
+    Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0])
+}
+
+/// Takes over some bodies of a problem. Each task has its own bodies, here and below.
+pub(super) fn load_bodies(
+    problem: &StepProblem,
+    slots: &[u32],
+    range: Range<usize>,
+    states: &Shared<State>,
+    accelerations: &Shared<Row8>,
+) {
+    let row = |from: &[f32]| Row8(std::array::from_fn(|i| from[i]));
+    for i in range {
+        let body: &[f32; 16] = bytemuck::cast_ref(&problem.bodies[i]);
+        let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[i]);
+        let state = State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) };
+        let [x, y, z] = problem.masses[i].acceleration;
+        // SAFETY: tasks have different bodies (`in_groups` cuts their range), and `Partition::give_slots` gives each a slot of its own.
+        unsafe {
+            states.write(slots[i] as usize, state);
+            accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        }
+    }
+}
+
+/// Gives some bodies back.
+pub(super) fn store_bodies(states: &[State], slots: &[u32], range: Range<usize>, rows: &Shared<BodyRow>) {
+    for i in range {
+        let State { velocity, movement, .. } = &states[slots[i] as usize];
+        let both = [velocity.0, movement.0];
+        // SAFETY: tasks have different bodies: `in_groups` cuts their range.
+        unsafe { rows.write(i, bytemuck::cast(both)) };
+    }
+}
+
+/// A pass over bodies.
+pub(super) struct BodyWork<'a> {
+    pub kernel: Kernel,
+    pub params: &'a Params,
+    pub bodies: Shared<'a, State>,
+    /// v . w . of each without the impulses of the substep.
+    pub free: Shared<'a, Row8>,
+    pub accelerations: &'a [Row8],
+}
+
+impl Work for BodyWork<'_> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
+        let params = StepParams::<L>::load(self.params);
+        for group in groups {
+            let range = WIDTH * group..WIDTH * (group + 1);
+            // SAFETY: tasks have different groups of slots: `Threads::spread` cuts their range.
+            let states = unsafe { self.bodies.slice(range.clone()) };
+            // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
+            let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
+            if let Kernel::IntegrateVelocities { carry } = self.kernel {
+                let accelerations = &self.accelerations[range.clone()];
+                // SAFETY: as above.
+                let rows = unsafe { self.free.slice(range) };
+                // SAFETY: `NEIGHBORING_ROWS` are the places of the sixteen rows of each slice.
+                let (acceleration, free) = unsafe {
+                    (
+                        L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS),
+                        L::gathered(rows.as_ptr(), &NEIGHBORING_ROWS),
+                    )
+                };
+                let ([x, y, z, ..], [vx, vy, vz, _, wx, wy, wz, _]) = (acceleration, free);
+                let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
+                let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+                integrate_velocities(carry, &params, &mass, &mut body, &mut free);
+                rows.copy_from_slice(&velocity_rows(free.v, free.w));
+            } else {
+                integrate_positions(&params, &mut body);
+                for (state, movement) in states.iter_mut().zip(movement_rows(&body)) {
+                    state.movement = movement;
+                }
+            }
+            for (state, velocity) in states.iter_mut().zip(velocity_rows(body.v, body.w)) {
+                state.velocity = velocity;
+            }
+        }
+    }
+}
+
+/// Turns the spins of some bodies with unequal moments of inertia, given with their slots.
+pub(super) fn integrate_spins(
+    params: &Params,
+    inertias: &[(usize, Inertia<f32>)],
+    bodies: &Shared<State>,
+    free: &Shared<Row8>,
+) {
+    let params = StepParams::load(params);
+    for (slot, inertia) in inertias {
+        // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
+        let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
+        let (mut body, [vx, vy, vz, _, wx, wy, wz, _]) = (state.load(), row.0);
+        let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+        integrate_gyroscopic(&params, inertia, &mut body, &mut free);
+        state.velocity = velocity_row(body.v, body.w);
+        *row = velocity_row(free.v, free.w);
+    }
+}
+
+/// Extrapolates the velocities of some bodies, and keeps those before.
+pub(super) fn extrapolate_velocities(
+    first: bool,
+    factor: f32,
+    bodies: &Shared<State>,
+    before: &Shared<Row8>,
+    range: Range<usize>,
+) {
+    // SAFETY: tasks have different slots: `Threads::spread` cuts their range.
+    let (bodies, before) = unsafe { (bodies.slice(range.clone()), before.slice(range)) };
+    for (body, before) in bodies.iter_mut().zip(before) {
+        let now = body.velocity;
+        if !first {
+            for (x, before) in body.velocity.0.iter_mut().zip(&before.0) {
+                *x = extrapolated(*x, *before, factor);
+            }
+        }
+        *before = now;
+    }
+}
+
+/// The places of sixteen bodies that stand beside each other.
+const NEIGHBORS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<State>() / 8) as u32);
+
+/// The places of sixteen rows that stand beside each other.
+const NEIGHBORING_ROWS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<Row8>() / 8) as u32);
+
+/// Sixteen bodies at the given places.
+///
+/// # Safety
+/// The places are those of states, and no thread writes them meanwhile.
+#[inline(always)]
+pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Body<L> {
+    // SAFETY: the caller's promise.
+    let (velocity, movement) = unsafe {
+        (L::gathered(&raw const (*states).velocity, places), L::gathered(&raw const (*states).movement, places))
+    };
+    let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (velocity, movement);
+    Body { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz), dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
+}
+
+#[inline(always)]
+pub(super) fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
+    let zero = L::constant(0.0);
+    L::scattered([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero])
+}
+
+#[inline(always)]
+fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
+    let (p, q) = (body.dp, body.dq);
+    L::scattered([p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w])
+}

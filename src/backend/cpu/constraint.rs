@@ -1,0 +1,81 @@
+//! Contacts and joints as lanes see them.
+
+use std::ops::Range;
+
+use crate::problem::{ContactRow, JointRow, StepProblem};
+
+/// A kind of constraint: contacts or joints.
+pub(super) trait Constraint: Sized + Sync {
+    /// Whether each impulse has a row of `points`.
+    const HAS_POINTS: bool;
+    fn colors(problem: &StepProblem) -> Range<u32>;
+    fn rows(problem: &StepProblem) -> &[Self];
+    fn impulses(problem: &StepProblem) -> &[[f32; 4]];
+    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
+    fn bodies(&self) -> [u32; 2];
+    /// Numbers of the constraint itself, in the order of the kernels' struct.
+    fn header(&self) -> [f32; 11];
+    /// Contact points, 1 to 4; 1 of a joint.
+    fn points(&self) -> u32;
+    /// Its first row of impulses and points; `row` is its own row.
+    fn first(&self, row: u32) -> u32;
+}
+
+impl Constraint for ContactRow {
+    const HAS_POINTS: bool = true;
+    fn colors(problem: &StepProblem) -> Range<u32> {
+        problem.contact_colors()
+    }
+    fn rows(problem: &StepProblem) -> &[Self] {
+        &problem.contacts
+    }
+    fn impulses(problem: &StepProblem) -> &[[f32; 4]] {
+        bytemuck::cast_slice(&problem.impulses)
+    }
+    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]) {
+        (&problem.contacts, bytemuck::cast_slice_mut(&mut problem.impulses))
+    }
+    fn bodies(&self) -> [u32; 2] {
+        [self.body_a, self.body_b]
+    }
+    #[inline(always)]
+    fn header(&self) -> [f32; 11] {
+        let ([nx, ny, nz], [tx, ty, tz]) = (self.normal, self.tangent);
+        [nx, ny, nz, tx, ty, tz, self.friction, self.restitution, self.radius_a, self.radius_b, self.preload]
+    }
+    fn points(&self) -> u32 {
+        self.point_count
+    }
+    fn first(&self, _: u32) -> u32 {
+        self.first_point
+    }
+}
+
+impl Constraint for JointRow {
+    const HAS_POINTS: bool = false;
+    fn colors(problem: &StepProblem) -> Range<u32> {
+        problem.joint_colors()
+    }
+    fn rows(problem: &StepProblem) -> &[Self] {
+        &problem.joints
+    }
+    fn impulses(problem: &StepProblem) -> &[[f32; 4]] {
+        bytemuck::cast_slice(&problem.joint_impulses)
+    }
+    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]) {
+        (&problem.joints, bytemuck::cast_slice_mut(&mut problem.joint_impulses))
+    }
+    fn bodies(&self) -> [u32; 2] {
+        [self.body_a, self.body_b]
+    }
+    fn header(&self) -> [f32; 11] {
+        let ([ax, ay, az], [bx, by, bz], [gx, gy, gz]) = (self.r_a, self.r_b, self.gap);
+        [ax, ay, az, bx, by, bz, gx, gy, gz, 0.0, 0.0]
+    }
+    fn points(&self) -> u32 {
+        1
+    }
+    fn first(&self, row: u32) -> u32 {
+        row
+    }
+}

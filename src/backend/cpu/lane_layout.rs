@@ -1,0 +1,271 @@
+//! Constraints in groups of sixteen lanes: from the rows of a problem, and back.
+
+#![allow(unsafe_code)]
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use super::bodies::place;
+use super::constraint::Constraint;
+use super::partition::{ColorRanges, Partition, PartitionedRows};
+use super::shared::Shared;
+use super::simd::{Lanes, Portable, WIDTH, Wide};
+use super::threads::Threads;
+use crate::kernels::ImpulseStep;
+use crate::kernels::momentum::{StepLength, extrapolate, step_length};
+use crate::math::{Lane, Vec3, vec3};
+use crate::problem::StepProblem;
+
+/// Sixteen constraints of one color with as many impulses each.
+#[derive(Clone, Copy, Default)]
+pub(super) struct LaneGroup {
+    pub a: BodyLanes,
+    pub b: BodyLanes,
+    /// Rows of the problem, one a lane; `NO_ROW` for a lane without a constraint.
+    rows: [u32; WIDTH],
+    pub header: [Wide; 11],
+    /// The first of its impulses, and of its points.
+    first: u32,
+    /// Impulses; one of them is the patch, if there are patches.
+    count: u32,
+}
+
+/// The row of a lane without a constraint.
+const NO_ROW: u32 = u32::MAX;
+
+/// Sixteen bodies.
+#[derive(Clone, Copy, Default)]
+pub(super) struct BodyLanes {
+    /// Where their states are.
+    pub places: [u32; WIDTH],
+    /// Which of them can move, a bit a lane.
+    pub movable: u16,
+}
+
+impl BodyLanes {
+    /// Puts a body of a problem into a lane; the body after the last is the placeholder.
+    fn set(&mut self, lane: usize, body: usize, problem: &StepProblem, slots: &[u32]) {
+        self.places[lane] = place(slots[body] as usize);
+        self.movable |= u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
+    }
+}
+
+/// The contacts, or the joints, of a problem, part by part and color by color.
+#[derive(Default)]
+pub(super) struct LaneLayout<C> {
+    pub groups: Vec<LaneGroup>,
+    /// The groups of each color of each part.
+    pub ranges: ColorRanges,
+    pub points: Vec<[Wide; 12]>,
+    rows: PartitionedRows,
+    /// Constraints of each color of each part with one to four points, and its first group and impulse.
+    counts: Vec<[usize; 4]>,
+    firsts: Vec<(usize, u32)>,
+    /// State of accelerated sweeps.
+    steps: Vec<ImpulseStep<Portable>>,
+    constraint: PhantomData<C>,
+}
+
+impl<C: Constraint> LaneLayout<C> {
+    /// Takes over the constraints of a problem and their impulses.
+    pub fn load(
+        &mut self,
+        problem: &StepProblem,
+        partition: &Partition,
+        impulses: &mut Vec<[Wide; 4]>,
+        threads: &Threads,
+    ) {
+        self.make_groups(problem, partition, threads);
+        let count = self.groups.last().map_or(0, |group| group.impulses().end);
+        self.points.resize(if C::HAS_POINTS { count } else { 0 }, [Wide::default(); 12]);
+        impulses.resize(count, [Wide::default(); 4]);
+        let (points, impulses) = (Shared::new(&mut self.points), Shared::new(impulses));
+        let (len, groups) = (self.groups.len(), Shared::new(&mut self.groups));
+        threads.spread(0..len, &|range| {
+            // SAFETY: tasks have different groups: `Threads::spread` cuts their range.
+            for group in unsafe { groups.slice(range) } {
+                let own = group.impulses();
+                let own_points = if C::HAS_POINTS { own.clone() } else { 0..0 };
+                // SAFETY: `make_groups` gives each group impulses and points of its own.
+                let (points, impulses) = unsafe { (points.slice(own_points), impulses.slice(own)) };
+                group.fill::<C>(problem, &partition.slots, points, impulses);
+            }
+        });
+    }
+
+    /// Gives the impulses back.
+    pub fn store(&self, problem: &mut StepProblem, impulses: &[[Wide; 4]], threads: &Threads) {
+        let (rows, to_problem) = C::impulses_mut(problem);
+        let to_problem = Shared::new(to_problem);
+        threads.spread(0..self.groups.len(), &|range| {
+            for group in &self.groups[range] {
+                for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                    let first = rows[row as usize].first(row) as usize;
+                    for (k, wide) in impulses[group.impulses()].iter().enumerate() {
+                        // SAFETY: `make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
+                        // constraints have different impulses.
+                        unsafe { to_problem.write(first + k, wide.map(|number| number.0[lane])) };
+                    }
+                }
+            }
+        });
+    }
+
+    /// Extrapolates all impulses.
+    pub fn extrapolate(&mut self, first: bool, factor: f32, impulses: &mut [[Wide; 4]], threads: &Threads) {
+        let len = impulses.len();
+        self.steps.resize(len, ImpulseStep::default());
+        let factor = Portable::constant(factor.into());
+        let (impulses, steps) = (Shared::new(impulses), Shared::new(&mut self.steps));
+        threads.spread(0..len, &|range| {
+            // SAFETY: tasks have different impulses: `Threads::spread` cuts their range.
+            let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
+            for (impulse, step) in impulses.iter_mut().zip(steps) {
+                let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
+                [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+            }
+        });
+    }
+
+    /// Measures how far the last sweep moved each impulse of the problem.
+    pub fn measure_step(
+        &self,
+        problem: &StepProblem,
+        impulses: &[[Wide; 4]],
+        lengths: &mut [StepLength<f32>],
+        threads: &Threads,
+    ) {
+        let (rows, lengths) = (C::rows(problem), Shared::new(lengths));
+        threads.spread(0..self.groups.len(), &|range| {
+            for group in &self.groups[range] {
+                for (k, i) in group.impulses().enumerate() {
+                    let StepLength { square, along } = step_length(components(&impulses[i]), &self.steps[i]);
+                    let (square, along) = (square.store(), along.store());
+                    for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                        let to = rows[row as usize].first(row) as usize + k;
+                        // SAFETY: as in `store`.
+                        unsafe { lengths.write(to, StepLength { square: square.0[lane], along: along.0[lane] }) };
+                    }
+                }
+            }
+        });
+    }
+
+    /// Groups the constraints of each color of each part by their number of points. Groups stand in the order of their first rows, so
+    /// that neighbors in the world stay neighbors.
+    fn make_groups(&mut self, problem: &StepProblem, partition: &Partition, threads: &Threads) {
+        let (all, colors) = (C::rows(problem), C::colors(problem));
+        self.ranges.reset(colors.clone());
+        self.rows.update(problem, colors, partition.count, |row| {
+            let [a, b] = all[row as usize].bodies();
+            partition.of(a, b)
+        });
+        // Patches stand in the problem whether a pass asks for them or not.
+        let patch = u32::from(C::HAS_POINTS && problem.has_patches());
+        let kind_of = |row: u32| all[row as usize].points() as usize - 1;
+        let (rows, cells) = (&self.rows, self.rows.ranges.len());
+        self.counts.resize(cells, [0; 4]);
+        let counts = Shared::new(&mut self.counts);
+        threads.spread_each(0..cells, &|range| {
+            for cell in range {
+                let mut count = [0; 4];
+                rows.at(cell).iter().for_each(|&row| count[kind_of(row)] += 1);
+                // SAFETY: tasks have different cells: `Threads::spread_each` cuts their range.
+                unsafe { counts.write(cell, count) };
+            }
+        });
+        let (mut groups, mut impulses) = (0, 0);
+        self.firsts.clear();
+        for counts in &self.counts {
+            self.ranges.push(groups);
+            self.firsts.push((groups, impulses));
+            for (rows, points) in counts.iter().zip(1..) {
+                groups += rows.div_ceil(WIDTH);
+                impulses += rows.div_ceil(WIDTH) as u32 * (points + patch);
+            }
+        }
+        self.ranges.push(groups);
+        self.groups.resize(groups, LaneGroup::default());
+        let (firsts, groups) = (&self.firsts, Shared::new(&mut self.groups));
+        threads.spread_each(0..cells, &|range| {
+            for cell in range {
+                let (mut next, mut next_impulse) = firsts[cell];
+                // For each number of points the group with free lanes, and the lanes taken so far.
+                let (mut open, mut taken) = ([0; 4], [0; 4]);
+                for &row in rows.at(cell) {
+                    let kind = kind_of(row);
+                    let lane = taken[kind] % WIDTH;
+                    if lane == 0 {
+                        (open[kind], next) = (next, next + 1);
+                    }
+                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different cells.
+                    let group = unsafe { &mut groups.slice(open[kind]..open[kind] + 1)[0] };
+                    if lane == 0 {
+                        (group.first, group.count) = (next_impulse, kind as u32 + 1 + patch);
+                        next_impulse += group.count;
+                        group.rows = [NO_ROW; WIDTH];
+                    }
+                    group.rows[lane] = row;
+                    taken[kind] += 1;
+                }
+            }
+        });
+    }
+
+    /// The impulses of neighboring groups.
+    pub fn impulses_of(&self, groups: Range<usize>) -> Range<usize> {
+        let groups = &self.groups[groups];
+        groups.first().map_or(0..0, |first| first.impulses().start..groups[groups.len() - 1].impulses().end)
+    }
+}
+
+impl LaneGroup {
+    /// Where its impulses are.
+    #[inline(always)]
+    pub fn impulses(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+
+    /// Lanes without a constraint hold one of the placeholder with itself.
+    fn fill<C: Constraint>(
+        &mut self,
+        problem: &StepProblem,
+        slots: &[u32],
+        points: &mut [[Wide; 12]],
+        impulses: &mut [[Wide; 4]],
+    ) {
+        let placeholder = problem.bodies.len() as u32;
+        (self.a, self.b) = (BodyLanes::default(), BodyLanes::default());
+        let (all_points, all_impulses): (&[[f32; 12]], _) =
+            (bytemuck::cast_slice(&problem.points), C::impulses(problem));
+        for (lane, row) in self.rows.into_iter().enumerate() {
+            let ([a, b], header, first) = match C::rows(problem).get(row as usize) {
+                Some(constraint) => (constraint.bodies(), constraint.header(), constraint.first(row) as usize),
+                None => ([placeholder; 2], [0.0; 11], NO_ROW as usize),
+            };
+            self.a.set(lane, a as usize, problem, slots);
+            self.b.set(lane, b as usize, problem, slots);
+            set_lane(&mut self.header, lane, &header);
+            for (k, point) in points.iter_mut().enumerate() {
+                set_lane(point, lane, all_points.get(first + k).unwrap_or(&[0.0; 12]));
+            }
+            for (k, impulse) in impulses.iter_mut().enumerate() {
+                set_lane(impulse, lane, all_impulses.get(first + k).unwrap_or(&[0.0; 4]));
+            }
+        }
+    }
+}
+
+/// The three components of sixteen impulses.
+fn components(impulse: &[Wide; 4]) -> Vec3<Portable> {
+    let [x, y, z, _] = impulse.each_ref().map(Portable::load);
+    vec3(x, y, z)
+}
+
+/// Writes one lane of some rows.
+#[inline(always)]
+fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
+    for (row, value) in rows.iter_mut().zip(values) {
+        row.0[lane] = *value;
+    }
+}

@@ -1,0 +1,48 @@
+//! Threads share the memory of a step. These tests also run in Miri, which sees races; lanes are then portable.
+
+use super::super::calibrate::pile;
+use super::{Cpu, Reference};
+use crate::backend::Backend;
+use crate::config::SolverConfig;
+use crate::plan::StepPlan;
+use crate::problem::{JointRow, StepProblem};
+
+/// Bodies of a pile that move against each other: two colors of its contacts, and as many joints as the last has contacts. Each color
+/// is wide enough for two threads.
+fn moving_pile() -> StepProblem {
+    let mut problem = pile(if cfg!(miri) { 4 } else { 7 });
+    let starts = problem.colors.clone();
+    let [first, last] = [0, starts.len() - 3].map(|color| starts[color]..starts[color + 1]);
+    problem.colors = vec![0, first.end, first.end + last.len() as u32];
+    problem.first_joint_color = 2;
+    problem.order = first.chain(last.clone()).collect();
+    for (i, body) in (0_u16..).zip(&mut problem.bodies) {
+        body.v = [f32::from(i % 3), f32::from(i % 5), f32::from(i % 7)].map(|v| 0.1 * v - 0.2);
+    }
+    problem.joints = problem.contacts[last.start as usize..last.end as usize]
+        .iter()
+        .map(|c| JointRow { body_a: c.body_a, body_b: c.body_b, ..JointRow::default() })
+        .collect();
+    (problem.params.joint_count, problem.params.joint) = (problem.joints.len() as u32, problem.params.movable);
+    problem.joint_impulses = vec![Default::default(); problem.joints.len()];
+    problem.order.extend(0..problem.joints.len() as u32);
+    problem.colors.push(problem.order.len() as u32);
+    problem
+}
+
+#[test]
+fn two_threads_have_the_bits_of_the_reference() {
+    let config = SolverConfig::default().with(|c| {
+        (c.substeps, c.iterations, c.relax) = (1, 1, 0);
+    });
+    let (begin, mut expected, mut found) = (moving_pile(), moving_pile(), moving_pile());
+    let plan = StepPlan::new(&config, &begin);
+    Reference::<f32>::new().run(&mut expected, &plan.passes).expect("it runs");
+    assert!(begin.bodies.iter().zip(&expected.bodies).all(|(a, b)| a != b), "a body stands still");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+    pool.install(|| Cpu::new().run(&mut found, &plan.passes)).expect("it runs");
+    assert_eq!(found.bodies, expected.bodies);
+    assert_eq!(found.impulses, expected.impulses);
+    assert_eq!(found.joint_impulses, expected.joint_impulses);
+    assert!(found.joint_impulses.iter().all(|impulse| *impulse != Default::default()), "a joint without an impulse");
+}
