@@ -151,7 +151,7 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["run", "drop", "--config", "a\nb.toml"], &["a b.toml"]),
     (&["run", "none.json"], &["none.json"]),
     (&["run", "torn.json"], &["torn.json", "line 1"]),
-    (&["run", "negative.json"], &["negative.json", "body 1 \"pebble\"", "shapes[0]", "radius = -1"]),
+    (&["run", "negative.json"], &["negative.json", "body 1 \"pebble\"", "shapes[0]", "ball of radius -1"]),
     (&["run", "two.json"], &["two.json", "version = 2"]),
     (&["run", "good.json", "-p", "n=1"], &["good.json", "n=1"]),
     (&["run", "good.json", "--out", "nowhere/motion.csv"], &["nowhere/motion.csv"]),
