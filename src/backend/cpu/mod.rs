@@ -3,7 +3,7 @@
 //! Both run the same kernel text, over different lane types, so their results have the same bits. Contacts of one color and one number
 //! of points stand in groups of sixteen, lane by lane; contacts of a placeholder body fill the lanes that are left. The instruction
 //! set is chosen at run time. Color order makes the order inside a pass irrelevant, so a pass can be cut into as many tasks as there
-//! are threads. Where there are many islands, each thread runs all passes over some of them before it goes on ([`partition`]).
+//! are threads. Where there are many islands, each thread runs all passes over some of them before it goes on (`partition.rs`).
 
 mod bodies;
 mod constraint;
