@@ -12,7 +12,7 @@ use drystone::{Body, Error, Result, Scene, World};
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::parry::shape::{TriMesh, TypedShape};
 
-use crate::entrant::setting;
+use crate::setting::setting;
 
 /// Sides of the hull that stands for something round.
 const SIDES: i32 = 32;

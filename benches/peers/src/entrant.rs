@@ -1,7 +1,7 @@
 //! An engine and how it is set, before it has a scene.
 
 use drystone::{Result, Scene, SolverConfig};
-use drystone_cli::report::comparison::{Contender, Drystone, Setting};
+use drystone_cli::report::comparison::{Contender, Drystone};
 use drystone_cli::settings;
 
 use crate::{box3d::Box3d, rapier::Rapier};
@@ -69,18 +69,5 @@ impl Entrant {
             Engine::Rapier => Box::new(Rapier::new(scene, self.substeps, hertz, threads)?),
             Engine::Box3d => Box::new(Box3d::new(scene, self.substeps, hertz, threads)?),
         })
-    }
-}
-
-/// What a row of a table says of another engine: its substeps have one biased sweep each, and friction inside a disc.
-pub(crate) fn setting(engine: &str, substeps: u32, hertz: f32) -> Setting {
-    Setting {
-        engine: engine.into(),
-        backend: "cpu".into(),
-        substeps,
-        sweeps: 1,
-        method: "plain".into(),
-        friction: "disc".into(),
-        more: format!("{hertz:.0} Hz"),
     }
 }

@@ -8,6 +8,7 @@
 mod box3d;
 mod entrant;
 mod rapier;
+mod setting;
 mod team;
 
 pub use entrant::{Engine, Entrant};

@@ -6,7 +6,7 @@ use drystone_cli::maze;
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::prelude::*;
 
-use crate::entrant::setting;
+use crate::setting::setting;
 
 /// A scene in Rapier's hands.
 pub(crate) struct Rapier {

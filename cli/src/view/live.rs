@@ -1,32 +1,26 @@
 //! A scene that runs in a window: pause, step, restart, speed, colors, overlays, a mouse that pulls, settings that change live.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use glam::Vec3;
-use winit::keyboard::{Key, NamedKey};
 
-use super::camera::{Bounds, Camera};
-use super::colors::{ColorBy, Rgba};
+use super::camera::Bounds;
+use super::colors::ColorBy;
 use super::film::bounds;
-use super::overlay::{LineEnd, Overlay, lines};
-use super::panel;
-use super::show::{Pointer, Show};
+use super::overlay::Overlay;
 use drystone::Result;
 use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
 use drystone::config::SolverConfig;
 use drystone::scenes::Scene;
 use drystone::stats::StepStats;
-use drystone::world::{BallJoint, BodyKind, World};
 
-/// Steps keep a picture waiting for this long, or for as long as drawing takes if that is longer.
-const PATIENCE: Duration = Duration::from_millis(30);
 /// How fast a body that is pulled closes the gap to the mouse (1/s): soft, however stiff joints are.
 const PULL: f32 = 10.0;
 
 /// A scene that runs.
 pub struct Live {
-    scene: Scene,
+    pub(super) scene: Scene,
     exact: bool,
     pub(super) choice: BackendChoice,
     pub(super) simulation: Simulation,
@@ -45,23 +39,23 @@ pub struct Live {
     pub(super) stage_ms: [f64; 5],
     /// Why a setting was refused.
     pub(super) refused: Option<String>,
-    owed: f32,
+    pub(super) owed: f32,
     /// How long the steps before the last picture took.
-    stepping: Duration,
-    grabbed: Option<Grabbed>,
-    bounds: Bounds,
-    light_end: f32,
+    pub(super) stepping: Duration,
+    pub(super) grabbed: Option<Grabbed>,
+    pub(super) bounds: Bounds,
+    pub(super) light_end: f32,
 }
 
 /// A body that the mouse pulls, by the last joint of the world.
-struct Grabbed {
-    body: usize,
+pub(super) struct Grabbed {
+    pub(super) body: usize,
     /// The point that is pulled, in the body's frame (m).
-    anchor: Vec3,
+    pub(super) anchor: Vec3,
     /// Distance from the eye at which the mouse moves (m).
-    distance: f32,
+    pub(super) distance: f32,
     /// Where the mouse is (m).
-    target: Vec3,
+    pub(super) target: Vec3,
 }
 
 impl Live {
@@ -140,123 +134,12 @@ impl Live {
     }
 }
 
-impl Show for Live {
-    fn title(&self) -> String {
-        self.scene.name.clone()
-    }
-
-    fn world(&self) -> &World {
-        &self.simulation.world
-    }
-
-    fn bounds(&self) -> Bounds {
-        // Where things are now, unless something flew far away.
-        let now = self.bounds.join(bounds(self.world()));
-        if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
-    }
-
-    fn container(&self) -> Option<Bounds> {
-        self.scene.container.map(|(low, high)| Bounds { low, high })
-    }
-
-    fn camera(&self, aspect: f32) -> Camera {
-        let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
-        Camera::framing(&self.bounds, up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
-    }
-
-    fn colors(&mut self) -> Vec<Rgba> {
-        let values = self.color.values(&mut self.simulation);
-        let world = &self.simulation.world;
-        // Follows slowly, so that colors do not flicker.
-        let scale = self.color.scale(world, &values);
-        self.light_end += 0.05 * (scale - self.light_end);
-        self.color.paint(world, &values, self.light_end.max(0.5 * scale))
-    }
-
-    fn lines(&mut self) -> Vec<LineEnd> {
-        let size = 0.02 * self.bounds.radius();
-        let overlay = Overlay { joints: self.overlay.joints || self.grabbed.is_some(), ..self.overlay };
-        lines(&mut self.simulation, overlay, size)
-    }
-
-    fn advance(&mut self, seconds: f32) -> Result<()> {
-        let began = Instant::now();
-        let before = self.time();
-        let drawing = Duration::from_secs_f32(seconds).saturating_sub(self.stepping);
-        if !self.paused {
-            self.owed += seconds * self.speed;
-            while self.owed >= self.scene.dt && began.elapsed() < PATIENCE.max(drawing) {
-                self.step()?;
-                self.owed -= self.scene.dt;
-            }
-            // What cannot be made up for is let go.
-            self.owed = self.owed.min(2.0 * self.scene.dt);
-        }
-        self.stepping = began.elapsed();
-        self.pictures += (2.0 * seconds).min(1.0) * (1.0 / seconds.max(1e-4) - self.pictures);
-        let reached = (self.time() - before) / seconds.max(1e-4);
-        self.reached += (2.0 * seconds).min(1.0) * (reached - self.reached);
-        Ok(())
-    }
-
-    fn key(&mut self, key: &Key, down: bool) -> Result<()> {
-        if !down {
-            return Ok(());
-        }
-        match key.as_ref() {
-            Key::Named(NamedKey::Space) => self.paused = !self.paused,
-            Key::Character("n") => {
-                self.paused = true;
-                self.step()?;
-            }
-            Key::Character("r") => self.restart()?,
-            Key::Character("c") => self.color = self.color.next(),
-            Key::Character("1") => self.overlay.contacts = !self.overlay.contacts,
-            Key::Character("2") => self.overlay.joints = !self.overlay.joints,
-            Key::Character("3") => self.overlay.boxes = !self.overlay.boxes,
-            Key::Character("+" | "=") => self.speed = (self.speed * 2.0).min(16.0),
-            Key::Character("-") => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn grab(&mut self, pointer: &Pointer) -> bool {
-        let Pointer { origin, direction, .. } = *pointer;
-        let world = &mut self.simulation.world;
-        let met = |(i, b): (usize, &drystone::world::Body)| Some((b.meets_ray(origin, direction)?, i));
-        // What stands in front is seen, but only what is dynamic can be pulled.
-        let dynamic = world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic);
-        let Some((distance, body)) = dynamic.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
-        let target = origin + distance * direction;
-        let pulled = &world.bodies[body];
-        let anchor = pulled.rotation.inverse() * (target - pulled.position);
-        world.join(BallJoint::to_world(body, anchor, target));
-        self.grabbed = Some(Grabbed { body, anchor, distance, target });
-        true
-    }
-
-    fn drag(&mut self, pointer: &Pointer) {
-        if let Some(grabbed) = &mut self.grabbed {
-            grabbed.target = pointer.origin + grabbed.distance * pointer.direction;
-        }
-    }
-
-    fn release(&mut self) {
-        if self.grabbed.take().is_some() {
-            self.simulation.world.joints.pop();
-        }
-    }
-
-    fn panel(&mut self, ui: &mut egui::Ui) {
-        panel::show(self, ui);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec2;
+    use winit::keyboard::{Key, NamedKey};
 
+    use super::super::show::{Pointer, Show};
     use super::*;
 
     fn live(name: &str) -> Live {

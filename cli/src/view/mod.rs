@@ -16,6 +16,7 @@ mod colors;
 mod film;
 mod labyrinth;
 mod live;
+mod live_window;
 mod mesh;
 mod open;
 mod output;
