@@ -1,4 +1,4 @@
-//! What can go wrong for a reason outside the numbers: the caller's input, or the machine.
+//! Errors with a reason outside the numbers: the caller's input, or the machine.
 //!
 //! Trouble *in* the numbers (a body that left the finite range, a contact without a color) is not an
 //! error: it is counted in [`StepStats`](crate::stats::StepStats) and shown.
@@ -17,7 +17,7 @@ pub enum Error {
     File {
         /// The file as the caller named it.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// No adapter, or one that cannot do what is asked.

@@ -1,4 +1,4 @@
-//! What bears what: the load on the heaviest interface of a world, and how many substeps keep its overlap small.
+//! The load on the heaviest interface of a world, and the number of substeps that keep its overlap small.
 //!
 //! A soft contact at rest overlaps by s = F/(m w²), F the force on one of its points, m the mass that the point feels and
 //! w = 2 pi times the contact frequency, which is tied to the substep (docs/derivation.md, section 5). So the overlap of

@@ -27,7 +27,7 @@ pub trait Lane:
     + Mul<Output = Self>
     + Neg<Output = Self>
 {
-    /// What a comparison of two lanes gives.
+    /// The result of a comparison of two lanes.
     type Mask: Copy;
     /// The same constant in every lane.
     fn constant(x: f64) -> Self;

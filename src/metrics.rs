@@ -1,4 +1,4 @@
-//! What a run got wrong: penetration, speed and what fell, in f64.
+//! Errors of a run: penetration, speed and fallen bodies, in f64.
 
 use crate::collide::Detector;
 use crate::config::SolverConfig;
@@ -128,7 +128,7 @@ mod tests {
         let config = SolverConfig::default();
         let of = Penetration::of_world(&world, &config);
         assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.0105), "{of:?}");
-        // What is within its margin counts as touching, with a depth of zero.
+        // A manifold within its margin counts as touching, with a depth of zero.
         world.add(cube(21, 0.505));
         let of = Penetration::of_world(&world, &config);
         assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.010), "{of:?}");

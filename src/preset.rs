@@ -22,7 +22,7 @@ pub enum Preset {
 
 named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Reference = "reference", });
 
-/// What a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
+/// The figures that a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Promise {
@@ -48,7 +48,7 @@ impl Preset {
         SolverConfig { substeps, ..SolverConfig::default() }
     }
 
-    /// What it holds.
+    /// The figures that it holds.
     pub fn promise(self) -> Promise {
         let promise = |tower, heavy_top, deepest, at_rest| Promise { tower, heavy_top, deepest, at_rest };
         match self {

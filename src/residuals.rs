@@ -8,7 +8,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::contacts::{ContactProblem, Operator, Velocity};
 
-/// What impulses leave unsolved. All numbers are NaN if any of them is not finite.
+/// The errors of impulses. All numbers are NaN if any of them is not finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

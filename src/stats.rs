@@ -52,7 +52,7 @@ pub struct KernelTime {
     pub bytes: u64,
 }
 
-/// What a step moves between the processor and a device.
+/// The bytes and dispatches of a step between the processor and a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Traffic {

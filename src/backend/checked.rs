@@ -26,7 +26,7 @@ impl<'a> CheckedStep<'a> {
         Ok(Self { problem, passes })
     }
 
-    /// What the simulation built. Its stages keep the same promises: `graph` gives the colors, `problem` lays out the rows, `plan`
+    /// A step that the simulation built. Its stages keep the same promises: `graph` gives the colors, `problem` lays out the rows, `plan`
     /// makes the passes, and `Simulation::step` has checked the indices of bodies and joints.
     pub(crate) fn built(problem: &'a mut StepProblem, passes: &'a [Pass]) -> Self {
         Self { problem, passes }

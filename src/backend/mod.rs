@@ -21,10 +21,10 @@ pub trait Backend: Send {
     /// `reference`, `cpu` or `gpu`.
     fn name(&self) -> &'static str;
 
-    /// What it runs on, for people.
+    /// The name of the device or processor, for messages.
     fn adapter(&self) -> String;
 
-    /// Runs the passes in order; `bodies` and `impulses` of the problem are what they leave behind. What accelerated sweeps
+    /// Runs the passes in order; the passes write `bodies` and `impulses` of the problem. The numbers that accelerated sweeps
     /// leave for each other is kept: the next run may go on with more sweeps of the same problem.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ pub trait Backend: Send {
         Ok(())
     }
 
-    /// What the last step moved to a device and back.
+    /// The bytes that the last step moved to a device and back.
     fn traffic(&self) -> Traffic {
         Traffic::default()
     }

@@ -26,7 +26,7 @@ pub struct Detector {
     begins: Vec<usize>,
 }
 
-/// What to do about bodies that came, went or changed.
+/// The advice for bodies that came, went or changed.
 const ANEW: &str = "bodies cannot come, go or change kind or shape yet; make a new simulation of this world";
 
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.

@@ -20,7 +20,7 @@ pub struct Pair {
     pub body_a: u32,
     /// The other body.
     pub body_b: u32,
-    /// What they touch with.
+    /// The contacts of the two colliders.
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
@@ -48,7 +48,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// What that is along the normal of a contact.
+    /// The motion along the normal of a contact.
     pub fn along(&self, normal: [f32; 3], radii: [f32; 2]) -> NormalMovement<f32> {
         let quat = |turn: Quat| math::Quat::load(turn.to_array());
         let (normal, drift) = (math::Vec3::load(normal), math::Vec3::load(self.drift.to_array()));
@@ -91,7 +91,7 @@ pub(super) struct Scratch {
 /// are computed anew while they do, and one of 17 stones, 0.12 of its radius thick, falls with 8 substeps.
 const RECYCLE_TURN: f32 = 2.25e-4;
 
-/// The same where one of them is moved by somebody, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
+/// The same where one of them is kinematic, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
 /// slipped 1.6 degrees late, and a ball lost a quarter of its way.
 const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
 

@@ -1,4 +1,4 @@
-//! What a detection takes about bodies and reports about pairs.
+//! The state of bodies that a detection takes, and its report about pairs.
 
 use super::pair::Pair;
 
@@ -27,7 +27,7 @@ pub(crate) enum Change<'a> {
     },
 }
 
-/// What one detection did.
+/// Counts of one detection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DetectStats {

@@ -114,7 +114,7 @@ impl WorldContacts {
             let pose = Pose::from_parts(body.position, body.rotation);
             let mut aabb = c.aabb(pose).loosened(input.margins.speculative * c.size + input.margins.fall);
             let sweep = body.v * input.margins.dt;
-            // What turns reaches no further out than from one side of the body to the other, and its box no further than its
+            // A collider that turns reaches no further out than from one side of the body to the other, and its box no further than its
             // longest half diagonal.
             let most = c.reach - c.size + c.local.translation.length();
             aabb = aabb.loosened((c.reach * body.w.length() * input.margins.dt).min(most).max(0.0));

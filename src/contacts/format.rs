@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
 use crate::error::{Error, Result};
 
-/// What an HDF5 file begins with.
+/// The first bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 impl ContactProblem {

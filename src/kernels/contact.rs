@@ -1,4 +1,4 @@
-//! What happens at one manifold. Doubles of `shaders/lib/contact.wgsl` and of the kernels
+//! The sweeps of one manifold. Doubles of `shaders/lib/contact.wgsl` and of the kernels
 //! `clear_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
 //! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share
@@ -18,7 +18,7 @@ pub fn normal_movement<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<
     if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
 }
 
-/// What the contact answers to: the separation when the step began, less the preload, and what the bodies moved since.
+/// The separation that the contact acts on: the separation when the step began, less the preload, and the movement of the bodies since.
 #[inline(always)]
 pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, contact: &Contact<L>, point: &Point<L>) -> L {
     (point.separation - contact.preload) + movement.between(point.r_a, point.r_b)
@@ -44,7 +44,7 @@ fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
     if rules.accumulated { larger(sum + correction, zero) } else { sum + larger(correction, zero) }
 }
 
-/// What the points of a manifold share in a sweep.
+/// The values that the points of a manifold share in a sweep.
 struct Common<L> {
     softness: SoftnessOf<L>,
     movement: NormalMovement<L>,

@@ -1,4 +1,4 @@
-//! What happens to one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic` and
+//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic` and
 //! `integrate_positions`.
 
 use super::rows::{Body, Free, Inertia, Mass, StepParams};
@@ -62,7 +62,7 @@ fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, spin: Vec3<L>, next: Vec3<L>
 /// Square of the angle (rad) up to which two Newton steps leave no more than rounding.
 const SLOW: f64 = 0.0625;
 
-/// What `integrate_gyroscopic` adds to the angular velocity `w` of a body whose spin about its principal axes is fast: its
+/// The change that `integrate_gyroscopic` makes to the angular velocity `w` of a body whose spin about its principal axes is fast: its
 /// `square` is (h W)².
 #[cold]
 #[inline(never)]

@@ -48,7 +48,7 @@ impl<S: Scalar> KernelRows<S> {
         self.momentum = Momentum::load(&problem.momentum);
     }
 
-    /// What passes change, to storage.
+    /// The rows that passes change, to storage.
     pub fn store(&self, problem: &mut StepProblem) {
         problem.bodies.iter_mut().zip(&self.bodies).for_each(|(row, body)| *row = body.store());
         problem.impulses.iter_mut().zip(&self.impulses).for_each(|(row, impulse)| *row = impulse.store());

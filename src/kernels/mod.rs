@@ -64,12 +64,12 @@ impl Default for Rules {
 }
 
 impl Rules {
-    /// What a warm start asks of them: where friction acts, and nothing else.
+    /// The rules of a warm start: where friction acts, and nothing else.
     pub fn of_warm_start(self) -> Self {
         Self { friction: self.friction, patch: self.patch, ..Self::default() }
     }
 
-    /// What joints ask of them.
+    /// The rules of joints.
     pub fn of_joints(self) -> Self {
         Self { biased: self.biased, measured: self.measured, ..Self::default() }
     }

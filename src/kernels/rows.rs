@@ -187,7 +187,7 @@ pub struct StepParams<L> {
     pub joint: SoftnessOf<L>,
     /// Overlap that is left alone.
     pub slop: L,
-    /// What every correction is multiplied by.
+    /// Factor of every correction.
     pub relaxation: L,
     /// Corrections that change a relative velocity by less count as none.
     pub tolerance: L,

@@ -49,7 +49,7 @@ pub struct Solver<'a> {
     since: u32,
 }
 
-/// What runs the sweeps.
+/// The backend of the sweeps.
 enum Work {
     /// In f64, over rows that are kept.
     Exact(Box<Reference<f64>>),
@@ -96,7 +96,7 @@ impl<'a> Solver<'a> {
         self.problem.contact_colors().len()
     }
 
-    /// What runs the sweeps, for people.
+    /// The name of the backend, for messages.
     pub fn adapter(&self) -> String {
         match &self.work {
             Work::Exact(reference) => reference.adapter(),

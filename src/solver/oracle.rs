@@ -16,7 +16,7 @@ pub struct Solution {
     pub impulses: Vec<DVec3>,
     /// The velocities that they give the bodies.
     pub velocities: Vec<Velocity>,
-    /// What they leave unsolved.
+    /// Their errors.
     pub residuals: Residuals,
     /// Sweeps that it took.
     pub sweeps: u32,

@@ -105,5 +105,5 @@ fn is_same_surface(a: &PointContact, b: &PointContact) -> bool {
     a.friction == b.friction && apart(0) <= SAME_FRAME && apart(1) <= SAME_FRAME
 }
 
-/// Frames nearer than this are one frame: rounding of whoever wrote them.
+/// Frames nearer than this are one frame: the difference is rounding.
 const SAME_FRAME: f64 = 1e-12;
