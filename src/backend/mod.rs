@@ -25,7 +25,7 @@ pub trait Backend: Send {
     fn adapter(&self) -> String;
 
     /// Runs the passes in order; the passes write `bodies` and `impulses` of the problem. The numbers that accelerated sweeps
-    /// leave for each other is kept: the next run may go on with more sweeps of the same problem.
+    /// leave for each other stay: the next run may go on with more sweeps of the same problem.
     ///
     /// # Errors
     /// [`CheckedStep::new`] refuses the problem or the passes, the problem does not fit the device, or the device is lost.

@@ -8,9 +8,9 @@ use crate::math::{
 
 /// Adds gravity and force; with `carry` also the impulses that the substep before ended with.
 ///
-/// What they did then, M⁻¹ Gᵀ λ, is what they do now, since neither masses nor arms change within a step, and what they did
-/// then is what the velocities differ from the free ones by. So the warm start of every substep but the first costs one
-/// subtraction and one addition a body, and no pass over the contacts.
+/// Masses and arms stay the same within a step, so that the impulses change the velocities by the same M⁻¹ Gᵀ λ in every substep.
+/// That change is the difference between the velocities and the free velocities. The warm start of every substep but the first
+/// therefore costs one subtraction and one addition a body, and no pass over the contacts.
 #[inline(always)]
 pub fn integrate_velocities<L: Lane>(
     carry: bool,
