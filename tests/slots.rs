@@ -1,5 +1,6 @@
 //! Rows stay in their slots as long as their manifold lasts, and a slot that is free goes to another manifold with nothing in it.
 
+use drystone::config::FrictionAt;
 use drystone::glam::Vec3;
 use drystone::{Body, Cpu, Scene, Shape, Simulation, SolverConfig, World};
 
@@ -49,17 +50,30 @@ fn a_contact_stays_in_its_row_while_others_come_and_go() {
 
 #[test]
 fn a_manifold_in_the_slot_of_one_that_ended_begins_without_its_impulses_and_preload() {
+    for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
+        begins_without_impulses(friction_at);
+    }
+}
+
+fn begins_without_impulses(friction_at: FrictionAt) {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let (first, second) = (world.add(ball(0.0, 0.5)), world.add(ball(5.0, 80.0)));
+    let (first, second) = (world.add(ball(0.0, 0.5)), world.add(ball(50.0, 800.0)));
     for i in 0..4 {
         world.add(ball(10.0 + 2.0 * i as f32, 0.5));
     }
-    let mut simulation = simulation(world);
+    let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
+    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
     run(&mut simulation, 120);
+    // It slides, so that friction acts.
+    simulation.world.bodies[first].linear_velocity = Vec3::Z * 5.0;
+    run(&mut simulation, 3);
     let row = rows(&mut simulation, first as u32)[0];
     let borne = simulation.problem().contacts[row as usize];
-    assert!(borne.preload > 0.0 && simulation.problem().impulses[borne.first_point as usize].normal > 1.0);
+    let last = (borne.first_point + simulation.problem().params.patches) as usize;
+    let impulses = &simulation.problem().impulses;
+    assert!(borne.preload > 0.0 && impulses[borne.first_point as usize].normal > 1.0);
+    assert!(impulses[last].tangent_1.abs() + impulses[last].tangent_2.abs() > 1.0);
     simulation.world.bodies[first].position.y = 40.0;
     run(&mut simulation, 1);
     assert!(rows(&mut simulation, first as u32).is_empty());
@@ -68,8 +82,10 @@ fn a_manifold_in_the_slot_of_one_that_ended_begins_without_its_impulses_and_prel
     assert_eq!(rows(&mut simulation, second as u32), [row]);
     let (problem, _) = simulation.next_problem(DT).expect("a step");
     let begun = problem.contacts[row as usize];
-    let impulse = problem.impulses[begun.first_point as usize];
-    assert_eq!((begun.preload, impulse.normal, impulse.tangent_1, impulse.tangent_2), (0.0, 0.0, 0.0, 0.0));
+    let first_point = begun.first_point as usize;
+    for impulse in &problem.impulses[first_point..=first_point + problem.params.patches as usize] {
+        assert_eq!((begun.preload, impulse.normal, impulse.tangent_1, impulse.tangent_2), (0.0, 0.0, 0.0, 0.0));
+    }
 }
 
 /// A ball that rolls over a mesh is in contact with one triangle after another.
