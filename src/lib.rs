@@ -42,6 +42,7 @@ mod collide;
 mod compare;
 pub mod config;
 pub mod contacts;
+mod effort;
 mod error;
 mod graph;
 mod kernels;

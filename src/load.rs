@@ -38,6 +38,12 @@ impl Load {
     /// Every body hands on its weight, and what it bears itself, to the bodies below it in proportion to the area by which
     /// their bounding boxes overlap seen from above. A ball touches in one point, everything else in four corners.
     pub fn heaviest(world: &World, config: &SolverConfig) -> Option<Self> {
+        let deeper = |a: Self, b: Self| if b.stress > a.stress { b } else { a };
+        Self::all(world, config).into_iter().reduce(deeper)
+    }
+
+    /// All interfaces of `world`, as those of [`Self::heaviest`].
+    pub fn all(world: &World, config: &SolverConfig) -> Vec<Self> {
         let boxes = upright_boxes(world);
         let grid = Grid::new(&boxes);
         let gravity = world.gravity.as_dvec3().length();
@@ -46,7 +52,7 @@ impl Load {
         let mut from_the_top: Vec<usize> =
             (0..boxes.len()).filter(|&i| world.bodies[i].kind == BodyKind::Dynamic && !boxes[i].is_empty()).collect();
         from_the_top.sort_by(|&i, &j| boxes[j].low.y.total_cmp(&boxes[i].low.y).then(i.cmp(&j)));
-        let mut heaviest: Option<Self> = None;
+        let mut all = Vec::new();
         for upper in from_the_top {
             let below = grid.supports(&boxes, upper);
             let total: f64 = below.iter().map(|s| s.1).sum();
@@ -54,12 +60,10 @@ impl Load {
                 let force = borne[upper] * area / total;
                 borne[lower] += force;
                 let stress = stress(world, &boxes, upper, lower, force, config);
-                if heaviest.is_none_or(|h| stress > h.stress) {
-                    heaviest = Some(Self { upper, lower, force, stress });
-                }
+                all.push(Self { upper, lower, force, stress });
             }
         }
-        heaviest
+        all
     }
 
     /// Overlap with `substeps` in a step of `dt` seconds (m).

@@ -84,7 +84,8 @@ impl Simulation {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
         let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> = self.stages.plan.passes.iter().take_while(forces).cloned().collect();
+        let first: Vec<_> =
+            self.stages.plan.passes.chunk_by(|p, q| p.block == q.block).flat_map(|own| own.iter().take_while(forces)).cloned().collect();
         let mut problem = self.stages.problem.clone();
         Reference::<f32>::new().run(&mut problem, &first)?;
         let contacts = ContactProblem::of_step(name.into(), &problem);
@@ -103,7 +104,10 @@ impl Simulation {
         if self.stages.is_everything_still(&self.world, stats) {
             return Ok(false);
         }
-        self.stages.assemble(&self.world, &self.config, dt, self.on_device, stats);
+        if self.stages.find(&self.world, &self.config, dt, stats) {
+            self.leave_device();
+        }
+        self.stages.prepare(&self.world, &self.config, dt, self.on_device, stats);
         Ok(true)
     }
 
@@ -142,7 +146,8 @@ impl Simulation {
         let changes = next.changes(&self.world, &self.config, dt)?;
         next.follow(&self.world, &self.config, dt, changes);
         next.is_everything_still(&self.world, &mut StepStats::default());
-        next.assemble(&self.world, &self.config, dt, false, &mut StepStats::default());
+        next.find(&self.world, &self.config, dt, &mut StepStats::default());
+        next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
         Ok((next.problem, next.plan))
     }
 

@@ -11,7 +11,7 @@ use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::StepPlan;
 use crate::problem::carry::{Carry, Preload};
-use crate::problem::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow, Softness, StepProblem};
+use crate::problem::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow, Softness, StepProblem, Substep};
 use glam::Vec3;
 
 /// Bodies along each side of the two piles.
@@ -72,17 +72,13 @@ pub(super) fn pile(side: u32) -> StepProblem {
         inv_inertia_yz: [inertia, 0.0, inertia],
         ..MassRow::default()
     };
-    let substep = 1.0 / 480.0;
+    let length = 1.0 / 480.0;
     let soft = Softness { bias_rate: 30.0, mass_scale: 0.9, impulse_scale: 0.1, push_limit: 3.0 };
     let mut colors = vec![0];
     let mut problem = StepProblem {
         bodies: vec![BodyRow::AT_REST; count],
         masses: vec![mass; count],
         params: Params {
-            substep,
-            inverse_substep: 1.0 / substep,
-            movable: soft,
-            fixed: soft,
             body_count: count as u32,
             relaxation: 1.0,
             ..Params::default()
@@ -116,8 +112,10 @@ pub(super) fn pile(side: u32) -> StepProblem {
             colors.push(problem.contacts.len() as u32);
         }
     }
-    problem.sweep_in_order_of_rows();
-    (problem.first_joint_color, problem.colors) = (colors.len() as u32 - 1, colors);
+    problem.order = (0..problem.contacts.len() as u32).collect();
+    problem.colors = colors;
+    let substep = Substep { length, inverse_length: 1.0 / length, movable: soft, fixed: soft, joint: soft };
+    problem.in_one_block(problem.colors.len() as u32 - 1, substep);
     problem.params.point_count = problem.points.len() as u32;
     problem.impulses = vec![ImpulseRow::default(); problem.points.len()];
     problem

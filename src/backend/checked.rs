@@ -40,19 +40,27 @@ impl<'a> CheckedStep<'a> {
 
 /// Refuses passes over colors that are not there, and passes with patches over rows without them or the other way round.
 fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
-    let (contacts, joints) = (problem.contact_colors(), problem.joint_colors());
-    for (i, Pass { kernel, colors }) in passes.iter().enumerate() {
+    for (i, Pass { kernel, block, colors }) in passes.iter().enumerate() {
         let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));
+        let Some(own) = problem.blocks.get(*block as usize) else {
+            return refuse(format!("block {block}: there are {}", problem.blocks.len()));
+        };
+        let [contacts, joints, bodies, inertias] = own.colors();
         let (known, patch) = match kernel {
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
-                (&contacts, Some(rules.patch))
+                (contacts, Some(rules.patch))
             }
-            Kernel::ClearImpulses => (&contacts, None),
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (&joints, None),
-            _ => (&(0..0), None),
+            Kernel::ClearImpulses => (contacts, None),
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (joints, None),
+            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => (bodies, None),
+            Kernel::IntegrateGyroscopic => (inertias, None),
+            _ => (0..0, None),
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
             return refuse(format!("colors {colors:?}: there are {known:?}"));
+        }
+        if matches!(kernel, Kernel::Extrapolate { .. }) && problem.blocks.len() > 1 {
+            return refuse("goes over all bodies: there is more than one block".into());
         }
         if let Some(patch) = patch.filter(|patch| !problem.contacts.is_empty() && *patch != problem.has_patches()) {
             return refuse(format!("patch = {patch}: the contacts of this problem say otherwise"));

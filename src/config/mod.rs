@@ -26,8 +26,16 @@ pub use rules::{
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
 #[non_exhaustive]
 pub struct SolverConfig {
-    /// Substeps of one step, 1 or more. Errors fall with their square, time grows with them.
+    /// Substeps of one step, 1 or more: the least that an island takes. Errors fall with their square, time grows with them.
     pub substeps: u32,
+    /// Most substeps that an island takes. Its contacts keep the promise of `max_penetration` and `max_penetration_share` by twice,
+    /// four times, ... `substeps`, as few as do; `substeps` or less gives all islands the same. Accelerated sweeps, and sweeps that end
+    /// by a tolerance, go over all islands together, which then take `substeps`.
+    pub max_substeps: u32,
+    /// Deepest that a contact sags under a lasting load before its preload lifts it (m); 0 leaves it to `max_penetration_share`.
+    pub max_penetration: f32,
+    /// The same, relative to the smallest half extent of the thinner shape; the lower one counts.
+    pub max_penetration_share: f32,
     /// Biased sweeps a substep, 1 or more.
     pub iterations: u32,
     /// Sweeps without bias a substep, after the positions moved: they take out the velocity that the bias put in.
@@ -119,6 +127,9 @@ impl Default for SolverConfig {
     fn default() -> Self {
         Self {
             substeps: 8,
+            max_substeps: 512,
+            max_penetration: 0.0,
+            max_penetration_share: 0.015,
             iterations: 1,
             relax: 1,
             method: Method::Plain,
@@ -172,6 +183,12 @@ impl SolverConfig {
         Self { sleep_after: 0.0, ..self }
     }
 
+    /// Deepest that a contact may sag under a lasting load (m); `size` is the smallest half extent of the thinner shape (m).
+    pub fn promised_sag(&self, size: f32) -> f32 {
+        let share = self.max_penetration_share * size;
+        if self.max_penetration > 0.0 { share.min(self.max_penetration) } else { share }
+    }
+
     /// The friction rule that these settings come to.
     pub fn friction_rule(&self) -> FrictionRule {
         match self.friction {
@@ -217,6 +234,7 @@ impl SolverConfig {
         })?;
         for (name, value, least, most) in [
             ("substeps", self.substeps, 1, 4096),
+            ("max_substeps", self.max_substeps, 1, 4096),
             ("iterations", self.iterations, 1, 4096),
             ("relax", self.relax, 0, 4096),
             ("rules.manifold_passes", self.rules.manifold_passes.into(), 1, 16),
@@ -225,6 +243,8 @@ impl SolverConfig {
             ensure((least..=most).contains(&value), || format!("{name} = {value}: must be {least} to {most}"))?;
         }
         for (name, value, least, most) in [
+            ("max_penetration", self.max_penetration, 0.0, 1e3),
+            ("max_penetration_share", self.max_penetration_share, 1e-6, 1e3),
             ("baumgarte", self.baumgarte, 0.0, 1.0),
             ("slop", self.slop, 0.0, 1e3),
             ("relaxation", self.relaxation, 1e-3, 2.0),

@@ -14,6 +14,7 @@ impl ContactProblem {
     pub fn of_step(name: String, problem: &StepProblem) -> Self {
         let mut index = vec![None; problem.bodies.len()];
         let mut contacts = Self { name, ..Self::default() };
+        let inverse_substep = problem.blocks.first().map_or(0.0, |block| block.substep.inverse_length);
         for row in problem.swept_contacts() {
             let [a, b] = [row.body_a, row.body_b].map(|body| {
                 let (mass, place) = (&problem.masses[body as usize], &mut index[body as usize]);
@@ -35,7 +36,7 @@ impl ContactProblem {
                     }
                 };
                 let u = driven(row.body_b, b, r_b) - driven(row.body_a, a, r_a);
-                let gap = f64::from((point.separation - row.preload).max(0.0) * problem.params.inverse_substep);
+                let gap = f64::from((point.separation - row.preload).max(0.0) * inverse_substep);
                 let arm = |own: Option<u32>, r: DVec3| if own.is_some() { r } else { DVec3::ZERO };
                 contacts.contacts.push(PointContact {
                     a,

@@ -7,8 +7,8 @@ use crate::problem::StepProblem;
 /// The rows of a problem over one kind of numbers, indices left out.
 #[derive(Clone, Debug, Default)]
 pub struct KernelRows<S> {
-    /// The same for all.
-    pub params: StepParams<S>,
+    /// The numbers that are the same for all rows of a block, block by block.
+    pub params: Vec<StepParams<S>>,
     /// State of the bodies.
     pub bodies: Vec<Body<S>>,
     /// Their masses.
@@ -36,7 +36,7 @@ impl<S: Scalar> KernelRows<S> {
             kept.clear();
             kept.extend(rows.iter().map(load));
         }
-        self.params = StepParams::load(&problem.params);
+        refill(&problem.blocks, &mut self.params, |block| StepParams::load(&problem.params, &block.substep));
         refill(&problem.bodies, &mut self.bodies, Body::load);
         refill(&problem.masses, &mut self.masses, Mass::load);
         refill(&problem.inertias, &mut self.inertias, Inertia::load);

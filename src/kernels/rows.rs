@@ -2,7 +2,7 @@
 
 use crate::math::{Lane, Quat, Scalar, Vec3, dot3, vec3};
 use crate::problem::{
-    BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness,
+    BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness, Substep,
 };
 
 /// Double of the WGSL struct `Body`.
@@ -292,14 +292,14 @@ impl<L: Lane> SoftnessOf<L> {
 impl<L: Lane> StepParams<L> {
     /// From storage, the same in every lane.
     #[inline(always)]
-    pub fn load(p: &Params) -> Self {
+    pub fn load(p: &Params, s: &Substep) -> Self {
         Self {
-            substep: L::constant(p.substep.into()),
-            inverse_substep: L::constant(p.inverse_substep.into()),
+            substep: L::constant(s.length.into()),
+            inverse_substep: L::constant(s.inverse_length.into()),
             restitution_threshold: L::constant(p.restitution_threshold.into()),
-            movable: SoftnessOf::load(&p.movable),
-            fixed: SoftnessOf::load(&p.fixed),
-            joint: SoftnessOf::load(&p.joint),
+            movable: SoftnessOf::load(&s.movable),
+            fixed: SoftnessOf::load(&s.fixed),
+            joint: SoftnessOf::load(&s.joint),
             slop: L::constant(p.slop.into()),
             relaxation: L::constant(p.relaxation.into()),
             tolerance: L::constant(p.tolerance.into()),

@@ -44,11 +44,11 @@ impl Pass {
         };
         let bytes = match self.kernel {
             Kernel::IntegrateVelocities { carry } => {
-                problem.bodies.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
+                rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
             }
-            Kernel::IntegratePositions => problem.bodies.len() * (BODY + BODY / 2),
+            Kernel::IntegratePositions => rows.len() * (BODY + BODY / 2),
             Kernel::IntegrateGyroscopic => {
-                problem.inertias.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
+                rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
             }
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.

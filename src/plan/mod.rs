@@ -14,14 +14,16 @@ use std::ops::Range;
 
 use crate::config::{Clamping, FUSE_BELOW, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig};
 use crate::kernels::Rules;
-use crate::problem::StepProblem;
+use crate::problem::{Block, StepProblem, Substep};
 
-/// One dispatch: a kernel over all bodies, or over some colors one after another.
+/// One dispatch: a kernel over some colors of a block, one after another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pass {
     /// The kernel.
     pub kernel: Kernel,
-    /// The colors that the kernel goes over; empty for a kernel over bodies. More than one are swept by one workgroup.
+    /// Which block of the problem.
+    pub block: u32,
+    /// The colors that the kernel goes over; empty for a kernel that goes over everything. More than one are swept by one workgroup.
     pub colors: Range<u32>,
 }
 
@@ -31,6 +33,7 @@ struct Sweeps<'a> {
     range: Range<u32>,
     /// Whether others may follow the last.
     go_on: bool,
+    block: u32,
     joints: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
 }
@@ -46,32 +49,19 @@ pub struct StepPlan {
 #[derive(Clone, Debug)]
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
-    first_joint_color: u32,
-    has_inertias: bool,
-    is_long_enough: bool,
+    blocks: Vec<Block>,
 }
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
-        let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
-        others == (self.first_joint_color, self.has_inertias, self.is_long_enough) && self.colors == problem.colors
+        self.blocks == problem.blocks && self.colors == problem.colors
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
-        Self {
-            colors: problem.colors.clone(),
-            first_joint_color: problem.first_joint_color,
-            has_inertias: !problem.inertias.is_empty(),
-            is_long_enough: is_long_enough(problem),
-        }
+        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone() }
     }
-}
-
-/// Whether impulses can be carried over as velocities.
-fn is_long_enough(problem: &StepProblem) -> bool {
-    problem.params.substep >= SHORTEST_CARRIED
 }
 
 /// Shortest substep over which impulses are carried as velocities (s). A correction
@@ -80,13 +70,10 @@ fn is_long_enough(problem: &StepProblem) -> bool {
 const SHORTEST_CARRIED: f32 = 1.0 / 4100.0;
 
 impl StepPlan {
-    /// The plan of `problem` under `config`: in each substep velocities, warm start, biased sweeps, positions, relax
-    /// sweeps; bounces at the end.
+    /// The plan of `problem` under `config`: one block after another.
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
-        let groups = |colors| color_groups(&problem.colors, colors, config.fuse_colors_below);
-        let (contacts, joints) = (groups(problem.contact_colors()), groups(problem.joint_colors()));
         let friction = if problem.has_friction() { config.friction_rule() } else { FrictionRule::None };
-        let shared = Rules {
+        let rules = Rules {
             friction,
             patch: problem.has_patches(),
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
@@ -97,47 +84,63 @@ impl StepPlan {
             measured: config.tolerance > 0.0,
             biased: false,
         };
+        let bounces = problem.has_restitution();
+        let mut plan = Self::default();
+        for block in 0..problem.blocks.len() as u32 {
+            plan.substeps(config, problem, block, rules);
+            if bounces {
+                let rules = Rules { patch: rules.patch, ..Rules::default() };
+                let [contacts, ..] = problem.blocks[block as usize].colors();
+                let contacts = color_groups(&problem.colors, contacts, config.fuse_colors_below);
+                plan.over_colors(Kernel::ApplyRestitution(rules), block, &contacts);
+            }
+        }
+        plan
+    }
+
+    /// The substeps of a block: in each velocities, warm start, biased sweeps, positions, relax sweeps.
+    fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
+        let Block { substeps, substep: Substep { length, .. }, .. } = problem.blocks[block as usize];
+        let [contact_colors, joint_colors, bodies, inertias] = problem.blocks[block as usize].colors();
+        let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
+        let (contacts, joints) = (groups(&contact_colors), groups(&joint_colors));
+        let has_inertias = !problem.rows_of(&inertias).is_empty();
+        let (bodies, inertias) = ([bodies], [inertias]);
         // Momentum begins with the third sweep.
         let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
         let sweeps = |count: u32| Sweeps {
             method: method(count),
             range: 0..count,
             go_on: false,
+            block,
             joints: &joints,
             contacts: &contacts,
         };
         // Friction needs some sweep to happen in.
         let relax_only = config.friction_sweeps == FrictionSweeps::Relax && config.relax > 0;
-        let biased_friction = if relax_only { FrictionRule::None } else { friction };
+        let biased_friction = if relax_only { FrictionRule::None } else { shared.friction };
         let biased = Rules { biased: true, friction: biased_friction, ..shared };
-
-        let mut plan = Self::default();
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
-        let carried = shared.accumulated && joints.is_empty() && is_long_enough(problem);
-        for substep in 0..config.substeps {
+        let carried = shared.accumulated && joints.is_empty() && length >= SHORTEST_CARRIED;
+        for substep in 0..substeps {
             let carry = carried && substep > 0;
-            plan.over_bodies(Kernel::IntegrateVelocities { carry });
-            if !problem.inertias.is_empty() {
-                plan.over_bodies(Kernel::IntegrateGyroscopic);
+            self.over_colors(Kernel::IntegrateVelocities { carry }, block, &bodies);
+            if has_inertias {
+                self.over_colors(Kernel::IntegrateGyroscopic, block, &inertias);
             }
-            plan.over_colors(Kernel::WarmStartJoints, &joints);
+            self.over_colors(Kernel::WarmStartJoints, block, &joints);
             if carry {
                 // Done already.
             } else if shared.accumulated {
-                plan.over_colors(Kernel::WarmStart(shared.of_warm_start()), &contacts);
-            } else if !problem.contact_colors().is_empty() {
-                plan.passes.push(Pass { kernel: Kernel::ClearImpulses, colors: problem.contact_colors() });
+                self.over_colors(Kernel::WarmStart(shared.of_warm_start()), block, &contacts);
+            } else if !contact_colors.is_empty() {
+                self.passes.push(Pass { kernel: Kernel::ClearImpulses, block, colors: contact_colors.clone() });
             }
-            plan.sweeps(sweeps(config.iterations), biased);
-            plan.over_bodies(Kernel::IntegratePositions);
-            plan.sweeps(sweeps(config.relax), shared);
+            self.sweeps(sweeps(config.iterations), biased);
+            self.over_colors(Kernel::IntegratePositions, block, &bodies);
+            self.sweeps(sweeps(config.relax), shared);
         }
-        if problem.has_restitution() {
-            let rules = Rules { patch: shared.patch, ..Rules::default() };
-            plan.over_colors(Kernel::ApplyRestitution(rules), &contacts);
-        }
-        plan
     }
 
     /// Sweeps over a problem without time: what is wanted of the velocities stands in its rows, no body moves, and every
@@ -154,7 +157,7 @@ impl StepPlan {
         let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
         let joints = color_groups(&problem.colors, problem.joint_colors(), FUSE_BELOW);
         let mut plan = Self::default();
-        plan.sweeps(Sweeps { method, range, go_on: true, joints: &joints, contacts: &contacts }, rules);
+        plan.sweeps(Sweeps { method, range, go_on: true, block: 0, joints: &joints, contacts: &contacts }, rules);
         plan
     }
 
@@ -168,31 +171,31 @@ impl StepPlan {
     /// of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch was not taken: each such call
     /// adds a validating dispatch of its own, about the price of the empty one that it saves.
     fn sweeps(&mut self, sweeps: Sweeps, rules: Rules) {
-        let measured = rules.measured;
+        let (measured, block) = (rules.measured, sweeps.block);
         for sweep in sweeps.range.clone() {
             let first = sweep == 0;
             if measured {
-                self.over_bodies(Kernel::BeginSweep { first });
+                self.over_all(Kernel::BeginSweep { first }, block);
             }
             let accelerated = sweeps.method == Method::Accelerated;
             if accelerated {
-                self.over_bodies(Kernel::Extrapolate { first, measured });
+                self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
-            self.over_colors(Kernel::SolveJoints(rules.of_joints()), sweeps.joints);
-            self.over_colors(Kernel::SolveContacts(rules), sweeps.contacts);
+            self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
+            self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
-                self.over_bodies(Kernel::MeasureStep);
-                self.over_bodies(Kernel::UpdateMomentum);
+                self.over_all(Kernel::MeasureStep, block);
+                self.over_all(Kernel::UpdateMomentum, block);
             }
         }
     }
 
-    fn over_bodies(&mut self, kernel: Kernel) {
-        self.passes.push(Pass { kernel, colors: 0..0 });
+    fn over_all(&mut self, kernel: Kernel, block: u32) {
+        self.passes.push(Pass { kernel, block, colors: 0..0 });
     }
 
-    fn over_colors(&mut self, kernel: Kernel, groups: &[Range<u32>]) {
-        self.passes.extend(groups.iter().map(|colors| Pass { kernel, colors: colors.clone() }));
+    fn over_colors(&mut self, kernel: Kernel, block: u32, groups: &[Range<u32>]) {
+        self.passes.extend(groups.iter().map(|colors| Pass { kernel, block, colors: colors.clone() }));
     }
 }
 
@@ -214,7 +217,10 @@ fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Ran
 /// One line a run of equal kernels: `3 x solve_contacts(friction) over colors 0, 1, 2..9`.
 impl fmt::Display for StepPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for run in self.passes.chunk_by(|p, q| p.kernel == q.kernel) {
+        for run in self.passes.chunk_by(|p, q| p.kernel == q.kernel && p.block == q.block) {
+            if run[0].block > 0 {
+                write!(f, "block {}: ", run[0].block)?;
+            }
             write!(f, "{}", run[0].kernel)?;
             let colors: Vec<_> = run.iter().filter(|p| !p.colors.is_empty()).map(|p| group_name(&p.colors)).collect();
             if !colors.is_empty() {

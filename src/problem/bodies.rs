@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::StepProblem;
 use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params};
-use super::softness::{contact_softness, joint_softness};
 use crate::config::{SolverConfig, Stabilization};
 use crate::math::Lane;
 use crate::world::{Body, BodyKind, World};
@@ -15,17 +14,10 @@ const LEAST_BODIES: usize = 256;
 
 /// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
 /// bodies that nothing moves.
-pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, dt: f32, problem: &mut StepProblem) {
+pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
     write_bodies(world, asleep, config, problem);
-    let h = dt / config.substeps as f32;
     problem.params = Params {
-        substep: h,
-        inverse_substep: 1.0 / h,
         restitution_threshold: config.restitution_threshold,
-        inertia_count: problem.inertias.len() as u32,
-        movable: contact_softness(config, h, 1.0),
-        fixed: contact_softness(config, h, config.fixed_contact_frequency_ratio),
-        joint: joint_softness(config, h),
         body_count: problem.bodies.len() as u32,
         slop: if config.stabilization == Stabilization::Baumgarte { config.slop } else { 0.0 },
         relaxation: config.relaxation,

@@ -57,16 +57,21 @@ pub struct Preload {
 /// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
 const LARGEST_PRELOAD: f32 = 2.0;
 
-/// How much a contact is preloaded that was so by `before`, when its points of `mass` together were `pressed` by their normal
-/// impulses: a contact of two bodies that can move, or of one that cannot with one that can. Double of the function of the same
-/// name in `shaders/resident/begin_contacts.wgsl`.
-///
-/// At rest its springs are compressed by what it bears: the overlap of a soft contact, springs side by side. That much its
-/// surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they are
-/// for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
-pub(super) fn preloaded(by: &Preload, before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+/// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, its points of `mass` together: the overlap
+/// of springs side by side. The contact is one of two bodies that can move, or of one that cannot with one that can; the length of its
+/// substeps over that of class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
+pub(super) fn sag(by: &Preload, share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = if both_movable { by.movable_compliance } else { by.fixed_compliance };
-    let sag = pressed * compliance * reciprocal(mass);
+    // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
+    pressed * (compliance * share) * reciprocal(mass)
+}
+
+/// How much a contact is preloaded that was so by `before`, when what it bears compresses its springs by `sag`. Double of the function of
+/// the same name in `shaders/resident/begin_contacts.wgsl`.
+///
+/// That much its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they
+/// are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
+pub(super) fn preloaded(by: &Preload, before: f32, sag: f32) -> f32 {
     // Where the load ends, the preload ends too.
     smaller(before + by.share * (sag - before), LARGEST_PRELOAD * sag)
 }
@@ -84,16 +89,21 @@ mod tests {
     /// An impulse of 8 N s on 2 kg sags by 8 / 2 times the compliance.
     #[test]
     fn a_preload_takes_its_share_of_what_is_missing_to_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 0.0, true, 8.0, 2.0), 1.0);
-        near(preloaded(&BY, 1.0, true, 8.0, 2.0), 1.5);
-        near(preloaded(&BY, 0.0, false, 8.0, 2.0), 0.5);
-        near(preloaded(&BY, 3.0, true, 8.0, 2.0), 2.5);
+        near(preloaded(&BY, 0.0, sag(&BY, 1.0, true, 8.0, 2.0)), 1.0);
+        near(preloaded(&BY, 1.0, sag(&BY, 1.0, true, 8.0, 2.0)), 1.5);
+        near(preloaded(&BY, 0.0, sag(&BY, 1.0, false, 8.0, 2.0)), 0.5);
+        near(preloaded(&BY, 3.0, sag(&BY, 1.0, true, 8.0, 2.0)), 2.5);
+    }
+
+    #[test]
+    fn half_a_substep_makes_a_quarter_of_the_sag() {
+        assert_eq!(4.0 * sag(&BY, 0.5, true, 4.0, 2.0), sag(&BY, 1.0, true, 8.0, 2.0));
     }
 
     #[test]
     fn a_preload_is_at_most_twice_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 100.0, true, 8.0, 2.0), 4.0);
-        near(preloaded(&BY, 100.0, false, 8.0, 2.0), 2.0);
-        near(preloaded(&BY, 100.0, true, 0.0, 2.0), 0.0);
+        near(preloaded(&BY, 100.0, sag(&BY, 1.0, true, 8.0, 2.0)), 4.0);
+        near(preloaded(&BY, 100.0, sag(&BY, 1.0, false, 8.0, 2.0)), 2.0);
+        near(preloaded(&BY, 100.0, sag(&BY, 1.0, true, 0.0, 2.0)), 0.0);
     }
 }

@@ -18,10 +18,35 @@ impl StepProblem {
     /// One line that names the row and the field.
     pub fn check(&self) -> Result<()> {
         self.check_counts()?;
+        self.check_blocks()?;
         self.check_order()?;
         self.check_bodies()?;
         self.check_points()?;
         self.check_colors()
+    }
+
+    /// The blocks tile the colors: first all contacts, then all joints, all bodies, all rows of inertia.
+    fn check_blocks(&self) -> Result<()> {
+        let (colors, order) = (&self.colors, self.order.len());
+        let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
+        if ends != [0, order] || !colors.is_sorted() {
+            return refuse(format_args!("colors: must ascend from 0 to {order}"));
+        }
+        let mut next = 0;
+        for kind in 0..4 {
+            for (i, block) in self.blocks.iter().enumerate() {
+                let own = &block.colors()[kind];
+                if own.start != next || own.end < own.start {
+                    return refuse(format_args!("blocks[{i}]: colors {own:?}, but the color before is {next}"));
+                }
+                next = own.end;
+            }
+        }
+        let count = colors.len().saturating_sub(1);
+        if next as usize != count {
+            return refuse(format_args!("blocks: {next} colors, but there are {count}"));
+        }
+        Ok(())
     }
 
     fn check_counts(&self) -> Result<()> {
@@ -33,7 +58,6 @@ impl StepProblem {
             ("params.body_count", params.body_count as usize, self.bodies.len(), "bodies"),
             ("params.point_count", params.point_count as usize, self.points.len(), "points"),
             ("params.joint_count", params.joint_count as usize, self.joints.len(), "joints"),
-            ("params.inertia_count", params.inertia_count as usize, self.inertias.len(), "inertias"),
         ] {
             if rows != wanted {
                 return refuse(format_args!("{name}: {rows}, but {wanted} {of}"));
@@ -57,13 +81,13 @@ impl StepProblem {
                 return refuse(format_args!("{rows}[{row}]: bodies {pair:?}, but there are {bodies}"));
             }
         }
-        let mut next = 0;
+        let mut seen = vec![false; bodies];
         for (row, inertia) in self.inertias.iter().enumerate() {
-            let body = inertia.body as usize;
-            if body >= bodies || body < next {
-                return refuse(format_args!("inertias[{row}]: body {body}: must be less than {bodies}, and ascending"));
+            match seen.get_mut(inertia.body as usize) {
+                Some(seen) if !*seen => *seen = true,
+                Some(_) => return refuse(format_args!("inertias[{row}]: body {}: occurs twice", inertia.body)),
+                None => return refuse(format_args!("inertias[{row}]: body {}, but there are {bodies}", inertia.body)),
             }
-            next = body + 1;
         }
         Ok(())
     }
@@ -95,18 +119,21 @@ impl StepProblem {
     }
 
     fn check_order(&self) -> Result<()> {
-        let (colors, order) = (&self.colors, self.order.len());
-        let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
-        if ends != [0, order] || !colors.is_sorted() {
-            return refuse(format_args!("colors: must ascend from 0 to {order}"));
-        }
-        let (first_joint, count) = (self.first_joint_color as usize, colors.len().saturating_sub(1));
-        if first_joint > count {
-            return refuse(format_args!("first_joint_color = {first_joint}, but {count} colors"));
+        let all = |kind: usize| {
+            let ends = self.blocks.first().zip(self.blocks.last());
+            self.rows_of(&ends.map_or(0..0, |(a, b)| a.colors()[kind].start..b.colors()[kind].end))
+        };
+        let (bodies, inertias) = (all(2), all(3));
+        for (name, rows, count) in [("bodies", bodies, self.bodies.len()), ("inertias", inertias, self.inertias.len())] {
+            if rows.len() != count {
+                return refuse(format_args!("order: {} {name}, but there are {count}", rows.len()));
+            }
         }
         for (name, rows, count) in [
             ("contact", self.rows_of(&self.contact_colors()), self.contacts.len()),
             ("joint", self.rows_of(&self.joint_colors()), self.joints.len()),
+            ("body", bodies, self.bodies.len()),
+            ("inertia", inertias, self.inertias.len()),
         ] {
             let mut seen = vec![false; count];
             for &row in rows {
@@ -120,24 +147,39 @@ impl StepProblem {
         Ok(())
     }
 
+    /// No color has a body twice that can move, and no block a body of another one.
     fn check_colors(&self) -> Result<()> {
-        let mut seen = vec![0; self.bodies.len()];
-        for color in self.contact_colors().chain(self.joint_colors()) {
-            self.check_color(color, &mut seen)?;
+        let mut block_of = vec![0; self.bodies.len()];
+        for (i, block) in self.blocks.iter().enumerate() {
+            self.rows_of(&block.colors()[2]).iter().for_each(|&body| block_of[body as usize] = i);
         }
-        Ok(())
-    }
-
-    /// `seen`: one more than the last color that each body that can move is in.
-    fn check_color(&self, color: u32, seen: &mut [u32]) -> Result<()> {
-        for &row in self.rows_of(&(color..color + 1)) {
-            let pair = match color < self.first_joint_color {
-                true => [self.contacts[row as usize].body_a, self.contacts[row as usize].body_b],
-                false => [self.joints[row as usize].body_a, self.joints[row as usize].body_b],
-            };
-            for body in pair.map(|body| body as usize).into_iter().filter(|&body| self.masses[body].inv_mass > 0.0) {
-                if std::mem::replace(&mut seen[body], color + 1) == color + 1 {
-                    return refuse(format_args!("color {color}: body {body} occurs twice, and can move"));
+        let mut seen = vec![u32::MAX; self.bodies.len()];
+        for (i, block) in self.blocks.iter().enumerate() {
+            let [contacts, joints, _, inertias] = block.colors();
+            for color in contacts.clone().chain(joints) {
+                let is_contact = contacts.contains(&color);
+                for &row in self.rows_of(&(color..color + 1)) {
+                    let pair = match is_contact {
+                        true => [self.contacts[row as usize].body_a, self.contacts[row as usize].body_b],
+                        false => [self.joints[row as usize].body_a, self.joints[row as usize].body_b],
+                    };
+                    for body in pair.map(|body| body as usize) {
+                        if self.masses[body].inv_mass == 0.0 {
+                            continue;
+                        }
+                        if block_of[body] != i {
+                            return refuse(format_args!("color {color}: body {body} is not of block {i}, and can move"));
+                        }
+                        if std::mem::replace(&mut seen[body], color) == color {
+                            return refuse(format_args!("color {color}: body {body} occurs twice, and can move"));
+                        }
+                    }
+                }
+            }
+            for &row in self.rows_of(&inertias) {
+                let body = self.inertias[row as usize].body;
+                if block_of[body as usize] != i {
+                    return refuse(format_args!("inertias[{row}]: body {body} is not of block {i}"));
                 }
             }
         }

@@ -1,14 +1,17 @@
 //! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
+use glam::Vec3;
+
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
-use super::rows::{ContactRow, ImpulseRow, PointRow, points_a_slot};
+use super::rows::{ContactRow, ImpulseRow, PointRow, Substep, points_a_slot};
 use super::slots::{Slots, Write};
 use super::write::{Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
-use crate::graph::{Coloring, ConstraintGraph};
-use crate::world::World;
+use crate::effort::{self, Effort, Interface};
+use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
+use crate::world::{Body, BodyKind, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
 #[derive(Clone, Debug, Default)]
@@ -62,8 +65,48 @@ impl ContactRows {
             (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
             problem.points = moved(&problem.points, &from, stride);
             problem.impulses = moved(&problem.impulses, &from, stride);
+            problem.sags = moved(&problem.sags, &from, 1);
             self.computed = moved(&self.computed, &from, MAX_POINTS);
         }
+    }
+
+    /// Follows the loads that contacts bore in the step before.
+    pub fn follow_loads(&mut self, config: &SolverConfig, problem: &StepProblem) {
+        for (i, slot) in self.slots.all.iter_mut().enumerate().filter(|(_, slot)| slot.takes_part) {
+            slot.need = match problem.contacts.get(i).filter(|_| slot.write != Write::New) {
+                Some(contact) => {
+                    // In class 0 the substeps are longer, and sags grow with the square.
+                    let sag = problem.sags[i] / (contact.substep_share * contact.substep_share);
+                    effort::lasting(sag / config.promised_sag(slot.size), slot.need)
+                }
+                None => 0.0,
+            };
+        }
+    }
+
+    /// The contacts that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it touches.
+    pub fn interfaces<'a>(
+        &'a self,
+        world: &'a World,
+        detector: &'a Detector,
+    ) -> impl Iterator<Item = Interface> + Clone + 'a {
+        let is_driven = |b: &Body| {
+            b.kind == BodyKind::Kinematic && (b.linear_velocity != Vec3::ZERO || b.angular_velocity != Vec3::ZERO)
+        };
+        let any_driven = world.bodies.iter().any(is_driven);
+        let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
+        all.map(move |(slot, edge)| {
+            let (mut a, mut b) = (edge.a, edge.b);
+            if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
+                let pair = detector.pair(slot.world, slot.pair);
+                for (end, body) in [(&mut a, pair.body_a), (&mut b, pair.body_b)] {
+                    if is_driven(&world.bodies[body as usize]) {
+                        *end = body;
+                    }
+                }
+            }
+            Interface { a, b, need: slot.need }
+        })
     }
 
     /// Writes the rows of a step of `dt` seconds, after those of bodies.
@@ -72,6 +115,7 @@ impl ContactRows {
         world: &World,
         detector: &Detector,
         config: &SolverConfig,
+        effort: &Effort,
         dt: f32,
         problem: &mut StepProblem,
     ) {
@@ -79,23 +123,21 @@ impl ContactRows {
         self.lay_out(patches, problem);
         problem.params.point_count = problem.points.len() as u32;
         problem.params.patches = patches.into();
-        problem.order.clone_from(&self.coloring.order);
-        problem.colors.clone_from(&self.coloring.offsets);
-        problem.first_joint_color = self.coloring.color_count() as u32;
         self.carry.approach =
             config.friction_rule() == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
+        let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
-            movable_compliance: problem.params.movable.compliance(),
-            fixed_compliance: problem.params.fixed.compliance(),
+            movable_compliance: substep.movable.compliance(),
+            fixed_compliance: substep.fixed.compliance(),
             share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
             warm_start: config.warm_start.into(),
         };
         self.note_written(detector);
-        let StepProblem { bodies, masses, contacts, points, impulses, params, .. } = problem;
+        let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
         let Self { slots, carry, patches, computed, .. } = self;
-        let (substep, patches) = (params.substep, *patches);
-        let writer = Writer { world, detector, config, substep, bodies, masses, carry, patches };
-        writer.write(&slots.all, contacts, points, impulses, computed);
+        let (substep, patches) = (substep.length, *patches);
+        let writer = Writer { world, detector, config, effort, substep, bodies, masses, carry, patches };
+        writer.write(&slots.all, contacts, points, impulses, computed, sags);
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
     }
 
@@ -116,6 +158,7 @@ impl ContactRows {
             self.patches = patches;
         }
         problem.contacts.resize(count, ContactRow::default());
+        problem.sags.resize(count, 0.0);
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
         self.computed.resize(count * MAX_POINTS, 0.0);

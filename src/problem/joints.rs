@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::StepProblem;
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow};
+use crate::effort::{Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use crate::world::{BallJoint, BodyKind, World};
 
@@ -16,8 +17,11 @@ pub struct JointRows {
     /// The joints as edges of their graph.
     edges: Vec<Edge>,
     graph: ConstraintGraph,
-    coloring: Coloring,
+    /// The coloring of all joints.
+    pub coloring: Coloring,
     is_colored: bool,
+    /// The length of the substeps that each impulse belongs to, over that of class 0; 0 without an impulse.
+    shares: Vec<f32>,
 }
 
 impl JointRows {
@@ -52,6 +56,7 @@ impl JointRows {
         let impulse =
             |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
         problem.joint_impulses = from.iter().map(impulse).collect();
+        self.shares = from.iter().map(|from| from.map_or(0.0, |i| self.shares[i])).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);
         let changed = now.iter().zip(&from).filter(|(joint, from)| from.is_none_or(|i| before[i] != **joint));
@@ -69,36 +74,31 @@ impl JointRows {
         }
     }
 
-    /// Writes the rows of all joints, after those of bodies and contacts.
-    pub fn write(&self, world: &World, asleep: &[bool], problem: &mut StepProblem) {
+    /// The joints that take part, for the effort of their islands.
+    pub fn interfaces(&self, world: &World, asleep: &[bool]) -> impl Iterator<Item = Interface> + Clone {
+        let awake = self.edges.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
+        awake.map(|(_, edge)| Interface { a: edge.a, b: edge.b, need: 0.0 })
+    }
+
+    /// Writes the rows of all joints, after those of bodies.
+    pub fn write(&mut self, world: &World, effort: &Effort, problem: &mut StepProblem) {
         problem.joints.clear();
         problem.joint_impulses.resize(world.joints.len(), JointImpulseRow::default());
         problem.params.joint_count = world.joints.len() as u32;
         if world.joints.is_empty() {
             return;
         }
-        // A joint holds bodies of one island, which are asleep together.
-        let rests = |body: usize| asleep.get(body) == Some(&true);
-        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
-        let is_awake = |i: u32| {
-            let joint = &world.joints[i as usize];
-            // One of two bodies that nothing moves has no block to solve.
-            (moves(joint.body_a) || joint.body_b.is_some_and(moves))
-                && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
-        };
-        let contacts = problem.order.len();
-        for color in self.coloring.offsets.windows(2) {
-            let own = &self.coloring.order[color[0] as usize..color[1] as usize];
-            problem.order.extend(own.iter().filter(|&&i| is_awake(i)));
-            problem.colors.push(problem.order.len() as u32);
-        }
-        if problem.order.len() == contacts {
-            problem.colors.truncate(problem.first_joint_color as usize + 1);
-        }
         let world_row = world.bodies.len() as u32;
-        problem.joints.extend(world.joints.iter().map(|joint| {
+        let rows = world.joints.iter().zip(&mut problem.joint_impulses).zip(&mut self.shares);
+        problem.joints.extend(rows.map(|((joint, impulse), share_before)| {
             let [anchor_a, anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
+            let is_movable = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+            let share = effort.share(joint.body_b.filter(|&b| is_movable(b)).unwrap_or(joint.body_a));
+            let before = std::mem::replace(share_before, share);
+            if before != share && before > 0.0 {
+                impulse.linear = impulse.linear.map(|x| x * (share / before));
+            }
             JointRow {
                 r_a: arm(joint.body_a, anchor_a),
                 body_a: joint.body_a as u32,
@@ -115,6 +115,16 @@ impl JointRows {
             problem.params.body_count += 1;
         }
     }
+}
+
+/// Whether a joint of the world is swept. A joint holds bodies of one island, which are asleep together; one of two bodies that nothing moves
+/// has no block to solve.
+pub(super) fn takes_part(world: &World, asleep: &[bool], joint: u32) -> bool {
+    let joint = &world.joints[joint as usize];
+    let rests = |body: usize| asleep.get(body) == Some(&true);
+    let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+    (moves(joint.body_a) || joint.body_b.is_some_and(moves))
+        && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
 }
 
 /// Which of the joints before each joint is now.

@@ -1,5 +1,6 @@
 //! One step as a value: plain rows, whose names are the names of the WGSL bindings.
 
+mod blocks;
 mod bodies;
 pub mod carry;
 mod check;
@@ -12,13 +13,14 @@ mod slots;
 pub mod softness;
 mod write;
 
+pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassColors, PointRow, Softness,
+    MomentumRow, Params, PassRow, PointRow, Softness, Substep,
 };
 
 use std::ops::Range;
@@ -41,16 +43,19 @@ pub struct StepProblem {
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
+    /// How deep each manifold sags at rest under what it bore in the step before (m); empty where nothing is to follow.
+    pub sags: Vec<f32>,
     /// Ball joints. Only those in `order` take part.
     pub joints: Vec<JointRow>,
     /// Impulses of the joints.
     pub joint_impulses: Vec<JointImpulseRow>,
-    /// The contacts that take part, color by color, and after them the joints.
+    /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, and the rows of unequal
+    /// moments of inertia.
     pub order: Vec<u32>,
     /// Where each color begins in `order`, and where the last ends.
     pub colors: Vec<u32>,
-    /// Which of `colors` is the first of the joints.
-    pub first_joint_color: u32,
+    /// The blocks, one after another in each of the four kinds of colors.
+    pub blocks: Vec<Block>,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
@@ -58,14 +63,14 @@ pub struct StepProblem {
 }
 
 impl StepProblem {
-    /// Colors of the contacts.
+    /// Colors of the contacts of all blocks.
     pub fn contact_colors(&self) -> Range<u32> {
-        0..self.first_joint_color
+        0..self.blocks.last().map_or(0, |block| block.contacts[1])
     }
 
-    /// Colors of the joints.
+    /// Colors of the joints of all blocks.
     pub fn joint_colors(&self) -> Range<u32> {
-        self.first_joint_color..(self.colors.len() as u32).saturating_sub(1).max(self.first_joint_color)
+        self.blocks.first().map_or(0, |block| block.joints[0])..self.blocks.last().map_or(0, |block| block.joints[1])
     }
 
     /// The contacts, or joints, of some neighboring colors, by their rows.
@@ -81,15 +86,27 @@ impl StepProblem {
         self.rows_of(&self.contact_colors()).iter().map(|&row| &self.contacts[row as usize])
     }
 
-    /// Lets all rows take part that are there, contacts and joints each in one color.
+    /// Makes one block of all rows that are there, contacts and joints each in one color. Its substep is that of the block before, if
+    /// there was one.
     pub fn sweep_in_order_of_rows(&mut self) {
-        let (contacts, joints) = (self.contacts.len() as u32, self.joints.len() as u32);
-        self.order = (0..contacts).chain(0..joints).collect();
-        self.colors = vec![0, contacts];
-        self.first_joint_color = 1;
-        if joints > 0 {
-            self.colors.push(contacts + joints);
+        let substep = self.blocks.first().map(|block| block.substep).unwrap_or_default();
+        self.order = (0..self.contacts.len() as u32).chain(0..self.joints.len() as u32).collect();
+        let [contacts, all] = [self.contacts.len(), self.order.len()].map(|end| end as u32);
+        self.colors = if self.joints.is_empty() { vec![0, contacts] } else { vec![0, contacts, all] };
+        self.in_one_block(1, substep);
+    }
+
+    /// Makes one block of all bodies, and of the contacts and joints whose colors stand in `order`: first those of contacts,
+    /// `contact_colors` of them, then those of joints.
+    pub fn in_one_block(&mut self, contact_colors: u32, substep: Substep) {
+        let joints = [contact_colors, (self.colors.len() as u32).saturating_sub(1).max(contact_colors)];
+        let (bodies, inertias) = (joints[1], joints[1] + 1);
+        self.colors.resize(self.colors.len().max(1), 0);
+        for count in [self.bodies.len(), self.inertias.len()] {
+            self.order.extend(0..count as u32);
+            self.colors.push(self.order.len() as u32);
         }
+        self.blocks = vec![Block { substeps: 1, substep, contacts: [0, contact_colors], joints, bodies, inertias }];
     }
 
     /// Whether a patch follows the points of every contact.
@@ -105,7 +122,7 @@ impl StepProblem {
     /// Lets the contacts that take part begin without impulses and preloads.
     pub fn forget_impulses(&mut self) {
         let patch = usize::from(self.has_patches());
-        for &row in &self.order[..self.colors.get(self.first_joint_color as usize).map_or(0, |&end| end as usize)] {
+        for &row in &self.order[..self.rows_of(&self.contact_colors()).len()] {
             let contact = &mut self.contacts[row as usize];
             contact.preload = 0.0;
             let first = contact.first_point as usize;

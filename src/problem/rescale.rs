@@ -1,6 +1,7 @@
 //! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
 
 use super::StepProblem;
+use super::rows::{ContactRow, ImpulseRow};
 use super::softness::contact_softness;
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
@@ -29,6 +30,20 @@ impl StepScale {
     }
 }
 
+/// Brings an impulse or a preload from substeps of one share of those of class 0 to another. A preload is in proportion to the square.
+pub(super) fn change_share(contact: &mut ContactRow, share: f32, impulses: &mut [ImpulseRow]) {
+    let ratio = ratio(share, contact.substep_share);
+    contact.substep_share = share;
+    contact.preload *= ratio * ratio;
+    impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
+}
+
+fn scale_impulse(impulse: &mut ImpulseRow, factor: f32) {
+    impulse.normal *= factor;
+    impulse.tangent_1 *= factor;
+    impulse.tangent_2 *= factor;
+}
+
 /// The quotient, or 1 where nothing is to be divided by.
 fn ratio(now: f32, before: f32) -> f32 {
     if before > 0.0 { now / before } else { 1.0 }
@@ -45,11 +60,7 @@ impl StepScale {
         for contact in &mut problem.contacts {
             contact.preload *= if is_dynamic(contact.body_a) && is_dynamic(contact.body_b) { movable } else { fixed };
         }
-        for impulse in &mut problem.impulses {
-            impulse.normal *= forces;
-            impulse.tangent_1 *= forces;
-            impulse.tangent_2 *= forces;
-        }
+        problem.impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, forces));
         for impulse in &mut problem.joint_impulses {
             impulse.linear = impulse.linear.map(|x| x * forces);
         }

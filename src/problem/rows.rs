@@ -112,8 +112,8 @@ pub struct ContactRow {
     /// How far the springs of a soft contact are compressed while the surfaces just touch (m). The contact
     /// acts on the separation less the preload.
     pub preload: f32,
-    #[doc(hidden)]
-    pub pad: f32,
+    /// Length of its substeps over that of class 0: a power of two (docs/derivation.md). Impulses are in proportion to it.
+    pub substep_share: f32,
 }
 
 impl ContactRow {
@@ -248,40 +248,42 @@ impl Softness {
     }
 }
 
-/// The numbers that are the same for every body and contact of a step, 96 B.
+/// The numbers that are the same for every body and contact of a step, 32 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
-    /// Length of a substep (s).
-    pub substep: f32,
-    /// One over the length of a substep (1/s).
-    pub inverse_substep: f32,
     /// Approach slower than this does not bounce (m/s).
     pub restitution_threshold: f32,
-    /// Number of rows with unequal moments of inertia.
-    pub inertia_count: u32,
-    /// Contacts of two bodies that can move.
-    pub movable: Softness,
-    /// Contacts with a body that cannot.
-    pub fixed: Softness,
-    /// Joints.
-    pub joint: Softness,
-    /// Number of bodies.
-    pub body_count: u32,
-    /// Number of points, patches included.
-    pub point_count: u32,
     /// Overlap that is left alone (m).
     pub slop: f32,
     /// Factor of every correction.
     pub relaxation: f32,
     /// Corrections that change a relative velocity by less count as none (m/s).
     pub tolerance: f32,
+    /// Number of bodies.
+    pub body_count: u32,
+    /// Number of points, patches included.
+    pub point_count: u32,
     /// Number of joints.
     pub joint_count: u32,
     /// 1 if a patch follows the points of every contact.
     pub patches: u32,
-    #[doc(hidden)]
-    pub pad: u32,
+}
+
+/// The length of the substeps of a block, and the coefficients that follow from it, 56 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Substep {
+    /// Its length (s).
+    pub length: f32,
+    /// One over the length (1/s).
+    pub inverse_length: f32,
+    /// Contacts of two bodies that can move.
+    pub movable: Softness,
+    /// Contacts with a body that cannot.
+    pub fixed: Softness,
+    /// Joints.
+    pub joint: Softness,
 }
 
 /// Rows in `points` and `impulses` that a slot of a simulation has.
@@ -289,12 +291,14 @@ pub(super) fn points_a_slot(patches: bool) -> usize {
     MAX_POINTS + usize::from(patches)
 }
 
-/// The colors that one dispatch sweeps, one after another.
+/// One pass for a dispatch: its colors, one after another, and the substep of its block, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PassColors {
+pub struct PassRow {
     /// First color.
     pub first: u32,
     /// One past the last.
     pub end: u32,
+    /// The substep of the block.
+    pub substep: Substep,
 }

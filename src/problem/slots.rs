@@ -33,9 +33,14 @@ pub(super) struct Slot {
     pub write: Write,
     /// Whether its manifold is swept; not if it rests, and not if the slot is free.
     pub takes_part: bool,
+    /// Half of the smallest side of the thinner shape (m).
+    pub size: f32,
+    /// How deep its contact would sag in class 0 under what it bears for long, over the sag that the settings promise.
+    pub need: f32,
 }
 
-const FREE: Slot = Slot { world: 0, pair: 0, manifold: 0, write: Write::Separations, takes_part: false };
+const FREE: Slot =
+    Slot { world: 0, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
 
 /// All slots, those that are free included.
 #[derive(Clone, Debug, Default)]
@@ -80,7 +85,9 @@ impl Slots {
                 (.., true) => Write::Rows,
                 _ => Write::Separations,
             };
-            *slot = Slot { world: part, pair: i, manifold: k, write: slot.write.max(write), takes_part };
+            let need = if is_new { 0.0 } else { slot.need };
+            *slot =
+                Slot { world: part, pair: i, manifold: k, write: slot.write.max(write), takes_part, size: pair.size, need };
             let edge = &mut self.edges[manifold.slot as usize];
             *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
         }

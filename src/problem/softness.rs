@@ -12,7 +12,7 @@
 //! and w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²): the law
 //! that `tests/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
 
-use super::rows::Softness;
+use super::rows::{Softness, Substep};
 use crate::config::{SolverConfig, Stabilization};
 
 /// Coefficients of a contact with `frequency` (Hz) and `damping_ratio` over a substep of `h` seconds.
@@ -22,6 +22,19 @@ pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> 
     let a2 = h * omega * a1;
     let a3 = 1.0 / (1.0 + a2);
     Softness { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3, push_limit }
+}
+
+impl Substep {
+    /// A substep of `length` seconds.
+    pub fn new(config: &SolverConfig, length: f32) -> Self {
+        Self {
+            length,
+            inverse_length: 1.0 / length,
+            movable: contact_softness(config, length, 1.0),
+            fixed: contact_softness(config, length, config.fixed_contact_frequency_ratio),
+            joint: joint_softness(config, length),
+        }
+    }
 }
 
 /// How overlap is removed, for contacts of `ratio` times the frequency.
@@ -35,7 +48,7 @@ pub(super) fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Sof
     }
 }
 
-pub(super) fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
+fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
     match config.stabilization {
         Stabilization::Soft => softness(config.joint_frequency / h, config.joint_damping, h, config.push_limit),
         _ => contact_softness(config, h, 1.0),

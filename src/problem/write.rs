@@ -7,12 +7,14 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::carry::{Carry, preloaded};
+use super::carry::{Carry, preloaded, sag};
 use super::effective::{EffectiveMass, InverseMass};
+use super::rescale::change_share;
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow, points_a_slot};
 use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
+use crate::effort::Effort;
 use crate::math;
 use crate::world::World;
 
@@ -21,7 +23,8 @@ pub(super) struct Writer<'a> {
     pub world: &'a World,
     pub detector: &'a Detector,
     pub config: &'a SolverConfig,
-    /// Length of a substep (s).
+    pub effort: &'a Effort,
+    /// Length of a substep of class 0 (s).
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
@@ -38,6 +41,7 @@ struct SlotRows<'a> {
     impulses: &'a mut [ImpulseRow],
     /// Separation of each point when its manifold was computed (m).
     computed: &'a mut [f32],
+    sag: &'a mut f32,
 }
 
 /// Slots that one task writes.
@@ -52,32 +56,33 @@ impl Writer<'_> {
         points: &mut [PointRow],
         impulses: &mut [ImpulseRow],
         computed: &mut [f32],
+        sags: &mut [f32],
     ) {
         let stride = points_a_slot(self.patches);
         let points = points.par_chunks_mut(SLOTS_A_TASK * stride).zip(impulses.par_chunks_mut(SLOTS_A_TASK * stride));
-        let rows =
-            contacts.par_chunks_mut(SLOTS_A_TASK).zip(points).zip(computed.par_chunks_mut(SLOTS_A_TASK * MAX_POINTS));
+        let computed = computed.par_chunks_mut(SLOTS_A_TASK * MAX_POINTS).zip(sags.par_chunks_mut(SLOTS_A_TASK));
+        let rows = contacts.par_chunks_mut(SLOTS_A_TASK).zip(points).zip(computed);
         slots.par_chunks(SLOTS_A_TASK).zip(rows).enumerate().for_each(
-            |(chunk, (slots, ((contacts, (points, impulses)), computed)))| {
+            |(chunk, (slots, ((contacts, (points, impulses)), (computed, sags))))| {
                 // Far away in memory: these reads come first, so that none waits for another.
                 let mut motions = [Motion::default(); SLOTS_A_TASK];
                 for (motion, slot) in motions.iter_mut().zip(slots).filter(|(_, slot)| slot.takes_part) {
                     *motion = *self.detector.pair(slot.world, slot.pair).motion();
                 }
                 let points = points.chunks_mut(stride).zip(impulses.chunks_mut(stride));
-                let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS));
-                for (i, ((slot, motion), ((contact, (points, impulses)), computed))) in
+                let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS).zip(sags));
+                for (i, ((slot, motion), ((contact, (points, impulses)), (computed, sag)))) in
                     slots.iter().zip(&motions).zip(rows).enumerate()
                 {
                     contact.first_point = ((chunk * SLOTS_A_TASK + i) * stride) as u32;
-                    self.write_slot(slot, motion, SlotRows { contact, points, impulses, computed });
+                    self.write_slot(slot, motion, SlotRows { contact, points, impulses, computed, sag });
                 }
             },
         );
     }
 
     fn write_slot(&self, slot: &Slot, motion: &Motion, rows: SlotRows) {
-        let SlotRows { contact, points, impulses, computed } = rows;
+        let SlotRows { contact, points, impulses, computed, sag } = rows;
         if slot.write != Write::Separations {
             let pair = self.detector.pair(slot.world, slot.pair);
             let manifold = &pair.manifolds[slot.manifold as usize];
@@ -90,9 +95,16 @@ impl Writer<'_> {
         } else if slot.takes_part {
             self.refresh_points(contact, motion, points, computed);
         }
+        if slot.takes_part {
+            let share = self.share(contact);
+            if share != contact.substep_share {
+                change_share(contact, share, impulses);
+            }
+        }
         // Where the rows are on a device, the kernel begin_contacts does this.
         if slot.takes_part && !self.carry.on_device {
-            contact.preload = self.preload(contact, points, impulses);
+            *sag = self.sag(contact, points, impulses);
+            contact.preload = preloaded(&self.carry.preload, contact.preload, *sag);
             let warm_start = self.carry.preload.warm_start != 0;
             let begun =
                 |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
@@ -113,6 +125,7 @@ impl Writer<'_> {
             radius_a: manifold.radius_a,
             radius_b: manifold.radius_b,
             preload: if write == Write::New { 0.0 } else { row.preload },
+            substep_share: if write == Write::New { 0.0 } else { row.substep_share },
             ..ContactRow::framed(manifold.normal)
         };
     }
@@ -182,15 +195,21 @@ impl Writer<'_> {
         }
     }
 
-    /// How much a contact is preloaded in this step, by the impulses that it bore in the step before.
-    fn preload(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
+    /// The length of a contact's substeps over that of class 0.
+    fn share(&self, row: &ContactRow) -> f32 {
+        let is_movable = |body: u32| self.masses[body as usize].inv_mass > 0.0;
+        self.effort.share(if is_movable(row.body_a) { row.body_a } else { row.body_b } as usize)
+    }
+
+    /// How deep a contact sags under the impulses that it bore in the step before.
+    fn sag(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
         let both = [row.body_a, row.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
         let (mut pressed, mut mass) = (0.0, 0.0);
         for (point, impulse) in points[..row.point_count as usize].iter().zip(impulses) {
             pressed += impulse.normal;
             mass += point.normal_mass;
         }
-        preloaded(&self.carry.preload, row.preload, both, pressed, mass)
+        sag(&self.carry.preload, row.substep_share, both, pressed, mass)
     }
 
     /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction
@@ -208,7 +227,7 @@ impl Writer<'_> {
         let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
-            velocity_at_impact(u.dot(normal), pull, point.separation, self.substep, row.restitution);
+            velocity_at_impact(u.dot(normal), pull, point.separation, self.substep * self.share(row), row.restitution);
         if self.config.friction_rule() == FrictionRule::Slip && !self.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.

@@ -2,6 +2,7 @@
 
 use crate::collide::Detector;
 use crate::config::SolverConfig;
+use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
@@ -14,6 +15,9 @@ use crate::world::{MassProperties, Material, World};
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
+    pub effort: Effort,
+    /// The result of the detection of this step.
+    found: Found,
     key: Key,
     pub contacts: ContactRows,
     pub joints: JointRows,
@@ -61,6 +65,8 @@ impl Stages {
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
+            effort: Effort::default(),
+            found: Found::default(),
             key: Key { config: config.clone(), surfaces, scale: None },
             contacts: ContactRows::default(),
             joints: JointRows::default(),
@@ -130,13 +136,13 @@ impl Stages {
         self.sleep.is_everything_still()
     }
 
-    /// Detects, colors, prepares and plans. `on_device`: the device goes on from its own rows.
-    pub fn assemble(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
-        let Self { detector, sleep, contacts, joints, problem, .. } = self;
+    /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class.
+    pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
+        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
         let times = &mut stats.times;
         // Decided before the detection, by what a device that has the rows was asked to leave for.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
-        let found = timed(&mut times.detect, || {
+        *found = timed(&mut times.detect, || {
             let mut found = detector.detect(world, config, dt, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step already.
@@ -152,17 +158,27 @@ impl Stages {
         timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
-                if are_sorted_anew {
-                    contacts.sort(detector, problem);
-                }
             }
             joints.color(world, config.max_colors);
-        });
-        timed(&mut times.prepare, || {
-            problem::begin(world, sleep.asleep(), config, dt, problem);
+            contacts.follow_loads(config, problem);
+            if are_sorted_anew {
+                contacts.sort(detector, problem);
+            }
+            let asleep = sleep.asleep();
+            let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
+            effort.follow(world, asleep, config, dt, interfaces)
+        })
+    }
+
+    /// Prepares and plans. `on_device`: the device goes on from its own rows.
+    pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
+        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
+        timed(&mut stats.times.prepare, || {
+            problem::begin(world, sleep.asleep(), config, problem);
             contacts.carry.on_device = on_device;
-            contacts.write(world, detector, config, dt, problem);
-            joints.write(world, sleep.asleep(), problem);
+            contacts.write(world, detector, config, effort, dt, problem);
+            joints.write(world, effort, problem);
+            problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
                 self.plan = StepPlan::new(config, problem);

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::problem::effective::tangent_mass;
-use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem};
+use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem, Substep};
 
 /// A contact problem as a step without time.
 pub(super) struct Assembled {
@@ -35,17 +35,15 @@ impl Assembled {
         let sequence = Sequence::new(order, contacts);
         let hands = contacts.contacts.iter().enumerate().map(|(i, c)| hand(i, c)).collect::<Result<Vec<_>>>()?;
         let (mut problem, mut rows) = (StepProblem::default(), KernelRows::default());
+        let substep =
+            Substep { length: 1.0, inverse_length: 1.0, movable: HARD, fixed: HARD, ..Substep::default() };
         problem.params = Params {
-            substep: 1.0,
-            inverse_substep: 1.0,
-            movable: HARD,
-            fixed: HARD,
             relaxation: 1.0,
             body_count: contacts.bodies.len() as u32 + 1,
             point_count: contacts.contacts.len() as u32,
             ..Params::default()
         };
-        rows.params = StepParams::load(&problem.params);
+        rows.params = vec![StepParams::load(&problem.params, &substep)];
 
         // Bodies, and what is fixed as one more that nothing moves.
         rows.bodies = contacts.bodies.iter().map(|b| body(b.free)).chain([body(Velocity::default())]).collect();
@@ -81,9 +79,9 @@ impl Assembled {
         problem.masses = rows.masses.iter().map(Mass::store).collect();
         problem.points = rows.points.iter().map(Point::store).collect();
         problem.impulses = vec![ImpulseRow::default(); points.len()];
-        problem.sweep_in_order_of_rows();
-        problem.first_joint_color = sequence.offsets.len() as u32 - 1;
+        problem.order = (0..problem.contacts.len() as u32).collect();
         problem.colors = sequence.offsets;
+        problem.in_one_block(problem.colors.len() as u32 - 1, substep);
         Ok(Self { problem, rows, points, hands })
     }
 }

@@ -200,6 +200,11 @@ impl Body {
         self.mass = MassProperties::from_parry(&masses.sum(), self.density);
     }
 
+    /// Half of the smallest side of the thinnest of its shapes (m); infinite without shapes.
+    pub fn smallest_half_extent(&self) -> f32 {
+        self.colliders.iter().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)
+    }
+
     /// Centre of mass in the world (m).
     pub fn center_of_mass(&self) -> Vec3 {
         self.position + self.rotation * self.mass.center

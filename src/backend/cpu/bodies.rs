@@ -11,7 +11,7 @@ use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Free, Inertia, Mass, StepParams};
 use crate::math::{Quat, Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{BodyRow, Params, StepProblem};
+use crate::problem::{BodyRow, Params, StepProblem, Substep};
 
 /// The state of a body, and the mass that acts in sweeps.
 #[derive(Clone, Copy, Default)]
@@ -84,6 +84,7 @@ pub(super) fn store_bodies(states: &[State], slots: &[u32], range: Range<usize>,
 pub(super) struct BodyWork<'a> {
     pub kernel: Kernel,
     pub params: &'a Params,
+    pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
     /// v . w . of each without the impulses of the substep.
     pub free: Shared<'a, Row8>,
@@ -93,7 +94,7 @@ pub(super) struct BodyWork<'a> {
 impl Work for BodyWork<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
-        let params = StepParams::<L>::load(self.params);
+        let params = StepParams::<L>::load(self.params, self.substep);
         for group in groups {
             let range = WIDTH * group..WIDTH * (group + 1);
             // SAFETY: tasks have different groups of slots: `Threads::spread` cuts their range.
@@ -131,12 +132,12 @@ impl Work for BodyWork<'_> {
 
 /// Turns the spins of some bodies with unequal moments of inertia, given with their slots.
 pub(super) fn integrate_spins(
-    params: &Params,
+    (params, substep): (&Params, &Substep),
     inertias: &[(usize, Inertia<f32>)],
     bodies: &Shared<State>,
     free: &Shared<Row8>,
 ) {
-    let params = StepParams::load(params);
+    let params = StepParams::load(params, substep);
     for (slot, inertia) in inertias {
         // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
         let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };

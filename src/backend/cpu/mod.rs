@@ -28,7 +28,7 @@ use crate::kernels::convergence::begin_sweep;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ContactRow, ConvergenceRow, JointRow, Params, StepProblem};
+use crate::problem::{Block, ContactRow, ConvergenceRow, JointRow, Params, StepProblem};
 use bodies::{BodyWork, State, extrapolate_velocities, integrate_spins, load_bodies, store_bodies};
 use lane_layout::LaneLayout;
 use partition::Partition;
@@ -161,6 +161,7 @@ impl Cpu {
         let shared = SharedStep {
             instructions: self.instructions,
             params: &problem.params,
+            blocks: &problem.blocks,
             partition: &self.partition,
             bodies: Shared::new(&mut self.bodies),
             free: Shared::new(&mut self.free),
@@ -173,16 +174,16 @@ impl Cpu {
             moving: &moving,
         };
         let is_needed = |pass: &&Pass| self.convergence.done == 0 || !pass.kernel.rules().is_some_and(|r| r.measured);
-        let last = self.partition.count - 1;
-        threads.spread_each(0..last, &|parts| {
+        let for_one = &self.partition.blocks;
+        threads.spread_each(0..for_one.len(), &|parts| {
             for part in parts {
-                for pass in passes.iter().filter(is_needed) {
+                for pass in passes.iter().filter(is_needed).filter(|pass| pass.block == for_one[part]) {
                     shared.run(pass, part, &|groups, work| work(groups));
                 }
             }
         });
         for pass in passes.iter().filter(is_needed) {
-            shared.run(pass, last, &|groups, work| threads.spread(groups, work));
+            shared.run(pass, for_one.len() + pass.block as usize, &|groups, work| threads.spread(groups, work));
         }
         self.convergence.moving |= u32::from(moving.into_inner());
     }
@@ -222,6 +223,7 @@ fn stays_on_islands(kernel: Kernel) -> bool {
 struct SharedStep<'a> {
     instructions: InstructionSet,
     params: &'a Params,
+    blocks: &'a [Block],
     partition: &'a Partition,
     bodies: Shared<'a, State>,
     free: Shared<'a, Row8>,
@@ -242,15 +244,16 @@ impl SharedStep<'_> {
     /// Runs a pass over a part. Each task has its own part.
     fn run(&self, pass: &Pass, part: usize, spread: Spread) {
         let (kernel, params, bodies) = (pass.kernel, self.params, self.bodies);
+        let substep = &self.blocks[pass.block as usize].substep;
         match kernel {
             Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
-                let work = BodyWork { kernel, params, bodies, free: self.free, accelerations: self.accelerations };
+                let work = BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
                 spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
             }
             Kernel::IntegrateGyroscopic => {
                 let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
                 let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
-                integrate_spins(params, &self.inertias[first..end], &bodies, &self.free);
+                integrate_spins((params, substep), &self.inertias[first..end], &bodies, &self.free);
             }
             Kernel::ClearImpulses => {
                 for color in pass.colors.clone() {
@@ -279,7 +282,8 @@ impl SharedStep<'_> {
         spread: Spread,
     ) {
         let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
-        let work = Sweep { kernel, params, bodies, layout, impulses, moving };
+        let substep = &self.blocks[pass.block as usize].substep;
+        let work = Sweep { kernel, params, substep, bodies, layout, impulses, moving };
         for color in pass.colors.clone() {
             spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
         }

@@ -1,9 +1,10 @@
 //! The partition of bodies and constraints into parts, each for one thread.
 //!
 //! Islands do not depend on each other. So small islands fill parts that fit in a core's cache, and a thread runs all passes over a
-//! part before it takes the next: rows and bodies are fetched once a step and not once a pass, and no thread waits. The last part holds
-//! larger islands and bodies that no pass changes; all threads work on it together, color by color. Every body and every constraint
-//! gets the same passes in the same order, so the result has the same bits for every partition.
+//! part before it takes the next: rows and bodies are fetched once a step and not once a pass, and no thread waits. After these parts
+//! each block has one for its larger islands; all threads work on it together, color by color. Bodies that no pass changes are in the
+//! last part. Every body and every constraint gets the same passes in the same order, so the result has the same bits for every
+//! partition.
 
 use std::ops::Range;
 
@@ -19,8 +20,10 @@ const LARGE: u32 = 4 * PART;
 /// The part of each body, and its place among the lanes.
 #[derive(Default)]
 pub(super) struct Partition {
-    /// Number of parts, the last, for all threads, included.
+    /// Number of parts.
     pub count: usize,
+    /// The block of each part for one thread. The parts for all threads follow, a block each.
+    pub blocks: Vec<u32>,
     /// The slot of each body, and last that of the placeholder: a body at rest for lanes without a constraint.
     pub slots: Vec<u32>,
     /// Where the bodies of each part begin, in groups of [`WIDTH`] slots, and where the last end.
@@ -39,19 +42,29 @@ impl Partition {
         let bodies = problem.bodies.len();
         self.of_body.clear();
         self.of_body.resize(bodies, u32::MAX);
-        self.count = 1;
-        if problem.order.len() + bodies > undivided {
+        self.blocks.clear();
+        if problem.order.len() > undivided {
             self.find_islands(problem);
-            self.pack_islands(problem);
+            (0..problem.blocks.len()).for_each(|block| self.pack_islands(problem, block));
         }
-        let last = self.count as u32 - 1;
-        self.of_body.iter_mut().for_each(|part| *part = (*part).min(last));
+        let (first, blocks) = (self.blocks.len() as u32, problem.blocks.len() as u32);
+        // Where one part is for all threads, bodies that no pass changes are in it.
+        let resting = if blocks > 1 { first + blocks } else { first };
+        self.count = resting as usize + 1;
+        for (own, block) in (first..).zip(&problem.blocks) {
+            for &body in problem.rows_of(&block.colors()[2]) {
+                let part = &mut self.of_body[body as usize];
+                if *part == u32::MAX {
+                    *part = if blocks == 1 || moves(problem, body) { own } else { resting };
+                }
+            }
+        }
         self.give_slots();
     }
 
     /// The part of a constraint of two bodies.
     pub fn of(&self, a: u32, b: u32) -> u32 {
-        // Bodies that cannot move are in the last part.
+        // A body that cannot be pushed and has no part with what touches it is in the last part.
         self.of_body[a as usize].min(self.of_body[b as usize])
     }
 
@@ -80,27 +93,26 @@ impl Partition {
         }
     }
 
-    fn pack_islands(&mut self, problem: &StepProblem) {
-        let mut filled = 0;
-        for body in (0..problem.bodies.len() as u32).filter(|&body| moves(problem, body)) {
+    fn pack_islands(&mut self, problem: &StepProblem, block: usize) {
+        let mut filled = None;
+        for &body in problem.rows_of(&problem.blocks[block].colors()[2]) {
             let root = self.islands.root(body);
             let size = self.sizes[root as usize];
-            if size > LARGE {
+            if size > LARGE || !moves(problem, body) {
                 continue;
             }
             // The root of an island is its first body.
             if root == body {
-                if filled > 0 && filled + size > PART {
-                    self.count += 1;
-                    filled = 0;
+                if filled.is_none_or(|filled| filled + size > PART) {
+                    self.blocks.push(block as u32);
+                    filled = Some(0);
                 }
-                filled += size;
-                self.of_body[body as usize] = self.count as u32 - 1;
+                filled = filled.map(|filled| filled + size);
+                self.of_body[body as usize] = self.blocks.len() as u32 - 1;
             } else {
                 self.of_body[body as usize] = self.of_body[root as usize];
             }
         }
-        self.count += usize::from(filled > 0);
     }
 
     /// Bodies of different parts share no group. The placeholder, which all lanes read, has a group of its own.

@@ -55,31 +55,30 @@ impl<S: Scalar> Reference<S> {
     }
 
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
-        let params = &self.rows.params;
         match pass.kernel {
             Kernel::IntegrateVelocities { carry } => {
                 self.free.resize(self.rows.bodies.len(), Free::default());
-                let free = &mut self.free;
-                for ((body, free), mass) in self.rows.bodies.iter_mut().zip(free).zip(&self.rows.masses) {
-                    integrate_velocities(carry, params, mass, body, free);
+                for i in places(problem, pass) {
+                    let (mass, body, free) = (&self.rows.masses[i], &mut self.rows.bodies[i], &mut self.free[i]);
+                    integrate_velocities(carry, &self.rows.params[pass.block as usize], mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {
-                for (row, inertia) in problem.inertias.iter().zip(&self.rows.inertias) {
-                    let i = row.body as usize;
+                for row in places(problem, pass) {
+                    let i = problem.inertias[row].body as usize;
                     let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_gyroscopic(params, inertia, body, free);
+                    integrate_gyroscopic(&self.rows.params[pass.block as usize], &self.rows.inertias[row], body, free);
                 }
             }
             Kernel::IntegratePositions => {
-                for body in &mut self.rows.bodies {
-                    integrate_positions(params, body);
+                for i in places(problem, pass) {
+                    integrate_positions(&self.rows.params[pass.block as usize], &mut self.rows.bodies[i]);
                 }
             }
             Kernel::ClearImpulses => {
                 let patch = usize::from(problem.has_patches());
-                for &i in problem.rows_of(&pass.colors) {
-                    let row = &problem.contacts[i as usize];
+                for i in places(problem, pass) {
+                    let row = &problem.contacts[i];
                     let first = row.first_point as usize;
                     let own = &mut self.rows.impulses[first..first + row.point_count as usize + patch];
                     own.iter_mut().for_each(clear_impulse);
@@ -159,14 +158,14 @@ impl<S: Scalar> Reference<S> {
         pass: &Pass,
         kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Contact<S>, &[Point<S>], &mut [Impulse<S>]),
     ) {
-        for i in problem.rows_of(&pass.colors).iter().map(|&row| row as usize) {
+        for i in places(problem, pass) {
             let row = &problem.contacts[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);
             let first = row.first_point as usize;
             let rows = first..first + row.point_count as usize + usize::from(rules.patch);
             let (points, impulses) = (&self.rows.points[rows.clone()], &mut self.rows.impulses[rows]);
-            kernel(&self.rows.params, &mut pair, &self.rows.contacts[i], points, impulses);
+            kernel(&self.rows.params[pass.block as usize], &mut pair, &self.rows.contacts[i], points, impulses);
             self.store_pair(bodies, &pair);
         }
     }
@@ -178,11 +177,11 @@ impl<S: Scalar> Reference<S> {
         pass: &Pass,
         kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Joint<S>, &mut Vec3<S>),
     ) {
-        for i in problem.rows_of(&pass.colors).iter().map(|&row| row as usize) {
+        for i in places(problem, pass) {
             let row = &problem.joints[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);
-            kernel(&self.rows.params, &mut pair, &self.rows.joints[i], &mut self.rows.joint_impulses[i]);
+            kernel(&self.rows.params[pass.block as usize], &mut pair, &self.rows.joints[i], &mut self.rows.joint_impulses[i]);
             self.store_pair(bodies, &pair);
         }
     }
@@ -209,6 +208,11 @@ impl<S: Scalar> Reference<S> {
     fn is_converged(&self, rules: Rules) -> bool {
         rules.measured && self.convergence.done != 0
     }
+}
+
+/// The rows that a pass goes over.
+fn places(problem: &StepProblem, pass: &Pass) -> impl Iterator<Item = usize> {
+    problem.rows_of(&pass.colors).iter().map(|&row| row as usize)
 }
 
 impl<S: Scalar> Backend for Reference<S> {

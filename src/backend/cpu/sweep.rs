@@ -15,12 +15,13 @@ use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, Rules, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{ContactRow, JointRow, Params};
+use crate::problem::{ContactRow, JointRow, Params, Substep};
 
 /// A pass over the groups of one color.
 pub(super) struct Sweep<'a, C> {
     pub kernel: Kernel,
     pub params: &'a Params,
+    pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
     pub layout: &'a LaneLayout<C>,
     pub impulses: Shared<'a, [Wide; 4]>,
@@ -31,7 +32,7 @@ pub(super) struct Sweep<'a, C> {
 impl<C: Swept> Work for Sweep<'_, C> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
-        let params = StepParams::<L>::load(self.params);
+        let params = StepParams::<L>::load(self.params, self.substep);
         for group in groups {
             self.sweep::<L>(&params, &self.layout.groups[group]);
         }

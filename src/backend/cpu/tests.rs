@@ -13,9 +13,6 @@ fn moving_pile() -> StepProblem {
     let mut problem = pile(if cfg!(miri) { 4 } else { 7 });
     let starts = problem.colors.clone();
     let [first, last] = [0, starts.len() - 3].map(|color| starts[color]..starts[color + 1]);
-    problem.colors = vec![0, first.end, first.end + last.len() as u32];
-    problem.first_joint_color = 2;
-    problem.order = first.chain(last.clone()).collect();
     for (i, body) in (0_u16..).zip(&mut problem.bodies) {
         body.v = [f32::from(i % 3), f32::from(i % 5), f32::from(i % 7)].map(|v| 0.1 * v - 0.2);
     }
@@ -23,10 +20,12 @@ fn moving_pile() -> StepProblem {
         .iter()
         .map(|c| JointRow { body_a: c.body_a, body_b: c.body_b, ..JointRow::default() })
         .collect();
-    (problem.params.joint_count, problem.params.joint) = (problem.joints.len() as u32, problem.params.movable);
+    problem.params.joint_count = problem.joints.len() as u32;
     problem.joint_impulses = vec![Default::default(); problem.joints.len()];
-    problem.order.extend(0..problem.joints.len() as u32);
-    problem.colors.push(problem.order.len() as u32);
+    problem.order = first.clone().chain(last).chain(0..problem.params.joint_count).collect();
+    let all = problem.order.len() as u32;
+    problem.colors = vec![0, first.end, all - problem.params.joint_count, all];
+    problem.in_one_block(2, problem.blocks[0].substep);
     problem
 }
 

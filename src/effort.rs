@@ -1,0 +1,188 @@
+//! The substeps of each island, from the loads that its contacts bear.
+//!
+//! A soft contact that bears a force F sags by F/(m w²), m the mass that it feels and w = 2 pi times the contact frequency, which is tied to
+//! the length of a substep (docs/derivation.md, section 5). The settings promise how deep a contact sags at most. An island of class c takes
+//! 2^c times the substeps of the settings, so that its contacts sag 4^-c times as deep, and its class is the lowest that keeps the promise. The
+//! same number decides whether tall and unequal structures stand: a tower sways where the springs of its contacts are soft beside its load.
+//!
+//! A class rises as soon as a load lasts, and falls only after a second in which half of the lower class's promise was kept: a load that is as
+//! large as before never changes a class. The power of two makes the change exact: impulses and preloads scale without rounding.
+
+use crate::config::{Method, SolverConfig};
+use crate::graph::{IMMOVABLE, Islands};
+use crate::load::Load;
+use crate::world::{BodyKind, World};
+
+/// A constraint, for the effort that its island takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Interface {
+    /// One body, or [`IMMOVABLE`].
+    pub a: u32,
+    /// The other one.
+    pub b: u32,
+    /// How deep the contact would sag with the substeps of the settings, over the sag that they promise.
+    pub need: f32,
+}
+
+/// The class of effort of each island.
+#[derive(Clone, Debug, Default)]
+pub struct Effort {
+    /// Body by body.
+    classes: Vec<u8>,
+    /// Steps in which the next lower class would have kept its promise, body by body.
+    calm_for: Vec<u8>,
+    /// The classes of bodies that are awake, ascending; a block each.
+    used: Vec<u8>,
+    /// Whether any body, awake or not, is above class 0.
+    any_above: bool,
+    highest: u8,
+    islands: Islands,
+    /// The need and the class of the island whose root each body is.
+    of_root: Vec<(f32, u8, u8)>,
+}
+
+/// Steps after which an island goes down one class.
+const CALM_STEPS: u8 = 60;
+/// The share of the promise that the lower class has to keep.
+const CALM_SHARE: f32 = 0.5;
+/// Most classes: 4096 substeps are the most that the settings take.
+const MOST_CLASSES: u8 = 12;
+
+/// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
+pub fn lasting(now: f32, before: f32) -> f32 {
+    now.min(4.0 * before + 0.25)
+}
+
+/// The lowest class that keeps the promise.
+fn class_for(need: f32) -> u8 {
+    (0..MOST_CLASSES).find(|&class| need <= sag_factor(class)).unwrap_or(MOST_CLASSES)
+}
+
+/// How much deeper a contact would sag in class 0 than in this class.
+fn sag_factor(class: u8) -> f32 {
+    (1_u32 << (2 * class)) as f32
+}
+
+impl Effort {
+    /// The highest class that the settings allow. Sweeps that end by what all bodies do have one class for all.
+    fn highest(config: &SolverConfig) -> u8 {
+        if config.method == Method::Accelerated || config.tolerance > 0.0 {
+            return 0;
+        }
+        (config.max_substeps / config.substeps).checked_ilog2().unwrap_or(0) as u8
+    }
+
+    /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` are the contacts and joints between bodies that are
+    /// awake, where a body counts as movable that a pass moves.
+    pub fn follow(
+        &mut self,
+        world: &World,
+        asleep: &[bool],
+        config: &SolverConfig,
+        dt: f32,
+        interfaces: impl Iterator<Item = Interface> + Clone,
+    ) -> bool {
+        self.highest = Self::highest(config);
+        let is_first = self.classes.is_empty();
+        if is_first {
+            self.classes.resize(world.bodies.len(), 0);
+            self.calm_for.resize(world.bodies.len(), 0);
+            if self.highest > 0 {
+                self.begin(world, config, dt);
+            }
+        }
+        let is_needed = |interface: Interface| interface.need > 1.0;
+        (is_first || self.any_above || interfaces.clone().any(is_needed))
+            && self.follow_islands(world, asleep, interfaces)
+    }
+
+    /// Classes by the loads of statics.
+    fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
+        for load in Load::all(world, config) {
+            let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
+            let need = load.overlap(config.substeps, dt, config) / f64::from(config.promised_sag(size[0].min(size[1])));
+            let class = class_for(need as f32).min(self.highest);
+            for body in [load.upper, load.lower] {
+                self.classes[body] = self.classes[body].max(class);
+            }
+        }
+    }
+
+    fn follow_islands(
+        &mut self,
+        world: &World,
+        asleep: &[bool],
+        interfaces: impl Iterator<Item = Interface> + Clone,
+    ) -> bool {
+        let bodies = world.bodies.len();
+        self.islands.reset(bodies);
+        for Interface { a, b, .. } in interfaces.clone() {
+            if a != IMMOVABLE && b != IMMOVABLE {
+                self.islands.join(a, b);
+            }
+        }
+        self.of_root.clear();
+        self.of_root.resize(bodies, (0.0, 0, u8::MAX));
+        for Interface { a, b, need } in interfaces {
+            let body = if a == IMMOVABLE { b } else { a };
+            if body != IMMOVABLE {
+                let root = self.islands.root(body) as usize;
+                self.of_root[root].0 = self.of_root[root].0.max(need);
+            }
+        }
+        let is_awake = |body: usize| asleep.get(body) != Some(&true) && world.bodies[body].kind != BodyKind::Fixed;
+        for body in (0..bodies).filter(|&body| is_awake(body)) {
+            let (_, class, calm) = &mut self.of_root[self.islands.root(body as u32) as usize];
+            *class = (*class).max(self.classes[body]);
+            *calm = (*calm).min(self.calm_for[body]);
+        }
+        let mut changed = false;
+        let mut used = [false; MOST_CLASSES as usize + 1];
+        for body in (0..bodies).filter(|&body| is_awake(body)) {
+            let (need, before, calm) = self.of_root[self.islands.root(body as u32) as usize];
+            let (class, calm) = self.next(need, before, calm);
+            changed |= class != self.classes[body];
+            (self.classes[body], self.calm_for[body]) = (class, calm);
+            used[usize::from(class)] |= world.bodies[body].kind == BodyKind::Dynamic;
+        }
+        self.used.clear();
+        self.used.extend((0..=MOST_CLASSES).filter(|&class| used[usize::from(class)]));
+        self.any_above = self.classes.iter().any(|&class| class > 0);
+        changed
+    }
+
+    /// The class of an island, and how long it has been calm.
+    fn next(&self, need: f32, class: u8, calm: u8) -> (u8, u8) {
+        let wanted = class_for(need);
+        if wanted >= class || class > self.highest {
+            return (wanted.min(self.highest), 0);
+        }
+        if need > CALM_SHARE * sag_factor(class - 1) {
+            return (class, 0);
+        }
+        if calm + 1 < CALM_STEPS { (class, calm + 1) } else { (class - 1, 0) }
+    }
+
+    /// The number of blocks.
+    pub fn block_count(&self) -> usize {
+        self.used.len().max(1)
+    }
+
+    /// The block of a body: of bodies that are awake one for each class, in the order of the classes.
+    pub fn block_of(&self, body: usize) -> usize {
+        if self.used.len() < 2 {
+            return 0;
+        }
+        self.used.iter().position(|&class| class == self.classes[body]).unwrap_or(0)
+    }
+
+    /// The class of the bodies of a block.
+    pub fn class_of_block(&self, block: usize) -> u8 {
+        self.used.get(block).copied().unwrap_or(0)
+    }
+
+    /// The length of the substeps of a body over that of class 0.
+    pub fn share(&self, body: usize) -> f32 {
+        self.classes.get(body).map_or(1.0, |&class| 1.0 / (1_u32 << class) as f32)
+    }
+}
