@@ -116,13 +116,13 @@ impl StepPlan {
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
         let carried = shared.accumulated && joints.is_empty() && is_long_enough(problem);
         for substep in 0..config.substeps {
-            let carry = carried && substep > 0;
-            plan.over_bodies(Kernel::IntegrateVelocities { carry });
+            let warm_start = carried && substep > 0;
+            plan.over_bodies(Kernel::IntegrateVelocities { warm_start });
             if !problem.inertias.is_empty() {
                 plan.over_bodies(Kernel::IntegrateGyroscopic);
             }
             plan.over_colors(Kernel::WarmStartJoints, &joints);
-            if carry {
+            if warm_start {
                 // Done already.
             } else if shared.accumulated {
                 plan.over_colors(Kernel::WarmStart(shared.of_warm_start()), &contacts);

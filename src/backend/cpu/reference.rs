@@ -57,11 +57,11 @@ impl<S: Scalar> Reference<S> {
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
         let params = &self.rows.params;
         match pass.kernel {
-            Kernel::IntegrateVelocities { carry } => {
+            Kernel::IntegrateVelocities { warm_start } => {
                 self.free.resize(self.rows.bodies.len(), Free::default());
                 let free = &mut self.free;
                 for ((body, free), mass) in self.rows.bodies.iter_mut().zip(free).zip(&self.rows.masses) {
-                    integrate_velocities(carry, params, mass, body, free);
+                    integrate_velocities(warm_start, params, mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::pipelines::Pipelines;
 use super::timer::Timer;
 use super::wgsl::{Program, WORKGROUP};
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::{Kernel, Pass};
 use crate::problem::{PassColors, StepProblem};
 
@@ -53,7 +53,7 @@ fn threads(problem: &StepProblem, pass: &Pass) -> usize {
         Kernel::ClearImpulses => problem.rows_of(&pass.colors).len(),
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
         // A workgroup a chunk.
-        Kernel::MeasureStep => problem.impulse_count().div_ceil(CHUNK) * WORKGROUP as usize,
+        Kernel::MeasureStep => problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),

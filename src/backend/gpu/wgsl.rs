@@ -7,7 +7,7 @@ use super::bindings::declarations;
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
 use crate::kernels::Rules;
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::Kernel;
 
 /// Threads of a workgroup.
@@ -82,8 +82,8 @@ enum Over {
 fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
-        Kernel::IntegrateVelocities { carry } => {
-            let call = format!("integrate_velocity({carry}, row)");
+        Kernel::IntegrateVelocities { warm_start } => {
+            let call = format!("integrate_velocity({warm_start}, row)");
             (&[part!("integrate_velocities")], Over::Count("params.body_count"), call)
         }
         Kernel::IntegrateGyroscopic => {
@@ -206,7 +206,7 @@ fn text(of_plan: bool, threads: u32, parts: &[&str], loops: &str, main: &str) ->
     format!(
         "const WORKGROUP: u32 = {threads}u;
 const MAX_POINTS: u32 = {MAX_POINTS}u;
-const CHUNK: u32 = {CHUNK}u;
+const IMPULSES_PER_CHUNK: u32 = {IMPULSES_PER_CHUNK}u;
 const PASS_ROWS: u32 = {PASS_ROWS}u;
 
 {buffers}
