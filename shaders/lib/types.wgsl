@@ -61,8 +61,8 @@ struct ResidentParams {
     // Number of contacts that take part, and where their rows begin in `colors`.
     contact_count: u32, order: u32,
     written_count: u32,
-    // 1 if a patch follows the points of every contact; 1 if the host sent all points.
-    patches: u32, has_points: u32,
+    // 1 if the host sent all points.
+    has_points: u32,
 }
 
 // A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.

@@ -24,7 +24,7 @@ fn begin_contact(at: u32) {
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
     }
-    for (var k = contact.first_point; k < end + resident.patches; k++) {
+    for (var k = contact.first_point; k < end + params.patches; k++) {
         if resident.preload.warm_start == 1u {
             impulses[k].peak = 0.0;
         } else {

@@ -285,7 +285,7 @@ pub struct Params {
 }
 
 /// Rows in `points` and `impulses` that a slot of a simulation has.
-pub(super) fn points_a_slot(patches: bool) -> usize {
+pub(crate) fn points_a_slot(patches: bool) -> usize {
     MAX_POINTS + usize::from(patches)
 }
 
