@@ -29,8 +29,8 @@ const SLOW: f32 = 0.0625;
 
 // The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
 fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
-    var h = params.substep;
-    if square > 1.0 { h = params.substep * inverse_sqrt(square); }
+    var h = pass_row.substep;
+    if square > 1.0 { h = pass_row.substep * inverse_sqrt(square); }
     var next = spin;
     for (var step = 0u; step < 4u; step++) {
         next = newton_step(inertia, h, spin, next);
@@ -66,12 +66,12 @@ fn turn_spin(i: u32) {
     let a = vec3f((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
     let rates = vec3f(a.y * a.z, a.z * a.x, a.x * a.y);
     let sizes = vec3f(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
-    let angle = spin * params.substep;
+    let angle = spin * pass_row.substep;
     let square = dot3(sizes, angle * angle);
 
     var turn: vec3f;
     if SLOW > square {
-        let next = newton_step(inertia, params.substep, spin, newton_step(inertia, params.substep, spin, spin));
+        let next = newton_step(inertia, pass_row.substep, spin, newton_step(inertia, pass_row.substep, spin, spin));
         // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
         let change = next - spin;
         turn = x * change.x + y * change.y + z * change.z;

@@ -3,6 +3,6 @@
 
 fn integrate_position(i: u32) {
     let body = bodies[i];
-    bodies[i].dp = body.dp + body.v * params.substep;
-    bodies[i].dq = renormalized(quat_mul(exp_rotation(body.w * params.substep), body.dq));
+    bodies[i].dp = body.dp + body.v * pass_row.substep;
+    bodies[i].dq = renormalized(quat_mul(exp_rotation(body.w * pass_row.substep), body.dq));
 }

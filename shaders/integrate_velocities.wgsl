@@ -1,15 +1,15 @@
-// integrate_velocities: one thread adds gravity and force to the velocity of one body. With `carry` it also adds the change of
+// integrate_velocities: one thread adds gravity and force to the velocity of one body. With `is_warm_start` it also adds the change of
 // velocity that the impulses of the substep before caused: the difference of the velocities from the free ones.
 // Reads masses. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
 
-fn integrate_velocity(carry: bool, i: u32) {
-    let free_v = bodies[i].v + masses[i].acceleration * params.substep;
+fn integrate_velocity(is_warm_start: bool, i: u32) {
+    let free_v = bodies[i].v + masses[i].acceleration * pass_row.substep;
     let free_w = bodies[i].w;
-    if carry {
-        let carried_v = bodies[i].v - free[i].v;
-        let carried_w = bodies[i].w - free[i].w;
-        bodies[i].v = free_v + carried_v;
-        bodies[i].w = free_w + carried_w;
+    if is_warm_start {
+        let warm_v = bodies[i].v - free[i].v;
+        let warm_w = bodies[i].w - free[i].w;
+        bodies[i].v = free_v + warm_v;
+        bodies[i].w = free_w + warm_w;
     } else {
         bodies[i].v = free_v;
     }

@@ -1,4 +1,4 @@
-// measure_step: one workgroup adds up the step of a sweep over the impulses of CHUNK points or joints: its square, and its product
+// measure_step: one workgroup adds up the step of a sweep over the impulses of IMPULSES_PER_CHUNK points or joints: its square, and its product
 // with the way from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair of sums.
 // Double: src/kernels/momentum.rs.
 
@@ -16,10 +16,10 @@ fn step_length(i: u32) -> vec2f {
 
 fn measure_step(thread: u32, group: u32, groups: u32) {
     let count = params.point_count + params.joint_count;
-    for (var first = group * CHUNK; first < count; first += groups * CHUNK) {
+    for (var first = group * IMPULSES_PER_CHUNK; first < count; first += groups * IMPULSES_PER_CHUNK) {
         var own = vec2f();
-        for (var i = first + thread; i < min(first + CHUNK, count); i += WORKGROUP) { own += step_length(i); }
+        for (var i = first + thread; i < min(first + IMPULSES_PER_CHUNK, count); i += WORKGROUP) { own += step_length(i); }
         let sum = workgroup_sum(thread, own);
-        if thread == 0u { lengths[first / CHUNK] = sum; }
+        if thread == 0u { lengths[first / IMPULSES_PER_CHUNK] = sum; }
     }
 }

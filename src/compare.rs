@@ -181,7 +181,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 14] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 15] {
     // A field that is added has to be named here.
     let StepProblem {
         params,

@@ -70,12 +70,12 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     }
     let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
     if kernel == Kernel::IntegrateGyroscopic {
-        let first = in_one_pass(Kernel::IntegrateVelocities { carry: false }, problem);
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
     }
-    // What it carries over is what happened since it last ran.
-    if kernel == (Kernel::IntegrateVelocities { carry: true }) {
-        let first = in_one_pass(Kernel::IntegrateVelocities { carry: false }, problem);
+    // What a warm start applies is what happened since it last ran.
+    if kernel == (Kernel::IntegrateVelocities { warm_start: true }) {
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
     }
     ways.dedup();

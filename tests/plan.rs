@@ -49,7 +49,7 @@ fn the_plan_of_a_tower_reads_as_the_step_is_told() {
     // Three colors between boxes: two would do for a chain, if its contacts did not choose in an order without a pattern. One for
     // the floor. All are small, so that one workgroup sweeps them.
     let first = "integrate_velocities\nwarm_start(disc friction) over colors 0..4\n";
-    let later = "integrate_velocities(carry)\n";
+    let later = "integrate_velocities(warm start)\n";
     let sweeps = "\
 solve_contacts(biased) over colors 0..4
 integrate_positions
@@ -122,7 +122,7 @@ fn a_world_that_touches_nothing_is_only_integrated() {
     let (plan, ..) = planned(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 2));
     assert_eq!(
         plan.to_string(),
-        "integrate_velocities\nintegrate_positions\nintegrate_velocities(carry)\nintegrate_positions\n"
+        "integrate_velocities\nintegrate_positions\nintegrate_velocities(warm start)\nintegrate_positions\n"
     );
 }
 

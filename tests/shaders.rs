@@ -84,12 +84,12 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
         let shared = Rules { measured, patch, friction, round: true, ..Rules::default() };
         let biased = Rules { biased: true, friction: FrictionRule::None, patch: false, ..shared };
         let mut kernels = vec![
-            Kernel::IntegrateVelocities { carry: false },
+            Kernel::IntegrateVelocities { warm_start: false },
             Kernel::WarmStart(shared.of_warm_start()),
             Kernel::SolveContacts(biased),
             Kernel::IntegratePositions,
             Kernel::SolveContacts(shared),
-            Kernel::IntegrateVelocities { carry: true },
+            Kernel::IntegrateVelocities { warm_start: true },
             Kernel::ApplyRestitution(Rules { patch, ..Rules::default() }),
         ];
         // Eight buffers are enough for one or the other.
@@ -110,7 +110,7 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
 /// missing barrier shows in no result.
 #[test]
 fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
-    let kernels = [Kernel::IntegrateVelocities { carry: false }, Kernel::SolveContacts(Rules::default())];
+    let kernels = [Kernel::IntegrateVelocities { warm_start: false }, Kernel::SolveContacts(Rules::default())];
     let module = parsed(&Program::OneDispatch(kernels.into(), 16).source());
     let [entry] = &module.entry_points[..] else { panic!("one entry point") };
     let mut bodies = Vec::new();

@@ -20,8 +20,8 @@ fn current_separation(movement: NormalMovement, contact: Contact, point: Point) 
 }
 
 fn pair_softness(pair: ptr<function, Pair>) -> Softness {
-    if (*pair).mass_a.inv_mass > 0.0 && (*pair).mass_b.inv_mass > 0.0 { return params.movable; }
-    return params.fixed;
+    if (*pair).mass_a.inv_mass > 0.0 && (*pair).mass_b.inv_mass > 0.0 { return pass_row.movable; }
+    return pass_row.fixed;
 }
 
 // The impulse pushes, never pulls: the sum of the corrections, or each by itself.
@@ -35,7 +35,7 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
     let pushed = larger(softness.bias_rate * smaller(s + params.slop, 0.0), -softness.push_limit);
-    let bias = select(select(0.0, pushed, rules.biased), s * params.inverse_substep, apart);
+    let bias = select(select(0.0, pushed, rules.biased), s * pass_row.inverse_substep, apart);
     let mass_scale = select(select(1.0, softness.mass_scale, rules.biased), 1.0, apart);
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);

@@ -16,7 +16,7 @@ struct Contact {
     normal: vec3f, friction: f32,
     tangent: vec3f, restitution: f32,
     body_a: u32, body_b: u32, first_point: u32, point_count: u32,
-    radius_a: f32, radius_b: f32, preload: f32,
+    radius_a: f32, radius_b: f32, preload: f32, substep_share: f32,
 }
 
 struct Point {
@@ -40,17 +40,19 @@ struct Momentum { t: f32, factor: f32, square: f32, restarts: u32 }
 struct Softness { bias_rate: f32, mass_scale: f32, impulse_scale: f32, push_limit: f32 }
 
 struct Params {
-    substep: f32, inverse_substep: f32, restitution_threshold: f32, inertia_count: u32,
+    restitution_threshold: f32, slop: f32, relaxation: f32, tolerance: f32,
+    body_count: u32, point_count: u32, joint_count: u32, patches: u32,
+}
+
+// What one dispatch sweeps: colors, one after another, with the substep of their block. The buffer `colors` holds where each color begins,
+// then where the last one ends, then the rows of the colors.
+struct PassRow {
+    first: u32, end: u32,
+    substep: f32, inverse_substep: f32,
     movable: Softness,
     fixed: Softness,
     joint: Softness,
-    body_count: u32, point_count: u32, slop: f32, relaxation: f32,
-    tolerance: f32, joint_count: u32, patches: u32,
 }
-
-// The colors that one dispatch sweeps, one after another. The buffer `colors` holds where each color begins, then where the last one
-// ends, then the rows of the contacts or joints of the colors.
-struct PassColors { first: u32, end: u32 }
 
 struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, warm_start: u32 }
 
@@ -61,8 +63,8 @@ struct ResidentParams {
     // Number of contacts that take part, and where their rows begin in `colors`.
     contact_count: u32, order: u32,
     written_count: u32,
-    // 1 if a patch follows the points of every contact; 1 if the host sent all points.
-    patches: u32, has_points: u32,
+    // 1 if the host sent all points.
+    has_points: u32,
 }
 
 // A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.

@@ -1,10 +1,13 @@
-// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the
-// impulses of the step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::write_slot in src/problem/write.rs, preloaded in src/problem/carry.rs.
+// begin_contacts: one thread writes the separations of the points of one manifold, how deep it sags under the impulses of the step
+// before, and its preload, which follows from that. Reads colors, separations, masses. Writes contacts, points, impulses, sags; one thread a
+// manifold. Doubles: Writer::write_slot in src/problem/write.rs, sag and preloaded in src/problem/carry.rs.
 
-fn preloaded(before: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
     let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
-    let sag = pressed * compliance * reciprocal(mass);
+    return pressed * (compliance * share) * reciprocal(mass);
+}
+
+fn preloaded(before: f32, sag: f32) -> f32 {
     // A contact that bears less has less preload at once.
     return smaller(before + resident.preload.share * (sag - before), 2.0 * sag);
 }
@@ -20,11 +23,13 @@ fn begin_contact(at: u32) {
         pressed += impulses[k].normal;
         mass += points[k].normal_mass;
     }
-    contacts[i].preload = preloaded(contact.preload, both_movable, pressed, mass);
+    let own_sag = sag(contact.substep_share, both_movable, pressed, mass);
+    sags[i] = own_sag;
+    contacts[i].preload = preloaded(contact.preload, own_sag);
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
     }
-    for (var k = contact.first_point; k < end + resident.patches; k++) {
+    for (var k = contact.first_point; k < end + params.patches; k++) {
         if resident.preload.warm_start == 1u {
             impulses[k].peak = 0.0;
         } else {

@@ -19,20 +19,20 @@ fn write_contact(i: u32) {
     now.preload = select(before.preload, 0.0, is_new);
     contacts[row] = now;
     let first = now.first_point;
-    let stride = MAX_POINTS + resident.patches;
+    let stride = MAX_POINTS + params.patches;
     if resident.has_points == 0u {
-        for (var k = 0u; k < now.point_count + resident.patches; k++) { points[first + k] = written_points[i * stride + k]; }
+        for (var k = 0u; k < now.point_count + params.patches; k++) { points[first + k] = written_points[i * stride + k]; }
     }
     let nothing = Impulse(0.0, 0.0, 0.0, 0.0);
     var old = array(nothing, nothing, nothing, nothing);
     var patch_impulse = nothing;
     if !is_new {
         for (var k = 0u; k < before.point_count; k++) { old[k] = retangented(before, now, impulses[first + k]); }
-        if resident.patches == 1u { patch_impulse = retangented(before, now, impulses[first + before.point_count]); }
+        if params.patches == 1u { patch_impulse = retangented(before, now, impulses[first + before.point_count]); }
     }
     for (var k = 0u; k < now.point_count; k++) {
         let at = (points_before >> (8u * k)) & 0xffu;
         if at < MAX_POINTS { impulses[first + k] = old[at]; } else { impulses[first + k] = nothing; }
     }
-    if resident.patches == 1u { impulses[first + now.point_count] = patch_impulse; }
+    if params.patches == 1u { impulses[first + now.point_count] = patch_impulse; }
 }

@@ -25,7 +25,7 @@ pub struct Pair {
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
     /// Half of the smallest side of the thinner one (m).
-    size: f32,
+    pub size: f32,
     /// Radius around the origin of body b that holds its collider (m).
     reach_b: f32,
     /// Distance up to which the last computation predicted (m).

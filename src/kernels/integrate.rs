@@ -6,25 +6,25 @@ use crate::math::{
     Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, turned, vec3,
 };
 
-/// Adds gravity and force; with `carry` also the impulses that the substep before ended with.
+/// Adds gravity and force; with `warm_start` also the impulses that the substep before ended with.
 ///
 /// Masses and arms stay the same within a step, so that the impulses change the velocities by the same M⁻¹ Gᵀ λ in every substep.
 /// That change is the difference between the velocities and the free velocities. The warm start of every substep but the first
 /// therefore costs one subtraction and one addition a body, and no pass over the contacts.
 #[inline(always)]
 pub fn integrate_velocities<L: Lane>(
-    carry: bool,
+    warm_start: bool,
     params: &StepParams<L>,
     mass: &Mass<L>,
     body: &mut Body<L>,
     free: &mut Free<L>,
 ) {
-    let (carried_v, carried_w) = (body.v - free.v, body.w - free.w);
+    let (warm_v, warm_w) = (body.v - free.v, body.w - free.w);
     body.v += mass.acceleration * params.substep;
     (free.v, free.w) = (body.v, body.w);
-    if carry {
-        body.v += carried_v;
-        body.w += carried_w;
+    if warm_start {
+        body.v += warm_v;
+        body.w += warm_w;
     }
 }
 

@@ -24,7 +24,7 @@ use crate::math::{Lane, Scalar, Vec3, dot3, reciprocal, vec3};
 /// Threads of a workgroup: how many sums are taken side by side.
 const WORKGROUP: usize = 64;
 /// Numbers that one workgroup sums, the constant of the same name in `measure_step.wgsl`.
-pub const CHUNK: usize = 1024;
+pub const IMPULSES_PER_CHUNK: usize = 1024;
 
 impl<S: Scalar> Momentum<S> {
     /// Begins a sequence of sweeps: none yet.
@@ -108,7 +108,7 @@ pub fn step_length<L: Lane>(impulse: Vec3<L>, step: &ImpulseStep<L>) -> StepLeng
 /// Sum of some numbers as the kernels form it: `measure_step` that of each chunk, `update_momentum` that of those.
 pub fn chunked_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
     let mut sums = [T::default(); WORKGROUP];
-    for (i, chunk) in numbers.chunks(CHUNK).enumerate() {
+    for (i, chunk) in numbers.chunks(IMPULSES_PER_CHUNK).enumerate() {
         sums[i % WORKGROUP] = sums[i % WORKGROUP] + workgroup_sum(chunk);
     }
     sum_of_halves(sums)

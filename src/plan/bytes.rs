@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{Kernel, Pass, StepPlan};
 use crate::config::FrictionRule;
-use crate::kernels::momentum::{CHUNK, StepLength};
+use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
     StepProblem,
@@ -43,8 +43,8 @@ impl Pass {
             end - first
         };
         let bytes = match self.kernel {
-            Kernel::IntegrateVelocities { carry } => {
-                rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if carry { 2 } else { 1 })
+            Kernel::IntegrateVelocities { warm_start } => {
+                rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if warm_start { 2 } else { 1 })
             }
             Kernel::IntegratePositions => rows.len() * (BODY + BODY / 2),
             Kernel::IntegrateGyroscopic => {
@@ -54,7 +54,9 @@ impl Pass {
             // Reads and writes what was before, and writes where the sweep begins.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
             Kernel::MeasureStep => 3 * IMPULSE * problem.impulse_count(),
-            Kernel::UpdateMomentum => problem.impulse_count().div_ceil(CHUNK) * size_of::<StepLength<f32>>(),
+            Kernel::UpdateMomentum => {
+                problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * size_of::<StepLength<f32>>()
+            }
             Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::ClearImpulses => {

@@ -12,7 +12,7 @@ pub enum Kernel {
     /// Gravity and forces; over bodies.
     IntegrateVelocities {
         /// Whether the impulses that the last substep ended with are applied as well, as velocities.
-        carry: bool,
+        warm_start: bool,
     },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic,
@@ -83,8 +83,8 @@ impl Kernel {
 impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.name())?;
-        if matches!(self, Self::IntegrateVelocities { carry: true }) {
-            write!(f, "(carry)")?;
+        if matches!(self, Self::IntegrateVelocities { warm_start: true }) {
+            write!(f, "(warm start)")?;
         }
         if let Some(r) = self.rules() {
             let friction = match r.friction {

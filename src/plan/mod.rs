@@ -124,13 +124,13 @@ impl StepPlan {
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
         let carried = shared.accumulated && joints.is_empty() && length >= SHORTEST_CARRIED;
         for substep in 0..substeps {
-            let carry = carried && substep > 0;
-            self.over_colors(Kernel::IntegrateVelocities { carry }, block, &bodies);
+            let warm_start = carried && substep > 0;
+            self.over_colors(Kernel::IntegrateVelocities { warm_start }, block, &bodies);
             if has_inertias {
                 self.over_colors(Kernel::IntegrateGyroscopic, block, &inertias);
             }
             self.over_colors(Kernel::WarmStartJoints, block, &joints);
-            if carry {
+            if warm_start {
                 // Done already.
             } else if shared.accumulated {
                 self.over_colors(Kernel::WarmStart(shared.of_warm_start()), block, &contacts);

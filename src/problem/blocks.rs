@@ -53,12 +53,12 @@ pub fn lay_out(
     problem.colors.clear();
     problem.colors.push(0);
     let count = effort.block_count();
-    let mut blocks: Vec<Block> = (0..count)
-        .map(|block| {
-            let substeps = config.substeps << effort.class_of_block(block);
-            Block { substeps, substep: Substep::new(config, dt / substeps as f32), ..Block::default() }
-        })
-        .collect();
+    let mut blocks = std::mem::take(&mut problem.blocks);
+    blocks.clear();
+    blocks.extend((0..count).map(|block| {
+        let substeps = config.substeps << effort.class_of_block(block);
+        Block { substeps, substep: Substep::new(config, dt / substeps as f32), ..Block::default() }
+    }));
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
@@ -102,14 +102,15 @@ fn deal_colors(
     block_of: impl Fn(&StepProblem, u32) -> Option<usize>,
     problem: &mut StepProblem,
 ) {
-    let of_row: Vec<Option<usize>> = coloring.order.iter().map(|&row| block_of(problem, row)).collect();
     for (i, block) in blocks.iter_mut().enumerate() {
         let first = problem.colors.len() as u32 - 1;
         for color in coloring.offsets.windows(2) {
             let begin = problem.order.len();
-            let places = color[0] as usize..color[1] as usize;
-            let rows = coloring.order[places.clone()].iter().zip(&of_row[places]);
-            problem.order.extend(rows.filter(|(_, own)| **own == Some(i)).map(|(row, _)| row));
+            for &row in &coloring.order[color[0] as usize..color[1] as usize] {
+                if block_of(problem, row) == Some(i) {
+                    problem.order.push(row);
+                }
+            }
             if problem.order.len() > begin {
                 problem.colors.push(problem.order.len() as u32);
             }

@@ -18,6 +18,7 @@ pub use bodies::{begin, store};
 pub use contacts::ContactRows;
 pub use joints::JointRows;
 pub use rescale::StepScale;
+pub(crate) use rows::points_a_slot;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
     MomentumRow, Params, PassRow, PointRow, Softness, Substep,

@@ -287,7 +287,7 @@ pub struct Substep {
 }
 
 /// Rows in `points` and `impulses` that a slot of a simulation has.
-pub(super) fn points_a_slot(patches: bool) -> usize {
+pub(crate) fn points_a_slot(patches: bool) -> usize {
     MAX_POINTS + usize::from(patches)
 }
 

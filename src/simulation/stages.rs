@@ -1,6 +1,6 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
-use crate::collide::Detector;
+use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::error::Result;
@@ -17,7 +17,7 @@ pub(super) struct Stages {
     pub sleep: Sleep,
     pub effort: Effort,
     /// The result of the detection of this step.
-    found: Found,
+    found: DetectStats,
     key: Key,
     pub contacts: ContactRows,
     pub joints: JointRows,
@@ -66,7 +66,7 @@ impl Stages {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
             effort: Effort::default(),
-            found: Found::default(),
+            found: DetectStats::default(),
             key: Key { config: config.clone(), surfaces, scale: None },
             contacts: ContactRows::default(),
             joints: JointRows::default(),

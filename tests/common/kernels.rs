@@ -41,8 +41,8 @@ pub fn every_rules() -> Vec<Rules> {
 /// Every kernel under every combination of rules.
 pub fn every_kernel() -> Vec<Kernel> {
     let mut all = vec![
-        Kernel::IntegrateVelocities { carry: false },
-        Kernel::IntegrateVelocities { carry: true },
+        Kernel::IntegrateVelocities { warm_start: false },
+        Kernel::IntegrateVelocities { warm_start: true },
         Kernel::IntegrateGyroscopic,
         Kernel::IntegratePositions,
         Kernel::ClearImpulses,

@@ -133,7 +133,7 @@ fn indices(words: &[u32]) -> (usize, usize) {
 #[test]
 fn no_index_leaves_its_buffer() {
     let small_world: std::sync::Arc<[Kernel]> = [
-        Kernel::IntegrateVelocities { carry: false },
+        Kernel::IntegrateVelocities { warm_start: false },
         Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, round: true, ..Rules::default() }),
         Kernel::IntegratePositions,
     ]

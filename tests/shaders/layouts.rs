@@ -66,7 +66,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         PassColors = PassColors { first end }
         Preload = Preload { movable_compliance fixed_compliance share warm_start }
         ResidentParams = ResidentParams {
-            preload body_count contact_count order written_count patches has_points
+            preload body_count contact_count order written_count has_points
         }
         Written = Written { row points_before }
     }

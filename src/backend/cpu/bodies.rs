@@ -101,7 +101,7 @@ impl Work for BodyWork<'_> {
             let states = unsafe { self.bodies.slice(range.clone()) };
             // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
             let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
-            if let Kernel::IntegrateVelocities { carry } = self.kernel {
+            if let Kernel::IntegrateVelocities { warm_start } = self.kernel {
                 let accelerations = &self.accelerations[range.clone()];
                 // SAFETY: as above.
                 let rows = unsafe { self.free.slice(range) };
@@ -115,7 +115,7 @@ impl Work for BodyWork<'_> {
                 let ([x, y, z, ..], [vx, vy, vz, _, wx, wy, wz, _]) = (acceleration, free);
                 let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
                 let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
-                integrate_velocities(carry, &params, &mass, &mut body, &mut free);
+                integrate_velocities(warm_start, &params, &mass, &mut body, &mut free);
                 rows.copy_from_slice(&velocity_rows(free.v, free.w));
             } else {
                 integrate_positions(&params, &mut body);

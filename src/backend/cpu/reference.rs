@@ -56,11 +56,11 @@ impl<S: Scalar> Reference<S> {
 
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
         match pass.kernel {
-            Kernel::IntegrateVelocities { carry } => {
+            Kernel::IntegrateVelocities { warm_start } => {
                 self.free.resize(self.rows.bodies.len(), Free::default());
                 for i in places(problem, pass) {
                     let (mass, body, free) = (&self.rows.masses[i], &mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_velocities(carry, &self.rows.params[pass.block as usize], mass, body, free);
+                    integrate_velocities(warm_start, &self.rows.params[pass.block as usize], mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {

@@ -41,8 +41,8 @@ macro_rules! bindings {
 bindings! {
     /// Numbers that are the same for all rows.
     Params "params": "Params", Uniform;
-    /// The colors that a pass goes over.
-    PassColors "pass_colors": "PassColors", UniformAtOffset;
+    /// The colors that a pass goes over, and the substep of its block.
+    PassRow "pass_row": "PassRow", UniformAtOffset;
     /// Velocities and movements of the bodies; read back.
     Bodies "bodies": "array<Body>", Write;
     /// Masses of the bodies.
@@ -84,6 +84,8 @@ bindings! {
     WrittenPoints "written_points": "array<Point>", Read;
     /// Separations of the points when the step begins.
     Separations "separations": "array<f32>", Read;
+    /// How deep each manifold sags under what it bore in the step before; read back.
+    Sags "sags": "array<f32>", Write;
     /// The passes of a plan that one dispatch follows.
     Passes "passes": "array<vec4u, PASS_ROWS>", Uniform;
 }

@@ -1,44 +1,45 @@
-//! The dispatches of a plan: a program, its number of workgroups, and the colors that it goes over.
+//! The dispatches of a plan: a program, its number of workgroups, and the row of its pass.
 
 use std::collections::HashMap;
 
 use super::pipelines::Pipelines;
 use super::timer::Timer;
 use super::wgsl::{Program, WORKGROUP};
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::{Kernel, Pass};
-use crate::problem::{PassColors, StepProblem};
+use crate::problem::{PassRow, StepProblem};
 
 /// One dispatch.
 pub(super) struct Dispatch {
     pub program: Program,
     pub workgroups: u32,
-    /// Offset of the colors in their buffer (B).
-    pub colors: u32,
+    /// Offset of the row of the pass in its buffer (B).
+    pub pass_row: u32,
 }
 
 impl Dispatch {
     /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes several.
     pub fn over(program: Program, rows: usize) -> Self {
-        Self { program, workgroups: (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535), colors: 0 }
+        Self { program, workgroups: (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535), pass_row: 0 }
     }
 }
 
-/// A dispatch for each pass, and the buffer of their colors. Offsets into the buffer are multiples of `stride` bytes.
+/// A dispatch for each pass, and the buffer of their rows. Offsets into the buffer are multiples of `stride` bytes.
 pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -> (Vec<Dispatch>, Vec<u8>) {
     let mut bytes = Vec::new();
     let mut known = HashMap::new();
     let mut place = |pass: &Pass| {
-        *known.entry(pass.colors.clone()).or_insert_with(|| {
+        *known.entry((pass.block, pass.colors.clone())).or_insert_with(|| {
             let at = bytes.len();
             bytes.resize(at + stride, 0);
-            let colors = PassColors { first: pass.colors.start, end: pass.colors.end };
-            bytes[at..at + size_of::<PassColors>()].copy_from_slice(bytemuck::bytes_of(&colors));
+            let substep = problem.blocks[pass.block as usize].substep;
+            let row = PassRow { first: pass.colors.start, end: pass.colors.end, substep };
+            bytes[at..at + size_of::<PassRow>()].copy_from_slice(bytemuck::bytes_of(&row));
             at as u32
         })
     };
     let dispatch = |pass: &Pass| Dispatch {
-        colors: place(pass),
+        pass_row: place(pass),
         ..Dispatch::over(Program::Pass(pass.kernel), threads(problem, pass))
     };
     let dispatches = passes.iter().map(dispatch).collect();
@@ -48,14 +49,11 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
 /// Threads that have work in a pass. One workgroup sweeps several colors, one after another.
 fn threads(problem: &StepProblem, pass: &Pass) -> usize {
     match pass.kernel {
-        Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => problem.bodies.len(),
-        Kernel::IntegrateGyroscopic => problem.inertias.len(),
-        Kernel::ClearImpulses => problem.rows_of(&pass.colors).len(),
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
         // A workgroup a chunk.
-        Kernel::MeasureStep => problem.impulse_count().div_ceil(CHUNK) * WORKGROUP as usize,
+        Kernel::MeasureStep => problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
-        _ if pass.colors.len() > 1 => 1,
+        _ if pass.colors.len() > 1 && pass.kernel != Kernel::ClearImpulses => 1,
         _ => problem.rows_of(&pass.colors).len(),
     }
 }
@@ -76,7 +74,7 @@ pub(super) fn encode(
         let compiled = pipelines.get(&run[0].program);
         compute.set_pipeline(&compiled.pipeline);
         for dispatch in run {
-            let offsets: &[u32] = if compiled.has_colors() { &[dispatch.colors] } else { &[] };
+            let offsets: &[u32] = if compiled.has_pass_row() { &[dispatch.pass_row] } else { &[] };
             compute.set_bind_group(0, &compiled.bind_group, offsets);
             compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
         }

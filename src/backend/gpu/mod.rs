@@ -159,16 +159,18 @@ impl Gpu {
         together: bool,
     ) -> Result<wgpu::CommandEncoder> {
         let mut all = first;
+        let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
         // The timer measures each kernel by itself.
         match one_dispatch::of(problem, passes).filter(|_| together && self.timer.is_none()) {
-            Some((program, passes)) => {
-                self.buffers.update(Binding::Passes, bytemuck::cast_slice(&passes));
+            Some((program, table)) => {
+                self.buffers.update(Binding::Passes, bytemuck::cast_slice(&table));
+                let (_, rows) = dispatch::of_passes(problem, &passes[..1], stride);
+                self.buffers.update(Binding::PassRow, &rows);
                 all.push(Dispatch::over(program, 1));
             }
             None => {
-                let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-                let (dispatches, pass_colors) = dispatch::of_passes(problem, passes, stride);
-                self.buffers.update(Binding::PassColors, &pass_colors);
+                let (dispatches, rows) = dispatch::of_passes(problem, passes, stride);
+                self.buffers.update(Binding::PassRow, &rows);
                 all.extend(dispatches);
             }
         }
@@ -233,7 +235,9 @@ impl Backend for Gpu {
 
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let (problem, passes) = step.into_parts();
-        let first = match self.rows.take().filter(|_| carry.on_device) {
+        let before = self.rows.take().filter(|_| carry.on_device);
+        let goes_on = before.is_some();
+        let first = match before {
             Some(before) => {
                 self.check(problem, passes)?;
                 self.update_small_rows(problem);
@@ -245,7 +249,15 @@ impl Backend for Gpu {
             }
         };
         let encoder = self.encoded(problem, first, passes, true)?;
-        self.finish(encoder, &mut rows::moved(problem))?;
+        let mut sags = std::mem::take(&mut problem.sags);
+        let mut wanted = rows::moved(problem);
+        // Else the host computed them.
+        if goes_on && !sags.is_empty() {
+            wanted.push((Binding::Sags, bytemuck::cast_slice_mut(&mut sags)));
+        }
+        let finished = self.finish(encoder, &mut wanted);
+        problem.sags = sags;
+        finished?;
         self.count_bytes(problem, passes);
         for (binding, bytes) in rows::moved(problem) {
             self.buffers.note(binding, bytes);

@@ -25,7 +25,8 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
         let colors = pass.colors.clone().map(|color| problem.rows_of(&(color..color + 1)).len());
         colors.max().unwrap_or(0)
     };
-    let fits = problem.bodies.len() <= MOST_ROWS
+    // All passes share the substep of one block.
+    let fits = problem.blocks.len() == 1
         && problem.points.len() <= 4 * MOST_ROWS
         && (FEWEST_PASSES..=MOST_PASSES).contains(&passes.len())
         && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MOST_ROWS);

@@ -8,7 +8,7 @@ use super::reflect::Reflected;
 use super::spirv_exact;
 use super::wgsl::{ENTRY_POINT, Program};
 use crate::error::Result;
-use crate::problem::PassColors;
+use crate::problem::PassRow;
 
 /// The pipelines of a device.
 pub(super) struct Pipelines {
@@ -30,8 +30,8 @@ pub(super) struct Compiled {
 
 impl Compiled {
     /// Whether it goes over colors, whose range stands at an offset of its own for each dispatch.
-    pub fn has_colors(&self) -> bool {
-        self.bindings.contains(&Binding::PassColors)
+    pub fn has_pass_row(&self) -> bool {
+        self.bindings.contains(&Binding::PassRow)
     }
 }
 
@@ -112,7 +112,7 @@ fn bind(
     bindings: &[Binding],
 ) -> wgpu::BindGroup {
     let entry = |&binding: &Binding| {
-        let size = binding.has_offset().then(|| wgpu::BufferSize::new(size_of::<PassColors>() as u64)).flatten();
+        let size = binding.has_offset().then(|| wgpu::BufferSize::new(size_of::<PassRow>() as u64)).flatten();
         let buffer = wgpu::BufferBinding { buffer: buffers.get(binding), offset: 0, size };
         wgpu::BindGroupEntry { binding: binding as u32, resource: wgpu::BindingResource::Buffer(buffer) }
     };

@@ -9,7 +9,7 @@ use super::wgsl::Program;
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 use crate::problem::carry::{Carry, NO_POINT, Preload};
-use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem};
+use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem, points_a_slot};
 
 // The shader writes no impulse to a point whose number before is `MAX_POINTS` or more.
 const _: () = assert!(NO_POINT as usize == MAX_POINTS);
@@ -44,12 +44,10 @@ pub struct ResidentParams {
     pub order: u32,
     /// Number of contacts whose rows the host computed anew.
     pub written_count: u32,
-    /// 1 if a patch follows the points of every contact.
-    pub patches: u32,
     /// 1 if the host sent all points.
     pub has_points: u32,
     #[doc(hidden)]
-    pub pad: [u32; 2],
+    pub pad: [u32; 3],
 }
 
 /// Sends what changed since the step before, and returns the programs that bring its rows to those of `problem`. `separations` is
@@ -68,7 +66,6 @@ pub(super) fn begin(
         contact_count: swept.len() as u32,
         order: problem.colors.len() as u32,
         written_count: carry.written.len() as u32,
-        patches: problem.has_patches().into(),
         has_points: carry.approach.into(),
         ..ResidentParams::default()
     };
@@ -82,6 +79,7 @@ pub(super) fn begin(
         (Binding::Points, before.points * size_of::<PointRow>(), size_of_val(&problem.points[..])),
         (Binding::Impulses, before.points * size_of::<ImpulseRow>(), size_of_val(&problem.impulses[..])),
     ];
+    buffers.reserve(Binding::Sags, size_of_val(&problem.sags[..]));
     for (binding, kept, size) in kept {
         buffers.grow(binding, kept, size);
     }
@@ -105,9 +103,9 @@ pub(super) fn begin(
 /// Sends the rows that the host computed anew.
 fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> Result<()> {
     if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
-        return Err(Error::input("carry: names contacts that are not there"));
+        return Err(Error::input("contacts written again: a row that is not there"));
     }
-    let stride = MAX_POINTS + usize::from(problem.has_patches());
+    let stride = points_a_slot(problem.has_patches());
     let (mut contacts, mut points) = (Vec::new(), Vec::new());
     for written in &carry.written {
         let contact = problem.contacts[written.row as usize];

@@ -1,7 +1,7 @@
 //! The rows of a problem as the bytes of buffers.
 
 use super::bindings::Binding;
-use crate::kernels::momentum::{CHUNK, StepLength};
+use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::StepProblem;
 
 /// Size of a row of the buffers that stay on the device: two vectors (B).
@@ -49,6 +49,6 @@ pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Bindi
         (Binding::Free, SCRATCH_ROW * bodies),
         (Binding::VelocitiesBefore, SCRATCH_ROW * before),
         (Binding::ImpulseSteps, SCRATCH_ROW * impulses),
-        (Binding::Lengths, size_of::<StepLength<f32>>() * impulses.div_ceil(CHUNK)),
+        (Binding::Lengths, size_of::<StepLength<f32>>() * impulses.div_ceil(IMPULSES_PER_CHUNK)),
     ]
 }

@@ -7,7 +7,7 @@ use super::bindings::declarations;
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
 use crate::kernels::Rules;
-use crate::kernels::momentum::CHUNK;
+use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::Kernel;
 
 /// Threads of a workgroup.
@@ -57,9 +57,9 @@ impl Program {
     /// Its WGSL.
     pub fn source(&self) -> String {
         match self {
-            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, "pass_colors", |calls| calls.concat()),
+            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, "pass_row.first, pass_row.end", |calls| calls.concat()),
             Self::OneDispatch(kernels, threads) => {
-                of_plan(kernels, *threads, "PassColors(step.y, step.z)", follow_passes)
+                of_plan(kernels, *threads, "step.y, step.z", follow_passes)
             }
             Self::BeginBodies => of_begin(part!("resident/begin_bodies"), "begin_body", "body_count"),
             Self::WriteContacts => of_begin(part!("resident/write_contacts"), "write_contact", "written_count"),
@@ -82,15 +82,15 @@ enum Over {
 fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
-        Kernel::IntegrateVelocities { carry } => {
-            let call = format!("integrate_velocity({carry}, row)");
-            (&[part!("integrate_velocities")], Over::Count("params.body_count"), call)
+        Kernel::IntegrateVelocities { warm_start } => {
+            let call = format!("integrate_velocity({warm_start}, row)");
+            (&[part!("integrate_velocities")], Over::Colors, call)
         }
         Kernel::IntegrateGyroscopic => {
-            (&[part!("integrate_gyroscopic")], Over::Count("params.inertia_count"), "turn_spin(row)".into())
+            (&[part!("integrate_gyroscopic")], Over::Colors, "turn_spin(row)".into())
         }
         Kernel::IntegratePositions => {
-            (&[part!("integrate_positions")], Over::Count("params.body_count"), "integrate_position(row)".into())
+            (&[part!("integrate_positions")], Over::Colors, "integrate_position(row)".into())
         }
         Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
         Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
@@ -206,7 +206,7 @@ fn text(of_plan: bool, threads: u32, parts: &[&str], loops: &str, main: &str) ->
     format!(
         "const WORKGROUP: u32 = {threads}u;
 const MAX_POINTS: u32 = {MAX_POINTS}u;
-const CHUNK: u32 = {CHUNK}u;
+const IMPULSES_PER_CHUNK: u32 = {IMPULSES_PER_CHUNK}u;
 const PASS_ROWS: u32 = {PASS_ROWS}u;
 
 {buffers}

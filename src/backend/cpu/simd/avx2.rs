@@ -2,10 +2,9 @@
 //! [`super::instructions`] enters after it has asked the processor.
 
 use std::arch::x86_64::*;
-use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT, newton_inverse_sqrt};
+use super::{Lanes, Row8, WIDTH, Wide, lane, lanes, row_at};
+use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 
 /// Two registers.
 #[derive(Clone, Copy, Debug)]
@@ -15,93 +14,28 @@ pub struct Avx2([__m256; 2]);
 // SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has been
 // detected; loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes.
 
-impl Default for Avx2 {
-    #[inline(always)]
-    fn default() -> Self {
-        Self::constant(0.0)
-    }
+/// An intrinsic for both registers.
+macro_rules! both {
+    ($intrinsic:expr; $($x:expr),*) => {
+        unsafe { [$intrinsic($($x[0]),*), $intrinsic($($x[1]),*)] }
+    };
 }
 
-impl PartialEq for Avx2 {
-    fn eq(&self, o: &Self) -> bool {
-        self.store() == o.store()
-    }
-}
-
-impl Add for Avx2 {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self(unsafe { [_mm256_add_ps(self.0[0], o.0[0]), _mm256_add_ps(self.0[1], o.0[1])] })
-    }
-}
-
-impl Sub for Avx2 {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self(unsafe { [_mm256_sub_ps(self.0[0], o.0[0]), _mm256_sub_ps(self.0[1], o.0[1])] })
-    }
-}
-
-impl Mul for Avx2 {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, o: Self) -> Self {
-        Self(unsafe { [_mm256_mul_ps(self.0[0], o.0[0]), _mm256_mul_ps(self.0[1], o.0[1])] })
-    }
-}
-
-impl Neg for Avx2 {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(unsafe {
-            let sign = _mm256_set1_ps(-0.0);
-            [_mm256_xor_ps(self.0[0], sign), _mm256_xor_ps(self.0[1], sign)]
-        })
-    }
-}
-
-impl Lane for Avx2 {
-    type Mask = [__m256; 2];
-    #[inline(always)]
-    fn constant(x: f64) -> Self {
-        Self([unsafe { _mm256_set1_ps(x as f32) }; 2])
-    }
-    #[inline(always)]
-    fn gt(self, o: Self) -> Self::Mask {
-        unsafe { [_mm256_cmp_ps::<_CMP_GT_OQ>(self.0[0], o.0[0]), _mm256_cmp_ps::<_CMP_GT_OQ>(self.0[1], o.0[1])] }
-    }
-    #[inline(always)]
-    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-        unsafe { [_mm256_and_ps(a[0], b[0]), _mm256_and_ps(a[1], b[1])] }
-    }
-    #[inline(always)]
-    fn mask(value: bool) -> Self::Mask {
-        [unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(if value { -1 } else { 0 })) }; 2]
-    }
-    #[inline(always)]
-    fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self {
-        let (f, t) = (if_false.0, if_true.0);
-        Self(unsafe { [_mm256_blendv_ps(f[0], t[0], mask[0]), _mm256_blendv_ps(f[1], t[1], mask[1])] })
-    }
-    #[inline(always)]
-    fn larger(a: Self, b: Self) -> Self {
-        Self(unsafe { [_mm256_max_ps(a.0[0], b.0[0]), _mm256_max_ps(a.0[1], b.0[1])] })
-    }
-    #[inline(always)]
-    fn smaller(a: Self, b: Self) -> Self {
-        Self(unsafe { [_mm256_min_ps(a.0[0], b.0[0]), _mm256_min_ps(a.0[1], b.0[1])] })
-    }
-    #[inline(always)]
-    fn inverse_sqrt(self) -> Self {
-        newton_inverse_sqrt(self, Self([guess(self.0[0]), guess(self.0[1])]))
-    }
-    #[inline(always)]
-    fn inverse_power(self) -> Self {
-        Self([inverse_power(self.0[0]), inverse_power(self.0[1])])
-    }
+lane! {
+    Avx2, [__m256; 2], |a, b, m|
+    neg = both!(_mm256_xor_ps; a, [_mm256_set1_ps(-0.0); 2]);
+    constant = [unsafe { _mm256_set1_ps(a) }; 2];
+    larger = both!(_mm256_max_ps; a, b);
+    smaller = both!(_mm256_min_ps; a, b);
+    gt = both!(_mm256_cmp_ps::<_CMP_GT_OQ>; a, b);
+    and = both!(_mm256_and_ps; a, b);
+    mask = [unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(if m { -1 } else { 0 })) }; 2];
+    select = both!(_mm256_blendv_ps; a, b, m);
+    inverse_sqrt_guess = [guess(a[0]), guess(a[1])];
+    inverse_power = [inverse_power(a[0]), inverse_power(a[1])];
+    Add::add = both!(_mm256_add_ps; a, b);
+    Sub::sub = both!(_mm256_sub_ps; a, b);
+    Mul::mul = both!(_mm256_mul_ps; a, b);
 }
 
 /// One over the power of two in each number.

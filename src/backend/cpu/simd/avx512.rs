@@ -2,10 +2,9 @@
 //! [`super::instructions`] enters after it has asked the processor.
 
 use std::arch::x86_64::*;
-use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT, newton_inverse_sqrt};
+use super::{Lanes, Row8, WIDTH, Wide, lane, lanes, row_at};
+use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
@@ -15,99 +14,26 @@ pub struct Avx512(__m512);
 // SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has been
 // detected; loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
 
-impl Default for Avx512 {
-    #[inline(always)]
-    fn default() -> Self {
-        Self::constant(0.0)
-    }
-}
-
-impl PartialEq for Avx512 {
-    fn eq(&self, o: &Self) -> bool {
-        self.store() == o.store()
-    }
-}
-
-impl Add for Avx512 {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self(unsafe { _mm512_add_ps(self.0, o.0) })
-    }
-}
-
-impl Sub for Avx512 {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self(unsafe { _mm512_sub_ps(self.0, o.0) })
-    }
-}
-
-impl Mul for Avx512 {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, o: Self) -> Self {
-        Self(unsafe { _mm512_mul_ps(self.0, o.0) })
-    }
-}
-
-impl Neg for Avx512 {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(unsafe {
-            let sign = _mm512_set1_epi32(i32::MIN);
-            _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(self.0), sign))
-        })
-    }
-}
-
-impl Lane for Avx512 {
-    type Mask = __mmask16;
-    #[inline(always)]
-    fn constant(x: f64) -> Self {
-        Self(unsafe { _mm512_set1_ps(x as f32) })
-    }
-    #[inline(always)]
-    fn gt(self, o: Self) -> __mmask16 {
-        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, o.0) }
-    }
-    #[inline(always)]
-    fn and(a: __mmask16, b: __mmask16) -> __mmask16 {
-        a & b
-    }
-    #[inline(always)]
-    fn mask(value: bool) -> __mmask16 {
-        if value { __mmask16::MAX } else { 0 }
-    }
-    #[inline(always)]
-    fn select(if_false: Self, if_true: Self, mask: __mmask16) -> Self {
-        Self(unsafe { _mm512_mask_blend_ps(mask, if_false.0, if_true.0) })
-    }
-    #[inline(always)]
-    fn larger(a: Self, b: Self) -> Self {
-        Self(unsafe { _mm512_max_ps(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn smaller(a: Self, b: Self) -> Self {
-        Self(unsafe { _mm512_min_ps(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn inverse_sqrt(self) -> Self {
-        let guess = unsafe {
-            let half_bits = _mm512_srli_epi32::<1>(_mm512_castps_si512(self.0));
-            Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(INVERSE_SQRT_GUESS as i32), half_bits)))
-        };
-        newton_inverse_sqrt(self, guess)
-    }
-    #[inline(always)]
-    fn inverse_power(self) -> Self {
-        Self(unsafe {
-            let exponent = _mm512_and_si512(_mm512_castps_si512(self.0), _mm512_set1_epi32(EXPONENT as i32));
-            _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(OPPOSITE_EXPONENT as i32), exponent))
-        })
-    }
+lane! {
+    Avx512, __mmask16, |a, b, m|
+    neg = unsafe { _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(a), _mm512_set1_epi32(i32::MIN))) };
+    constant = unsafe { _mm512_set1_ps(a) };
+    larger = unsafe { _mm512_max_ps(a, b) };
+    smaller = unsafe { _mm512_min_ps(a, b) };
+    gt = unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b) };
+    and = a & b;
+    mask = if m { __mmask16::MAX } else { 0 };
+    select = unsafe { _mm512_mask_blend_ps(m, a, b) };
+    inverse_sqrt_guess = unsafe {
+        _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(INVERSE_SQRT_GUESS as i32), _mm512_srli_epi32::<1>(_mm512_castps_si512(a))))
+    };
+    inverse_power = unsafe {
+        let exponent = _mm512_and_si512(_mm512_castps_si512(a), _mm512_set1_epi32(EXPONENT as i32));
+        _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(OPPOSITE_EXPONENT as i32), exponent))
+    };
+    Add::add = unsafe { _mm512_add_ps(a, b) };
+    Sub::sub = unsafe { _mm512_sub_ps(a, b) };
+    Mul::mul = unsafe { _mm512_mul_ps(a, b) };
 }
 
 impl Lanes for Avx512 {

@@ -72,3 +72,93 @@ macro_rules! lanes {
     };
 }
 pub(super) use lanes;
+
+/// Arithmetic of a type of lanes: what each function does to the registers `a` and `b` of its arguments, and for a mask `m`.
+macro_rules! lane {
+    (
+        $Type:ident, $Mask:ty, |$a:ident, $b:ident, $m:ident|
+        neg = $neg:expr; constant = $constant:expr; larger = $larger:expr; smaller = $smaller:expr;
+        gt = $gt:expr; and = $and:expr; mask = $mask:expr; select = $select:expr;
+        inverse_sqrt_guess = $guess:expr; inverse_power = $power:expr;
+        $($Op:ident::$op:ident = $result:expr;)*
+    ) => {
+        impl Default for $Type {
+            #[inline(always)]
+            fn default() -> Self {
+                Self::constant(0.0)
+            }
+        }
+
+        impl PartialEq for $Type {
+            fn eq(&self, o: &Self) -> bool {
+                self.store() == o.store()
+            }
+        }
+
+        $(impl std::ops::$Op for $Type {
+            type Output = Self;
+            #[inline(always)]
+            fn $op(self, o: Self) -> Self {
+                let ($a, $b) = (self.0, o.0);
+                Self($result)
+            }
+        })*
+
+        impl std::ops::Neg for $Type {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let $a = self.0;
+                Self($neg)
+            }
+        }
+
+        impl Lane for $Type {
+            type Mask = $Mask;
+            #[inline(always)]
+            fn constant(x: f64) -> Self {
+                let $a = x as f32;
+                Self($constant)
+            }
+            #[inline(always)]
+            fn larger(a: Self, b: Self) -> Self {
+                let ($a, $b) = (a.0, b.0);
+                Self($larger)
+            }
+            #[inline(always)]
+            fn smaller(a: Self, b: Self) -> Self {
+                let ($a, $b) = (a.0, b.0);
+                Self($smaller)
+            }
+            #[inline(always)]
+            fn gt(self, o: Self) -> $Mask {
+                let ($a, $b) = (self.0, o.0);
+                $gt
+            }
+            #[inline(always)]
+            fn and($a: $Mask, $b: $Mask) -> $Mask {
+                $and
+            }
+            #[inline(always)]
+            fn mask($m: bool) -> $Mask {
+                $mask
+            }
+            #[inline(always)]
+            fn select(if_false: Self, if_true: Self, $m: $Mask) -> Self {
+                let ($a, $b) = (if_false.0, if_true.0);
+                Self($select)
+            }
+            #[inline(always)]
+            fn inverse_sqrt(self) -> Self {
+                let $a = self.0;
+                crate::math::newton_inverse_sqrt(self, Self($guess))
+            }
+            #[inline(always)]
+            fn inverse_power(self) -> Self {
+                let $a = self.0;
+                Self($power)
+            }
+        }
+    };
+}
+use lane;

@@ -1,77 +1,28 @@
 //! Sixteen numbers in plain Rust: right on every target.
 
-use std::ops::{Add, Mul, Neg, Sub};
-
-use super::{Lanes, Row8, WIDTH, Wide, lanes, row_at};
-use crate::math::Lane;
+use super::{Lanes, Row8, WIDTH, Wide, lane, lanes, row_at};
+use crate::math::{INVERSE_SQRT_GUESS, Lane};
 
 /// Sixteen numbers; the compiler chooses the registers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub struct Portable(Wide);
 
-impl Add for Portable {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self(Wide(lanes!(i => self.0.0[i] + o.0.0[i])))
-    }
-}
-
-impl Sub for Portable {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self(Wide(lanes!(i => self.0.0[i] - o.0.0[i])))
-    }
-}
-
-impl Mul for Portable {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, o: Self) -> Self {
-        Self(Wide(lanes!(i => self.0.0[i] * o.0.0[i])))
-    }
-}
-
-impl Neg for Portable {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(Wide(self.0.0.map(|x| -x)))
-    }
-}
-
-impl Lane for Portable {
-    type Mask = [bool; WIDTH];
-    #[inline(always)]
-    fn constant(x: f64) -> Self {
-        Self(Wide([x as f32; WIDTH]))
-    }
-    #[inline(always)]
-    fn gt(self, o: Self) -> Self::Mask {
-        std::array::from_fn(|i| self.0.0[i] > o.0.0[i])
-    }
-    #[inline(always)]
-    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-        std::array::from_fn(|i| a[i] && b[i])
-    }
-    #[inline(always)]
-    fn mask(value: bool) -> Self::Mask {
-        [value; WIDTH]
-    }
-    #[inline(always)]
-    fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self {
-        Self(Wide(std::array::from_fn(|i| if mask[i] { if_true.0.0[i] } else { if_false.0.0[i] })))
-    }
-    #[inline(always)]
-    fn inverse_sqrt(self) -> Self {
-        Self(Wide(self.0.0.map(Lane::inverse_sqrt)))
-    }
-    #[inline(always)]
-    fn inverse_power(self) -> Self {
-        Self(Wide(self.0.0.map(Lane::inverse_power)))
-    }
+lane! {
+    Portable, [bool; WIDTH], |a, b, m|
+    neg = Wide(lanes!(i => -a.0[i]));
+    constant = Wide([a; WIDTH]);
+    larger = Wide(lanes!(i => Lane::larger(a.0[i], b.0[i])));
+    smaller = Wide(lanes!(i => Lane::smaller(a.0[i], b.0[i])));
+    gt = lanes!(i => a.0[i] > b.0[i]);
+    and = lanes!(i => a[i] && b[i]);
+    mask = [m; WIDTH];
+    select = Wide(lanes!(i => if m[i] { b.0[i] } else { a.0[i] }));
+    inverse_sqrt_guess = Wide(a.0.map(|x| f32::from_bits(INVERSE_SQRT_GUESS.wrapping_sub(x.to_bits() >> 1))));
+    inverse_power = Wide(a.0.map(Lane::inverse_power));
+    Add::add = Wide(lanes!(i => a.0[i] + b.0[i]));
+    Sub::sub = Wide(lanes!(i => a.0[i] - b.0[i]));
+    Mul::mul = Wide(lanes!(i => a.0[i] * b.0[i]));
 }
 
 impl Lanes for Portable {
