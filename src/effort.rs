@@ -11,6 +11,7 @@
 use crate::config::{Method, SolverConfig};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
+use crate::stats::{EFFORT_CLASSES, HardestContact};
 use crate::world::{BodyKind, World};
 
 /// A constraint, for the effort that its island takes.
@@ -36,6 +37,8 @@ pub struct Effort {
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
     highest: u8,
+    /// Bodies that are awake and can be pushed, class by class.
+    counts: [u32; EFFORT_CLASSES],
     islands: Islands,
     /// The need and the class of the island whose root each body is.
     of_root: Vec<(f32, u8, u8)>,
@@ -45,8 +48,15 @@ pub struct Effort {
 const CALM_STEPS: u8 = 60;
 /// The share of the promise that the lower class has to keep.
 const CALM_SHARE: f32 = 0.5;
-/// Most classes: 4096 substeps are the most that the settings take.
-const MOST_CLASSES: u8 = 12;
+/// The highest class of all.
+const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
+
+/// The interface that asks for most.
+pub fn hardest(interfaces: impl Iterator<Item = Interface>) -> Option<HardestContact> {
+    let harder = |a: Interface, b: Interface| if b.need > a.need { b } else { a };
+    let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
+    interfaces.reduce(harder).map(|i| HardestContact { bodies: [body(i.a), body(i.b)], need: i.need })
+}
 
 /// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
@@ -55,7 +65,7 @@ pub fn lasting(now: f32, before: f32) -> f32 {
 
 /// The lowest class that keeps the promise.
 fn class_for(need: f32) -> u8 {
-    (0..MOST_CLASSES).find(|&class| need <= sag_factor(class)).unwrap_or(MOST_CLASSES)
+    (0..HIGHEST).find(|&class| need <= sag_factor(class)).unwrap_or(HIGHEST)
 }
 
 /// How much deeper a contact would sag in class 0 than in this class.
@@ -137,16 +147,16 @@ impl Effort {
             *calm = (*calm).min(self.calm_for[body]);
         }
         let mut changed = false;
-        let mut used = [false; MOST_CLASSES as usize + 1];
+        self.counts = [0; EFFORT_CLASSES];
         for body in (0..bodies).filter(|&body| is_awake(body)) {
             let (need, before, calm) = self.of_root[self.islands.root(body as u32) as usize];
             let (class, calm) = self.next(need, before, calm);
             changed |= class != self.classes[body];
             (self.classes[body], self.calm_for[body]) = (class, calm);
-            used[usize::from(class)] |= world.bodies[body].kind == BodyKind::Dynamic;
+            self.counts[usize::from(class)] += u32::from(world.bodies[body].kind == BodyKind::Dynamic);
         }
         self.used.clear();
-        self.used.extend((0..=MOST_CLASSES).filter(|&class| used[usize::from(class)]));
+        self.used.extend((0..=HIGHEST).filter(|&class| self.counts[usize::from(class)] > 0));
         self.any_above = self.classes.iter().any(|&class| class > 0);
         changed
     }
@@ -161,6 +171,21 @@ impl Effort {
             return (class, 0);
         }
         if calm + 1 < CALM_STEPS { (class, calm + 1) } else { (class - 1, 0) }
+    }
+
+    /// Bodies that are awake and can be pushed, class by class; `bodies` of them in all.
+    pub fn counts(&self, bodies: u32) -> [u32; EFFORT_CLASSES] {
+        if self.used.len() > 1 || self.used.last().is_some_and(|&class| class > 0) {
+            return self.counts;
+        }
+        let mut counts = [0; EFFORT_CLASSES];
+        counts[0] = bodies;
+        counts
+    }
+
+    /// The class of a body.
+    pub fn class_of(&self, body: usize) -> u8 {
+        self.classes.get(body).copied().unwrap_or(0)
     }
 
     /// The number of blocks.
@@ -183,6 +208,6 @@ impl Effort {
 
     /// The length of the substeps of a body over that of class 0.
     pub fn share(&self, body: usize) -> f32 {
-        self.classes.get(body).map_or(1.0, |&class| 1.0 / (1_u32 << class) as f32)
+        1.0 / (1_u32 << self.class_of(body)) as f32
     }
 }

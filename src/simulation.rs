@@ -175,6 +175,11 @@ impl Simulation {
         self.stages.sleep.asleep().get(body) == Some(&true)
     }
 
+    /// The substeps that a body takes in a step; see [`SolverConfig::max_substeps`].
+    pub fn substeps_of(&self, body: usize) -> u32 {
+        self.config.substeps << self.stages.effort.class_of(body)
+    }
+
     /// Wakes the island of a body, if the body sleeps. A change of a sleeping body itself, of gravity or of a
     /// joint wakes it anyway.
     pub fn wake(&mut self, body: usize) {

@@ -22,6 +22,11 @@ pub struct StepStats {
     pub overflow: usize,
     /// Bodies that sleep.
     pub asleep: usize,
+    /// Bodies that are awake and can be pushed, by the class of effort of their island: in class c an island takes 2^c times the
+    /// substeps of the settings.
+    pub efforts: [u32; EFFORT_CLASSES],
+    /// The contact that asks for most substeps.
+    pub hardest: Option<HardestContact>,
     /// Joints.
     pub joints: usize,
     /// Sweeps that were done, where the settings have a tolerance; else 0.
@@ -38,6 +43,21 @@ pub struct StepStats {
     pub kernels: Vec<KernelTime>,
     /// The first body whose pose or velocity is not finite, if any.
     pub first_non_finite: Option<usize>,
+}
+
+/// Number of classes of effort: 4096 substeps are the most that the settings take.
+pub const EFFORT_CLASSES: usize = 13;
+
+/// The contact that asks for most substeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct HardestContact {
+    /// Its bodies that can be pushed; one only if the other cannot.
+    pub bodies: [Option<usize>; 2],
+    /// How deep it would sag with the substeps of the settings under what it bears for long, over the sag that the settings promise. An
+    /// island of need n takes at least the square root of n times these substeps.
+    pub need: f32,
 }
 
 /// Time that a device spent at one kernel in one step.

@@ -2,7 +2,7 @@
 
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
-use crate::effort::Effort;
+use crate::effort::{self, Effort};
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
@@ -166,6 +166,7 @@ impl Stages {
             }
             let asleep = sleep.asleep();
             let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
+            stats.hardest = effort::hardest(contacts.interfaces(world, detector));
             effort.follow(world, asleep, config, dt, interfaces)
         })
     }
@@ -187,6 +188,8 @@ impl Stages {
                 self.plan_key = Some(PlanKey::of(problem));
             }
         });
+        let awake = problem.masses.iter().filter(|mass| mass.inv_mass > 0.0).count();
+        stats.efforts = effort.counts(awake as u32);
         stats.pairs = found.pairs;
         stats.computed = found.computed;
         stats.manifolds = contacts.coloring.order.len();

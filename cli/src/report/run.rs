@@ -11,9 +11,18 @@ use drystone::backend::Backend;
 use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::scenes::{Group, Scene};
-use drystone::stats::{KernelTime, StepStats, median};
+use drystone::stats::{KernelTime, HardestContact, StepStats, median};
 use drystone::world::{Body, BodyKind, World};
 use glam::Vec3;
+
+/// Bodies whose islands take the same number of substeps.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct EffortRow {
+    /// Substeps of a step.
+    pub substeps: u32,
+    /// Number of bodies that are awake and can be pushed.
+    pub bodies: u32,
+}
 
 /// Report of one run; its fields are the keys of the JSON object.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -50,6 +59,12 @@ pub struct RunReport {
     pub manifolds: usize,
     /// Their contact points.
     pub points: usize,
+    /// Bodies by the substeps that they took in the last step in which a body was awake.
+    pub efforts: Vec<EffortRow>,
+    /// Most substeps that a body took in any step.
+    pub most_substeps: u32,
+    /// The contact that asked for most substeps in that last step.
+    pub hardest_contact: Option<HardestContact>,
     /// Bodies that sleep at the end.
     pub asleep: usize,
     /// The first step after which a body slept.
@@ -213,6 +228,11 @@ impl RunReport {
             return;
         }
         self.awake_steps += 1;
+        let efforts = (0..).zip(stats.efforts).filter(|(_, bodies)| *bodies > 0);
+        self.efforts =
+            efforts.map(|(class, bodies)| EffortRow { substeps: self.config.substeps << class, bodies }).collect();
+        self.most_substeps = self.efforts.iter().map(|row| row.substeps).fold(self.most_substeps, u32::max);
+        self.hardest_contact = stats.hardest;
         self.awake_times.push(step_ms);
         self.stage_times.push(stats.times.stages().map(|s| ms(s.1)));
         for kernel in &stats.kernels {

@@ -9,7 +9,7 @@ use super::simd::{Lanes, Row8, WIDTH, Work, lanes};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Free, Inertia, Mass, StepParams};
-use crate::math::{Quat, Vec3, vec3};
+use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, Params, StepProblem, Substep};
 
@@ -30,22 +30,24 @@ pub(super) fn place(body: usize) -> u32 {
     u32::try_from(body * size_of::<State>() / 8).expect("fewer than 268 million bodies")
 }
 
-impl State {
-    /// As the body of a kernel.
-    pub fn load(&self) -> Body<f32> {
-        let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (self.velocity.0, self.movement.0);
-        Body {
-            v: vec3(vx, vy, vz),
-            w: vec3(wx, wy, wz),
-            dp: vec3(px, py, pz),
-            dq: Quat { axis: vec3(qx, qy, qz), w: qw },
-        }
-    }
+/// The body of a kernel from the numbers of a state.
+#[inline(always)]
+fn body<L>(velocity: [L; 8], [px, py, pz, _, qx, qy, qz, qw]: [L; 8]) -> Body<L> {
+    let Free { v, w } = free_body(velocity);
+    Body { v, w, dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
 }
 
-/// Two velocities in a row.
-fn velocity_row(v: Vec3<f32>, w: Vec3<f32>) -> Row8 {
-    Row8([v.x, v.y, v.z, 0.0, w.x, w.y, w.z, 0.0])
+/// Free velocities from the numbers of a row.
+#[inline(always)]
+fn free_body<L>([vx, vy, vz, _, wx, wy, wz, _]: [L; 8]) -> Free<L> {
+    Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) }
+}
+
+/// The numbers of a row of velocities.
+#[inline(always)]
+fn velocity_numbers<L: Lane>(v: Vec3<L>, w: Vec3<L>) -> [L; 8] {
+    let zero = L::constant(0.0);
+    [v.x, v.y, v.z, zero, w.x, w.y, w.z, zero]
 }
 
 /// Takes over some bodies of a problem. Each task has its own bodies, here and below.
@@ -112,9 +114,8 @@ impl Work for BodyWork<'_> {
                         L::gathered(rows.as_ptr(), &NEIGHBORING_ROWS),
                     )
                 };
-                let ([x, y, z, ..], [vx, vy, vz, _, wx, wy, wz, _]) = (acceleration, free);
+                let ([x, y, z, ..], mut free) = (acceleration, free_body(free));
                 let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
-                let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
                 integrate_velocities(warm_start, &params, &mass, &mut body, &mut free);
                 rows.copy_from_slice(&velocity_rows(free.v, free.w));
             } else {
@@ -141,11 +142,10 @@ pub(super) fn integrate_spins(
     for (slot, inertia) in inertias {
         // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
         let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
-        let (mut body, [vx, vy, vz, _, wx, wy, wz, _]) = (state.load(), row.0);
-        let mut free = Free { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz) };
+        let (mut body, mut free) = (body(state.velocity.0, state.movement.0), free_body(row.0));
         integrate_gyroscopic(&params, inertia, &mut body, &mut free);
-        state.velocity = velocity_row(body.v, body.w);
-        *row = velocity_row(free.v, free.w);
+        state.velocity = Row8(velocity_numbers(body.v, body.w));
+        *row = Row8(velocity_numbers(free.v, free.w));
     }
 }
 
@@ -186,14 +186,12 @@ pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WI
     let (velocity, movement) = unsafe {
         (L::gathered(&raw const (*states).velocity, places), L::gathered(&raw const (*states).movement, places))
     };
-    let ([vx, vy, vz, _, wx, wy, wz, _], [px, py, pz, _, qx, qy, qz, qw]) = (velocity, movement);
-    Body { v: vec3(vx, vy, vz), w: vec3(wx, wy, wz), dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
+    body(velocity, movement)
 }
 
 #[inline(always)]
 pub(super) fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
-    let zero = L::constant(0.0);
-    L::scattered([v.x, v.y, v.z, zero, w.x, w.y, w.z, zero])
+    L::scattered(velocity_numbers(v, w))
 }
 
 #[inline(always)]

@@ -30,11 +30,12 @@ use crate::kernels::{Inertia, Momentum};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, ConvergenceRow, JointRow, Params, StepProblem};
 use bodies::{BodyWork, State, extrapolate_velocities, integrate_spins, load_bodies, store_bodies};
+use constraint::Constraint;
 use lane_layout::LaneLayout;
 use partition::Partition;
 use shared::Shared;
 use simd::{InstructionSet, Row8, WIDTH, Wide};
-use sweep::{Sweep, Swept, clear_impulses};
+use sweep::{Sweep, clear_impulses};
 use threads::Threads;
 
 /// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
@@ -42,10 +43,11 @@ use threads::Threads;
 const UNDIVIDED: usize = 60_000;
 
 /// The backend of the processor.
+#[derive(Default)]
 pub struct Cpu {
     instructions: InstructionSet,
-    /// Problems with fewer bodies and constraints are one part.
-    undivided: usize,
+    /// Problems with fewer bodies and constraints are one part; [`UNDIVIDED`] if not given.
+    undivided: Option<usize>,
     partition: Partition,
     bodies: Vec<State>,
     free: Vec<Row8>,
@@ -63,51 +65,25 @@ pub struct Cpu {
     lengths: Vec<StepLength<f32>>,
 }
 
-impl Default for Cpu {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Cpu {
     /// A backend on the best instruction set that the processor has.
     pub fn new() -> Self {
-        Self::on(InstructionSet::best())
+        Self::default()
     }
 
     /// A backend on each instruction set that the processor has, to compare: first on what every processor has, last the best.
     pub fn each() -> impl Iterator<Item = Self> {
-        InstructionSet::each().map(Self::on)
+        InstructionSet::each().map(|instructions| Self { instructions, ..Self::default() })
     }
 
     /// The same, but problems of more than `size` bodies and constraints are divided into parts that fit in a core's cache, if they
     /// have small islands. No result depends on `size`.
     pub fn dividing_above(self, size: usize) -> Self {
-        Self { undivided: size, ..self }
-    }
-
-    fn on(instructions: InstructionSet) -> Self {
-        Self {
-            instructions,
-            undivided: UNDIVIDED,
-            partition: Partition::default(),
-            bodies: Vec::new(),
-            free: Vec::new(),
-            accelerations: Vec::new(),
-            inertias: Vec::new(),
-            contacts: LaneLayout::default(),
-            contact_impulses: Vec::new(),
-            joints: LaneLayout::default(),
-            joint_impulses: Vec::new(),
-            convergence: ConvergenceRow::default(),
-            momentum: Momentum::default(),
-            velocities_before: Vec::new(),
-            lengths: Vec::new(),
-        }
+        Self { undivided: Some(size), ..self }
     }
 
     fn load(&mut self, problem: &StepProblem, threads: &Threads) {
-        self.partition.update(problem, self.undivided);
+        self.partition.update(problem, self.undivided.unwrap_or(UNDIVIDED));
         let slots = &self.partition.slots;
         let len = self.partition.all_bodies().len() * WIDTH;
         reset(&mut self.bodies, len);
@@ -273,7 +249,7 @@ impl SharedStep<'_> {
         }
     }
 
-    fn sweep<C: Swept>(
+    fn sweep<C: Constraint>(
         &self,
         pass: &Pass,
         part: usize,

@@ -12,10 +12,10 @@ use super::shared::Shared;
 use super::simd::{Lanes, WIDTH, Wide, Work, row_at};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, Rules, StepParams, Sym3};
+use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{ContactRow, JointRow, Params, Substep};
+use crate::problem::{Params, Substep};
 
 /// A pass over the groups of one color.
 pub(super) struct Sweep<'a, C> {
@@ -29,7 +29,7 @@ pub(super) struct Sweep<'a, C> {
     pub moving: &'a AtomicBool,
 }
 
-impl<C: Swept> Work for Sweep<'_, C> {
+impl<C: Constraint> Work for Sweep<'_, C> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = StepParams::<L>::load(self.params, self.substep);
@@ -39,82 +39,46 @@ impl<C: Swept> Work for Sweep<'_, C> {
     }
 }
 
-impl<C: Swept> Sweep<'_, C> {
+impl<C: Constraint> Sweep<'_, C> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
-        let states = self.bodies.as_ptr();
+        let (kernel, states) = (self.kernel, self.bodies.as_ptr());
         // SAFETY: `BodyLanes::set` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
         // holds that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
-        let rules = self.kernel.rules().unwrap_or_default();
+        let rules = kernel.rules().unwrap_or_default();
         let rows = group.impulses();
-        let points = if C::HAS_POINTS { &self.layout.points[rows.clone()] } else { &[] };
         // Impulses and rows are used in place: copies were most of what a sweep moved.
         // SAFETY: `Impulse` is `repr(C)` and holds lanes only; `LaneLayout::make_groups` gives each group impulses of its own.
-        let impulses: &mut [Impulse<L>] = unsafe { as_lanes_mut(self.impulses.slice(rows)) };
-        C::apply(self.kernel, rules, params, &mut pair, &group.header, points, impulses);
-        // SAFETY: as above.
-        unsafe { store_pair(states, &group.a, &group.b, &pair) };
-        note_moving(rules, &pair, self.moving);
-    }
-}
-
-/// A constraint that sweeps change.
-pub(super) trait Swept: Constraint {
-    /// Applies a kernel to sixteen constraints.
-    fn apply<L: Lanes>(
-        kernel: Kernel,
-        rules: Rules,
-        params: &StepParams<L>,
-        pair: &mut Pair<L>,
-        header: &[Wide; 11],
-        points: &[[Wide; 12]],
-        impulses: &mut [Impulse<L>],
-    );
-}
-
-impl Swept for ContactRow {
-    #[inline(always)]
-    fn apply<L: Lanes>(
-        kernel: Kernel,
-        rules: Rules,
-        params: &StepParams<L>,
-        pair: &mut Pair<L>,
-        header: &[Wide; 11],
-        points: &[[Wide; 12]],
-        impulses: &mut [Impulse<L>],
-    ) {
-        // SAFETY: `Contact` and `Point` are `repr(C)` and hold lanes only.
-        let (contact, points): (&Contact<L>, &[Point<L>]) =
-            unsafe { (&as_lanes(std::slice::from_ref(header))[0], as_lanes(points)) };
-        match kernel {
-            Kernel::WarmStart(_) => warm_start(rules, pair, contact, points, impulses),
-            Kernel::SolveContacts(_) => solve_contact(rules, params, pair, contact, points, impulses),
-            _ => restitute_contact(rules, params, pair, contact, points, impulses),
-        }
-    }
-}
-
-impl Swept for JointRow {
-    #[inline(always)]
-    fn apply<L: Lanes>(
-        kernel: Kernel,
-        rules: Rules,
-        params: &StepParams<L>,
-        pair: &mut Pair<L>,
-        header: &[Wide; 11],
-        _: &[[Wide; 12]],
-        impulses: &mut [Impulse<L>],
-    ) {
-        let [joint @ .., _, _]: &[Wide; 11] = header;
-        // SAFETY: `Joint` is `repr(C)` and holds lanes only.
-        let joint: &Joint<L> = unsafe { &as_lanes::<_, 9>(std::slice::from_ref(joint))[0] };
-        let mut impulse = impulses[0].components();
-        if matches!(kernel, Kernel::WarmStartJoints) {
-            warm_start_joint(pair, joint, impulse);
+        let impulses: &mut [Impulse<L>] = unsafe { as_lanes_mut(self.impulses.slice(rows.clone())) };
+        if C::HAS_POINTS {
+            // SAFETY: `Contact` and `Point` are `repr(C)` and hold lanes only.
+            let (contact, points): (&Contact<L>, &[Point<L>]) =
+                unsafe { (&as_lanes(std::slice::from_ref(&group.header))[0], as_lanes(&self.layout.points[rows])) };
+            match kernel {
+                Kernel::WarmStart(_) => warm_start(rules, &mut pair, contact, points, impulses),
+                Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, contact, points, impulses),
+                _ => restitute_contact(rules, params, &mut pair, contact, points, impulses),
+            }
         } else {
-            solve_joint(rules, params, pair, joint, &mut impulse);
-            impulses[0].set_components(impulse);
+            let [joint @ .., _, _]: &[Wide; 11] = &group.header;
+            // SAFETY: `Joint` is `repr(C)` and holds lanes only.
+            let joint: &Joint<L> = unsafe { &as_lanes::<_, 9>(std::slice::from_ref(joint))[0] };
+            let mut impulse = impulses[0].components();
+            if matches!(kernel, Kernel::WarmStartJoints) {
+                warm_start_joint(&mut pair, joint, impulse);
+            } else {
+                solve_joint(rules, params, &mut pair, joint, &mut impulse);
+                impulses[0].set_components(impulse);
+            }
+        }
+        // SAFETY: as above.
+        unsafe {
+            store_velocities(states, &group.a, &pair.a);
+            store_velocities(states, &group.b, &pair.b);
+        }
+        if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
+            self.moving.store(true, Ordering::Relaxed);
         }
     }
 }
@@ -124,14 +88,6 @@ pub(super) fn clear_impulses(impulses: &Shared<[Wide; 4]>, range: Range<usize>) 
     // SAFETY: tasks have different parts, and `LaneLayout::impulses_of` gives each part impulses of its own.
     for impulse in unsafe { impulses.slice(range) } {
         impulse[..3].fill(Wide::default());
-    }
-}
-
-/// Sets `moving` if the correction of a lane was above the tolerance.
-#[inline(always)]
-fn note_moving<L: Lanes>(rules: Rules, pair: &Pair<L>, moving: &AtomicBool) {
-    if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
-        moving.store(true, Ordering::Relaxed);
     }
 }
 
@@ -153,19 +109,6 @@ unsafe fn wide_pair<L: Lanes>(states: *const State, a: &BodyLanes, b: &BodyLanes
     }
 }
 
-/// Writes what can move of a pair.
-///
-/// # Safety
-/// The places are those of states, and no other thread uses those that can move meanwhile.
-#[inline(always)]
-unsafe fn store_pair<L: Lanes>(states: *mut State, a: &BodyLanes, b: &BodyLanes, pair: &Pair<L>) {
-    // SAFETY: the caller's promise.
-    unsafe {
-        store_velocities(states, a, &pair.a);
-        store_velocities(states, b, &pair.b);
-    }
-}
-
 /// # Safety
 /// As of [`wide_pair`].
 #[inline(always)]
@@ -178,7 +121,7 @@ unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Ma
 /// Writes the velocities of those that can move.
 ///
 /// # Safety
-/// As of [`store_pair`].
+/// The places are those of states, and no other thread uses those that can move meanwhile.
 #[inline(always)]
 unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, body: &Body<L>) {
     let BodyLanes { places, movable } = *bodies;

@@ -117,7 +117,7 @@ fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
 fn peak(pool: &rayon::ThreadPool) -> f64 {
     const ROUNDS: usize = 1_000_000;
     let begin = Instant::now();
-    pool.broadcast(|_| InstructionSet::best().run(&Chains, 0..ROUNDS));
+    pool.broadcast(|_| InstructionSet::default().run(&Chains, 0..ROUNDS));
     let done = pool.current_num_threads() * ROUNDS * 2 * CHAINS * WIDTH;
     done as f64 / begin.elapsed().as_secs_f64()
 }

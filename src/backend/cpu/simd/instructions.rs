@@ -37,11 +37,6 @@ impl InstructionSet {
         known.into_iter().filter(has)
     }
 
-    /// The best that this processor has.
-    pub fn best() -> Self {
-        Self::each().next_back().unwrap_or(Self::Portable)
-    }
-
     /// Its name, for people.
     pub fn name(self) -> &'static str {
         match self {
@@ -51,6 +46,13 @@ impl InstructionSet {
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => "AVX-512",
         }
+    }
+}
+
+impl Default for InstructionSet {
+    /// The best that this processor has.
+    fn default() -> Self {
+        Self::each().next_back().unwrap_or(Self::Portable)
     }
 }
 
