@@ -4,9 +4,11 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use drystone::config::FrictionAt;
 use drystone::stages::collide::Detector;
+use drystone::stages::effort::Effort;
 use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::{ContactRows, begin};
+
+use drystone::stages::problem::{ContactRows, JointRows, begin, lay_out};
 use drystone::{Backend, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.
@@ -51,18 +53,21 @@ fn stages(c: &mut Criterion) {
 
     let mut problem = StepProblem::default();
     let mut contacts = ContactRows::default();
-    begin(&world, &[], &config, dt, &mut problem);
+    let effort = Effort::default();
+    begin(&world, &[], &config, &mut problem);
     contacts.follow(&world, &mut detector);
     contacts.color(&world, config.max_colors);
     group.bench_function("rows, written again", |b| {
         b.iter(|| {
             contacts.write_again();
-            contacts.write(&world, &detector, &config, dt, &mut problem);
+            contacts.write(&world, &detector, &config, &effort, dt, &mut problem);
         });
     });
     group.bench_function("rows, carried", |b| {
-        b.iter(|| contacts.write(&world, &detector, &config, dt, &mut problem));
+        b.iter(|| contacts.write(&world, &detector, &config, &effort, dt, &mut problem));
     });
+    let joints = JointRows::default();
+    lay_out(&world, &[], &config, &effort, dt, (&contacts, &joints), &mut problem);
     group.bench_function("plan", |b| b.iter(|| StepPlan::new(&config, &problem)));
 }
 

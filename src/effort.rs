@@ -40,8 +40,30 @@ pub struct Effort {
     /// Bodies that are awake and can be pushed, class by class.
     counts: [u32; EFFORT_CLASSES],
     islands: Islands,
-    /// The need and the class of the island whose root each body is.
-    of_root: Vec<(f32, u8, u8)>,
+    /// The island whose root each body is.
+    of_root: Vec<Island>,
+}
+
+/// What decides the class of an island.
+#[derive(Clone, Copy, Debug)]
+struct Island {
+    /// The largest need of its contacts.
+    need: f32,
+    contacts: u32,
+    bodies: u32,
+    /// The highest class of its bodies, and the fewest steps for which any was calm.
+    class: u8,
+    calm_for: u8,
+}
+
+impl Island {
+    const NONE: Self = Self { need: 0.0, contacts: 0, bodies: 0, class: 0, calm_for: u8::MAX };
+
+    /// The need that counts. A column hands its load on through one contact a body and sways where that contact is soft; in a heap with several
+    /// contacts a body, the load of a contact has other ways.
+    fn counted_need(&self) -> f32 {
+        self.need * (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0)
+    }
 }
 
 /// Steps after which an island goes down one class.
@@ -108,14 +130,16 @@ impl Effort {
 
     /// Classes by the loads of statics.
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
-        for load in Load::all(world, config) {
+        let loads = Load::all(world, config);
+        let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+        let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
-            let need = load.overlap(config.substeps, dt, config) / f64::from(config.promised_sag(size[0].min(size[1])));
-            let class = class_for(need as f32).min(self.highest);
-            for body in [load.upper, load.lower] {
-                self.classes[body] = self.classes[body].max(class);
-            }
-        }
+            let sag = load.overlap(config.substeps, dt, config);
+            let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
+            let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
+            Interface { a, b, need: need as f32 }
+        };
+        self.follow_islands(world, &[], loads.iter().map(interface));
     }
 
     fn follow_islands(
@@ -132,25 +156,27 @@ impl Effort {
             }
         }
         self.of_root.clear();
-        self.of_root.resize(bodies, (0.0, 0, u8::MAX));
+        self.of_root.resize(bodies, Island::NONE);
         for Interface { a, b, need } in interfaces {
             let body = if a == IMMOVABLE { b } else { a };
             if body != IMMOVABLE {
-                let root = self.islands.root(body) as usize;
-                self.of_root[root].0 = self.of_root[root].0.max(need);
+                let island = &mut self.of_root[self.islands.root(body) as usize];
+                island.need = island.need.max(need);
+                island.contacts += 1;
             }
         }
         let is_awake = |body: usize| asleep.get(body) != Some(&true) && world.bodies[body].kind != BodyKind::Fixed;
         for body in (0..bodies).filter(|&body| is_awake(body)) {
-            let (_, class, calm) = &mut self.of_root[self.islands.root(body as u32) as usize];
-            *class = (*class).max(self.classes[body]);
-            *calm = (*calm).min(self.calm_for[body]);
+            let island = &mut self.of_root[self.islands.root(body as u32) as usize];
+            island.bodies += 1;
+            island.class = island.class.max(self.classes[body]);
+            island.calm_for = island.calm_for.min(self.calm_for[body]);
         }
         let mut changed = false;
         self.counts = [0; EFFORT_CLASSES];
         for body in (0..bodies).filter(|&body| is_awake(body)) {
-            let (need, before, calm) = self.of_root[self.islands.root(body as u32) as usize];
-            let (class, calm) = self.next(need, before, calm);
+            let island = self.of_root[self.islands.root(body as u32) as usize];
+            let (class, calm) = self.next(&island);
             changed |= class != self.classes[body];
             (self.classes[body], self.calm_for[body]) = (class, calm);
             self.counts[usize::from(class)] += u32::from(world.bodies[body].kind == BodyKind::Dynamic);
@@ -161,8 +187,9 @@ impl Effort {
         changed
     }
 
-    /// The class of an island, and how long it has been calm.
-    fn next(&self, need: f32, class: u8, calm: u8) -> (u8, u8) {
+    /// The next class of an island, and for how long it has been calm.
+    fn next(&self, island: &Island) -> (u8, u8) {
+        let (need, class) = (island.counted_need(), island.class);
         let wanted = class_for(need);
         if wanted >= class || class > self.highest {
             return (wanted.min(self.highest), 0);
@@ -170,7 +197,7 @@ impl Effort {
         if need > CALM_SHARE * sag_factor(class - 1) {
             return (class, 0);
         }
-        if calm + 1 < CALM_STEPS { (class, calm + 1) } else { (class - 1, 0) }
+        if island.calm_for + 1 < CALM_STEPS { (class, island.calm_for + 1) } else { (class - 1, 0) }
     }
 
     /// Bodies that are awake and can be pushed, class by class; `bodies` of them in all.

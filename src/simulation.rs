@@ -84,8 +84,14 @@ impl Simulation {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
         let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> =
-            self.stages.plan.passes.chunk_by(|p, q| p.block == q.block).flat_map(|own| own.iter().take_while(forces)).cloned().collect();
+        let first: Vec<_> = self
+            .stages
+            .plan
+            .passes
+            .chunk_by(|p, q| p.block == q.block)
+            .flat_map(|own| own.iter().take_while(forces))
+            .cloned()
+            .collect();
         let mut problem = self.stages.problem.clone();
         Reference::<f32>::new().run(&mut problem, &first)?;
         let contacts = ContactProblem::of_step(name.into(), &problem);

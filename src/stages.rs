@@ -8,6 +8,11 @@ pub mod collide {
     pub use crate::collide::*;
 }
 
+/// The substeps of each island.
+pub mod effort {
+    pub use crate::effort::*;
+}
+
 /// Colors: no body twice in one.
 pub mod graph {
     pub use crate::graph::*;

@@ -212,7 +212,7 @@ fn forces_stay_as_they_are_in_a_step_of_another_length() {
             let (next, _) = simulation.next_problem(dt).expect("a step");
             let substep = dt / config.substeps as f32;
             let old = simulation.problem().clone();
-            let factor = substep / old.params.substep;
+            let factor = substep / old.blocks[0].substep.length;
             assert_eq!(old.points.len(), next.points.len(), "the same contacts");
             let all = |p: &StepProblem| -> Vec<f32> {
                 let contacts = p.impulses.iter().flat_map(|i| [i.normal, i.tangent_1, i.tangent_2]);

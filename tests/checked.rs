@@ -63,20 +63,45 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
     }
 }
 
+/// Where the rows of one kind of colors stand in the order: contacts, joints, bodies or rows of inertia.
+fn places(problem: &StepProblem, kind: usize) -> std::ops::Range<usize> {
+    let colors = &problem.blocks[0].colors()[kind];
+    problem.colors[colors.start as usize] as usize..problem.colors[colors.end as usize] as usize
+}
+
+/// Puts a row into a place of one kind of colors.
+fn put(problem: &mut StepProblem, kind: usize, place: usize, row: u32) {
+    let first = places(problem, kind).start;
+    problem.order[first + place] = row;
+}
+
+/// Gives the first of two blocks all constraints, and the second all bodies.
+fn second_block(problem: &mut StepProblem) {
+    let mut second = problem.blocks[0];
+    second.contacts = [second.contacts[1]; 2];
+    second.joints = [second.joints[1]; 2];
+    let bodies = problem.blocks[0].bodies as usize;
+    problem.colors.insert(bodies, problem.colors[bodies]);
+    problem.colors.insert(bodies + 2, problem.colors[bodies + 2]);
+    (second.bodies, second.inertias) = (second.bodies + 1, second.inertias + 2);
+    problem.blocks[0].inertias += 1;
+    problem.blocks.push(second);
+}
+
 #[test]
 fn what_is_not_there_is_refused_by_row_and_field() {
     let (problem, plan) = step(&[]);
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 27] = [
+    let cases: [(&str, Break); 34] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
         ("params.body_count: ", |p, _| p.params.body_count += 1),
         ("params.point_count: ", |p, _| p.params.point_count += 1),
         ("params.joint_count: ", |p, _| p.params.joint_count += 1),
-        ("params.inertia_count: ", |p, _| p.params.inertia_count += 1),
+        ("order: ", |p, _| p.inertias.push(p.inertias[0])),
         ("contacts[1]: bodies", |p, n| p.contacts[1].body_b = n),
         ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
@@ -88,29 +113,34 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[0].first_point", |p, _| p.contacts[0].first_point = p.points.len() as u32),
         ("contacts[2].first_point = 0: points of contacts[0] are there", |p, _| {
             p.contacts[2].first_point = 0;
-            p.order.sort_unstable_by_key(|&row| row);
-            p.colors = vec![0, p.order.len() as u32];
-            p.first_joint_color = 1;
-            p.order.retain(|&row| row == 0 || row == 2);
-            p.order.dedup();
-            p.colors[1] = 2;
+            p.order = vec![0, 2];
+            p.colors = vec![0, 2];
+            p.in_one_block(1, p.blocks[0].substep);
         }),
-        ("first_joint_color", |p, _| p.first_joint_color = p.colors.len() as u32),
+        ("blocks[0]: colors", |p, _| p.blocks[0].contacts[1] = p.colors.len() as u32),
+        ("blocks[0]: colors", |p, _| p.blocks[0].joints[0] += 1),
+        ("blocks[0]: colors", |p, _| p.blocks[0].bodies += 1),
+        ("blocks[0]: colors", |p, _| p.blocks[0].inertias -= 1),
+        ("blocks: 0 colors, but there are", |p, _| p.blocks.clear()),
+        ("color 0: body 1 is not of block 0, and can move", |p, _| second_block(p)),
         ("colors: must ascend", |p, _| p.colors[1] = u32::MAX),
         ("colors: must ascend", |p, _| p.colors[0] = 1),
         ("colors: must ascend", |p, _| *p.colors.last_mut().expect("joints") += 1),
         ("colors: must ascend", |p, _| p.colors.clear()),
         ("order: contact 999999, but there are", |p, _| p.order[0] = 999_999),
         ("order: contact 0 occurs twice", |p, _| p.order[..2].fill(0)),
-        ("order: joint 999999, but there are", |p, _| *p.order.last_mut().expect("joints") = 999_999),
+        ("order: joint 999999, but there are", |p, _| put(p, 1, 0, 999_999)),
         ("order: joint 0 occurs twice", |p, _| {
-            let joints = p.order.len() - 2;
-            p.order[joints..].fill(0);
+            let joints = places(p, 1);
+            p.order[joints].fill(0);
         }),
+        ("order: body 999999, but there are", |p, _| put(p, 2, 0, 999_999)),
+        ("order: body 0 occurs twice", |p, _| put(p, 2, 1, 0)),
         ("color 0: body", |p, _| {
             // All contacts in one color.
-            p.colors.splice(1..p.first_joint_color as usize, []);
-            p.first_joint_color = 1;
+            p.order = (0..p.contacts.len() as u32).collect();
+            p.colors = vec![0, p.order.len() as u32];
+            p.in_one_block(1, p.blocks[0].substep);
         }),
     ];
     for (start, spoil) in cases {
@@ -125,10 +155,12 @@ fn what_is_not_there_is_refused_by_row_and_field() {
 #[test]
 fn a_joint_color_with_a_body_twice_is_refused() {
     let (mut problem, plan) = step(&[]);
-    let first = problem.first_joint_color as usize;
-    problem.colors.truncate(first + 1);
-    problem.colors.push(problem.order.len() as u32);
-    let line = refusal(problem, &plan.passes[..1]).expect("refused");
+    let (contacts, joints) = (problem.contact_colors().len(), places(&problem, 1));
+    problem.order.truncate(joints.end);
+    problem.colors.truncate(contacts + 1);
+    problem.colors.push(joints.end as u32);
+    problem.in_one_block(contacts as u32, problem.blocks[0].substep);
+    let line = refusal(problem, &plan.passes[..0]).expect("refused");
     assert!(line.contains("occurs twice, and can move"), "{line}");
 }
 
@@ -139,14 +171,14 @@ fn passes_over_colors_that_are_not_there_are_refused() {
     let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
     let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));
     let bodies = of(|k| matches!(k, Kernel::IntegratePositions));
-    let all = problem.colors.len() as u32 - 1;
+    let (first_joint, all) = (problem.blocks[0].joints[0], problem.colors.len() as u32 - 1);
     #[allow(clippy::reversed_empty_ranges)]
     for (pass, colors) in [
-        (contacts, 0..problem.first_joint_color + 1),
-        (contacts, problem.first_joint_color..problem.first_joint_color + 1),
+        (contacts, 0..first_joint + 1),
+        (contacts, first_joint..first_joint + 1),
         (contacts, 2..1),
         (joints, 0..1),
-        (joints, problem.first_joint_color..all + 1),
+        (joints, first_joint..all + 1),
         (bodies, 0..1),
     ] {
         let mut passes = plan.passes.clone();

@@ -202,8 +202,11 @@ fn sweeps_end_where_no_correction_is_above_the_tolerance() {
             problem.params.tolerance = tolerance;
             problem.convergence = ConvergenceRow::default();
             let once = |first| {
-                [vec![Pass { kernel: Kernel::BeginSweep { first }, colors: 0..0 }], in_one_pass(kernel, &problem)]
-                    .concat()
+                [
+                    vec![Pass { kernel: Kernel::BeginSweep { first }, block: 0, colors: 0..0 }],
+                    in_one_pass(kernel, &problem),
+                ]
+                .concat()
             };
             let passes = [once(true), once(false), once(false)].concat();
             let (ours, theirs) = (by_the_reference(&problem, &passes), after(&mut gpu, &problem, &passes));

@@ -1,10 +1,10 @@
 // begin_contacts: one thread writes the separations of the points of one manifold, how deep it sags under the impulses of the step
 // before, and its preload, which follows from that. Reads colors, separations, masses. Writes contacts, points, impulses, sags; one thread a
-// manifold. Doubles: Writer::write_slot in src/problem/write.rs, sag and preloaded in src/problem/carry.rs.
+// manifold. Doubles: Writer::write_slot in src/problem/write.rs, yielding and preloaded in src/problem/carry.rs.
 
-fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+fn yielding(share: f32, both_movable: bool, pressed: f32) -> f32 {
     let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
-    return pressed * (compliance * share) * reciprocal(mass);
+    return pressed * (compliance * share);
 }
 
 fn preloaded(before: f32, sag: f32) -> f32 {
@@ -16,16 +16,18 @@ fn begin_contact(at: u32) {
     let i = colors[resident.order + at];
     let contact = contacts[i];
     let end = contact.first_point + contact.point_count;
-    let both_movable = masses[contact.body_a].inv_mass > 0.0 && masses[contact.body_b].inv_mass > 0.0;
+    let a = masses[contact.body_a].inv_mass;
+    let b = masses[contact.body_b].inv_mass;
+    let both_movable = a > 0.0 && b > 0.0;
     var pressed = 0.0;
     var mass = 0.0;
     for (var k = contact.first_point; k < end; k++) {
         pressed += impulses[k].normal;
         mass += points[k].normal_mass;
     }
-    let own_sag = sag(contact.substep_share, both_movable, pressed, mass);
-    sags[i] = own_sag;
-    contacts[i].preload = preloaded(contact.preload, own_sag);
+    let yields = yielding(contact.substep_share, both_movable, pressed);
+    sags[i] = yields * (a + b);
+    contacts[i].preload = preloaded(contact.preload, yields * reciprocal(mass));
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
     }

@@ -78,11 +78,7 @@ pub(super) fn pile(side: u32) -> StepProblem {
     let mut problem = StepProblem {
         bodies: vec![BodyRow::AT_REST; count],
         masses: vec![mass; count],
-        params: Params {
-            body_count: count as u32,
-            relaxation: 1.0,
-            ..Params::default()
-        },
+        params: Params { body_count: count as u32, relaxation: 1.0, ..Params::default() },
         ..StepProblem::default()
     };
     // Every other contact along an axis: no body twice.

@@ -47,9 +47,7 @@ impl Pass {
                 rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if warm_start { 2 } else { 1 })
             }
             Kernel::IntegratePositions => rows.len() * (BODY + BODY / 2),
-            Kernel::IntegrateGyroscopic => {
-                rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY)
-            }
+            Kernel::IntegrateGyroscopic => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),

@@ -5,9 +5,9 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use super::StepProblem;
+use super::contacts::ContactRows;
 use super::joints::{JointRows, takes_part};
 use super::rows::Substep;
-use super::contacts::ContactRows;
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::graph::Coloring;

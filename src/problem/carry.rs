@@ -6,7 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::math::{reciprocal, smaller};
+use crate::math::smaller;
 
 /// The changes since the last step, for a backend that has the rows of that step.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,13 +57,15 @@ pub struct Preload {
 /// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
 const LARGEST_PRELOAD: f32 = 2.0;
 
-/// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, its points of `mass` together: the overlap
-/// of springs side by side. The contact is one of two bodies that can move, or of one that cannot with one that can; the length of its
-/// substeps over that of class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
-pub(super) fn sag(by: &Preload, share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
-    let compliance = if both_movable { by.movable_compliance } else { by.fixed_compliance };
-    // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
-    pressed * (compliance * share) * reciprocal(mass)
+impl Preload {
+    /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The
+    /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
+    /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
+    pub(super) fn yielding(&self, share: f32, both_movable: bool, pressed: f32) -> f32 {
+        let compliance = if both_movable { self.movable_compliance } else { self.fixed_compliance };
+        // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
+        pressed * (compliance * share)
+    }
 }
 
 /// How much a contact is preloaded that was so by `before`, when what it bears compresses its springs by `sag`. Double of the function of
@@ -82,6 +84,11 @@ mod tests {
 
     const BY: Preload = Preload { movable_compliance: 0.5, fixed_compliance: 0.25, share: 0.5, warm_start: 1 };
 
+    /// The overlap of springs side by side.
+    fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
+        BY.yielding(share, both_movable, pressed) / mass
+    }
+
     fn near(x: f32, y: f32) {
         assert!((x - y).abs() < 1e-6, "{x}, not {y}");
     }
@@ -89,21 +96,21 @@ mod tests {
     /// An impulse of 8 N s on 2 kg sags by 8 / 2 times the compliance.
     #[test]
     fn a_preload_takes_its_share_of_what_is_missing_to_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 0.0, sag(&BY, 1.0, true, 8.0, 2.0)), 1.0);
-        near(preloaded(&BY, 1.0, sag(&BY, 1.0, true, 8.0, 2.0)), 1.5);
-        near(preloaded(&BY, 0.0, sag(&BY, 1.0, false, 8.0, 2.0)), 0.5);
-        near(preloaded(&BY, 3.0, sag(&BY, 1.0, true, 8.0, 2.0)), 2.5);
+        near(preloaded(&BY, 0.0, sag(1.0, true, 8.0, 2.0)), 1.0);
+        near(preloaded(&BY, 1.0, sag(1.0, true, 8.0, 2.0)), 1.5);
+        near(preloaded(&BY, 0.0, sag(1.0, false, 8.0, 2.0)), 0.5);
+        near(preloaded(&BY, 3.0, sag(1.0, true, 8.0, 2.0)), 2.5);
     }
 
     #[test]
     fn half_a_substep_makes_a_quarter_of_the_sag() {
-        assert_eq!(4.0 * sag(&BY, 0.5, true, 4.0, 2.0), sag(&BY, 1.0, true, 8.0, 2.0));
+        assert_eq!(4.0 * sag(0.5, true, 4.0, 2.0), sag(1.0, true, 8.0, 2.0));
     }
 
     #[test]
     fn a_preload_is_at_most_twice_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 100.0, sag(&BY, 1.0, true, 8.0, 2.0)), 4.0);
-        near(preloaded(&BY, 100.0, sag(&BY, 1.0, false, 8.0, 2.0)), 2.0);
-        near(preloaded(&BY, 100.0, sag(&BY, 1.0, true, 0.0, 2.0)), 0.0);
+        near(preloaded(&BY, 100.0, sag(1.0, true, 8.0, 2.0)), 4.0);
+        near(preloaded(&BY, 100.0, sag(1.0, false, 8.0, 2.0)), 2.0);
+        near(preloaded(&BY, 100.0, sag(1.0, true, 0.0, 2.0)), 0.0);
     }
 }

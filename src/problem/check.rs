@@ -124,7 +124,8 @@ impl StepProblem {
             self.rows_of(&ends.map_or(0..0, |(a, b)| a.colors()[kind].start..b.colors()[kind].end))
         };
         let (bodies, inertias) = (all(2), all(3));
-        for (name, rows, count) in [("bodies", bodies, self.bodies.len()), ("inertias", inertias, self.inertias.len())] {
+        for (name, rows, count) in [("bodies", bodies, self.bodies.len()), ("inertias", inertias, self.inertias.len())]
+        {
             if rows.len() != count {
                 return refuse(format_args!("order: {} {name}, but there are {count}", rows.len()));
             }
@@ -168,7 +169,9 @@ impl StepProblem {
                             continue;
                         }
                         if block_of[body] != i {
-                            return refuse(format_args!("color {color}: body {body} is not of block {i}, and can move"));
+                            return refuse(format_args!(
+                                "color {color}: body {body} is not of block {i}, and can move"
+                            ));
                         }
                         if std::mem::replace(&mut seen[body], color) == color {
                             return refuse(format_args!("color {color}: body {body} occurs twice, and can move"));

@@ -44,7 +44,7 @@ pub struct StepProblem {
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
-    /// How deep each manifold sags at rest under what it bore in the step before (m); empty where nothing is to follow.
+    /// How deep the bodies of each manifold sag at rest under what it bore in the step before, face to face (m).
     pub sags: Vec<f32>,
     /// Ball joints. Only those in `order` take part.
     pub joints: Vec<JointRow>,

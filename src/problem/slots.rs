@@ -86,8 +86,15 @@ impl Slots {
                 _ => Write::Separations,
             };
             let need = if is_new { 0.0 } else { slot.need };
-            *slot =
-                Slot { world: part, pair: i, manifold: k, write: slot.write.max(write), takes_part, size: pair.size, need };
+            *slot = Slot {
+                world: part,
+                pair: i,
+                manifold: k,
+                write: slot.write.max(write),
+                takes_part,
+                size: pair.size,
+                need,
+            };
             let edge = &mut self.edges[manifold.slot as usize];
             *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
         }

@@ -7,7 +7,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::carry::{Carry, preloaded, sag};
+use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
 use super::rescale::change_share;
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow, points_a_slot};
@@ -15,7 +15,7 @@ use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
-use crate::math;
+use crate::math::{self, reciprocal};
 use crate::world::World;
 
 /// The sources of the rows of contacts.
@@ -103,8 +103,8 @@ impl Writer<'_> {
         }
         // Where the rows are on a device, the kernel begin_contacts does this.
         if slot.takes_part && !self.carry.on_device {
-            *sag = self.sag(contact, points, impulses);
-            contact.preload = preloaded(&self.carry.preload, contact.preload, *sag);
+            let (preload, load) = self.loaded(contact, points, impulses);
+            (contact.preload, *sag) = (preload, load);
             let warm_start = self.carry.preload.warm_start != 0;
             let begun =
                 |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
@@ -201,15 +201,16 @@ impl Writer<'_> {
         self.effort.share(if is_movable(row.body_a) { row.body_a } else { row.body_b } as usize)
     }
 
-    /// How deep a contact sags under the impulses that it bore in the step before.
-    fn sag(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> f32 {
-        let both = [row.body_a, row.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
+    /// The preload of a contact, and how deep its bodies sag, by the impulses that it bore in the step before.
+    fn loaded(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> (f32, f32) {
+        let [a, b] = [row.body_a, row.body_b].map(|body| self.masses[body as usize].inv_mass);
         let (mut pressed, mut mass) = (0.0, 0.0);
         for (point, impulse) in points[..row.point_count as usize].iter().zip(impulses) {
             pressed += impulse.normal;
             mass += point.normal_mass;
         }
-        sag(&self.carry.preload, row.substep_share, both, pressed, mass)
+        let yielding = self.carry.preload.yielding(row.substep_share, a > 0.0 && b > 0.0, pressed);
+        (preloaded(&self.carry.preload, row.preload, yielding * reciprocal(mass)), yielding * (a + b))
     }
 
     /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction

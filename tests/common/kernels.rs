@@ -78,18 +78,21 @@ pub fn has_patches(kernel: Kernel) -> bool {
 
 /// The colors that `kernel` goes over; none for one that goes over something else.
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
+    let [contacts, joints, bodies, inertias] = problem.blocks[0].colors();
     match kernel {
-        Kernel::WarmStartJoints | Kernel::SolveJoints(_) => problem.joint_colors(),
+        Kernel::WarmStartJoints | Kernel::SolveJoints(_) => joints,
         Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-            problem.contact_colors()
+            contacts
         }
+        Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => bodies,
+        Kernel::IntegrateGyroscopic => inertias,
         _ => 0..0,
     }
 }
 
 /// `kernel` over all of `problem` in one pass.
 pub fn in_one_pass(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
-    vec![Pass { kernel, colors: colors_of(kernel, problem) }]
+    vec![Pass { kernel, block: 0, colors: colors_of(kernel, problem) }]
 }
 
 /// Sweeps of the points and the joints of a problem that end with what comes between accelerated ones, several times.
@@ -108,5 +111,5 @@ pub fn color_by_color(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
     if colors.is_empty() {
         return in_one_pass(kernel, problem);
     }
-    colors.map(|c| Pass { kernel, colors: c..c + 1 }).collect()
+    colors.map(|c| Pass { kernel, block: 0, colors: c..c + 1 }).collect()
 }

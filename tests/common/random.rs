@@ -7,6 +7,7 @@ use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
+    Substep,
 };
 use drystone::stages::random::SplitMix64;
 use glam::{Mat3, Quat, Vec3};
@@ -73,7 +74,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
         }
     }
     let (contacts, coloring) = colored(random, CONTACTS);
-    problem.first_joint_color = coloring.color_count() as u32;
+    let contact_colors = coloring.color_count() as u32;
     (problem.order, problem.colors) = (coloring.order, coloring.offsets);
     // The last of them take no part.
     for bodies in contacts.into_iter().chain([[1, 2]; IDLE]) {
@@ -96,6 +97,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     }
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
     problem.params = params(&problem, patches);
+    problem.in_one_block(contact_colors, substep());
     problem
 }
 
@@ -139,16 +141,19 @@ pub fn faster(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem
 }
 
+fn substep() -> Substep {
+    let mut substep = Substep::default();
+    substep.length = 0.1;
+    substep.inverse_length = 1.0 / substep.length;
+    substep.movable = softness(1.5, 2.0, substep.length, 0.5);
+    substep.fixed = softness(3.0, 2.0, substep.length, 0.5);
+    substep.joint = softness(2.0, 1.0, substep.length, 0.5);
+    substep
+}
+
 fn params(problem: &StepProblem, patches: bool) -> Params {
-    let substep = 0.1;
     let mut params = Params::default();
-    params.substep = substep;
-    params.inverse_substep = 1.0 / substep;
     params.restitution_threshold = 1.0;
-    params.inertia_count = problem.inertias.len() as u32;
-    params.movable = softness(1.5, 2.0, substep, 0.5);
-    params.fixed = softness(3.0, 2.0, substep, 0.5);
-    params.joint = softness(2.0, 1.0, substep, 0.5);
     params.body_count = problem.bodies.len() as u32;
     params.point_count = problem.points.len() as u32;
     params.joint_count = problem.joints.len() as u32;

@@ -11,7 +11,7 @@ use drystone::backend::Backend;
 use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::scenes::{Group, Scene};
-use drystone::stats::{KernelTime, HardestContact, StepStats, median};
+use drystone::stats::{HardestContact, KernelTime, StepStats, median};
 use drystone::world::{Body, BodyKind, World};
 use glam::Vec3;
 

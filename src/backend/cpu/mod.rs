@@ -223,7 +223,8 @@ impl SharedStep<'_> {
         let substep = &self.blocks[pass.block as usize].substep;
         match kernel {
             Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
-                let work = BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
+                let work =
+                    BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
                 spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
             }
             Kernel::IntegrateGyroscopic => {

@@ -181,7 +181,12 @@ impl<S: Scalar> Reference<S> {
             let row = &problem.joints[i];
             let bodies = [row.body_a as usize, row.body_b as usize];
             let mut pair = self.load_pair(bodies);
-            kernel(&self.rows.params[pass.block as usize], &mut pair, &self.rows.joints[i], &mut self.rows.joint_impulses[i]);
+            kernel(
+                &self.rows.params[pass.block as usize],
+                &mut pair,
+                &self.rows.joints[i],
+                &mut self.rows.joint_impulses[i],
+            );
             self.store_pair(bodies, &pair);
         }
     }

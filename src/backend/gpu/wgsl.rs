@@ -57,10 +57,10 @@ impl Program {
     /// Its WGSL.
     pub fn source(&self) -> String {
         match self {
-            Self::Pass(kernel) => of_plan(&[*kernel], WORKGROUP, "pass_row.first, pass_row.end", |calls| calls.concat()),
-            Self::OneDispatch(kernels, threads) => {
-                of_plan(kernels, *threads, "step.y, step.z", follow_passes)
+            Self::Pass(kernel) => {
+                of_plan(&[*kernel], WORKGROUP, "pass_row.first, pass_row.end", |calls| calls.concat())
             }
+            Self::OneDispatch(kernels, threads) => of_plan(kernels, *threads, "step.y, step.z", follow_passes),
             Self::BeginBodies => of_begin(part!("resident/begin_bodies"), "begin_body", "body_count"),
             Self::WriteContacts => of_begin(part!("resident/write_contacts"), "write_contact", "written_count"),
             Self::BeginContacts => of_begin(part!("resident/begin_contacts"), "begin_contact", "contact_count"),
@@ -86,12 +86,8 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             let call = format!("integrate_velocity({warm_start}, row)");
             (&[part!("integrate_velocities")], Over::Colors, call)
         }
-        Kernel::IntegrateGyroscopic => {
-            (&[part!("integrate_gyroscopic")], Over::Colors, "turn_spin(row)".into())
-        }
-        Kernel::IntegratePositions => {
-            (&[part!("integrate_positions")], Over::Colors, "integrate_position(row)".into())
-        }
+        Kernel::IntegrateGyroscopic => (&[part!("integrate_gyroscopic")], Over::Colors, "turn_spin(row)".into()),
+        Kernel::IntegratePositions => (&[part!("integrate_positions")], Over::Colors, "integrate_position(row)".into()),
         Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
         Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
         Kernel::Extrapolate { first, measured } => {

@@ -41,7 +41,11 @@ impl RunReport {
             let each: Vec<_> = self.efforts.iter().map(|row| format!("{} with {}", row.bodies, row.substeps)).collect();
             let why = self.hardest_contact.filter(|hardest| hardest.need > 1.0).map_or_else(String::new, |hardest| {
                 let bodies: Vec<_> = hardest.bodies.iter().flatten().map(|body| format!("body {body}")).collect();
-                format!("; {} would sag {:.3} times as deep as promised with {substeps}", bodies.join(" on "), hardest.need)
+                format!(
+                    "; {} would sag {:.3} times as deep as promised with {substeps}",
+                    bodies.join(" on "),
+                    hardest.need
+                )
             });
             row("substeps", format!("{} bodies, at most {}{why}", each.join(", "), self.most_substeps));
         }
