@@ -1,5 +1,7 @@
 //! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
 
+use std::ops::Range;
+
 use super::bindings::Binding;
 use crate::error::{Error, Result};
 
@@ -103,28 +105,17 @@ impl Buffers {
     /// Sends the rows of a binding that the device does not have yet.
     pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
-        let mut known = std::mem::take(&mut self.slots[binding as usize].known);
-        let same = |at: usize| {
-            let end = (at + BLOCK).min(bytes.len());
-            known.get(at..end) == Some(&bytes[at..end])
-        };
-        let mut begin = None;
-        for at in (0..bytes.len()).step_by(BLOCK) {
-            match (same(at), begin) {
-                (false, None) => begin = Some(at),
-                (true, Some(from)) => {
-                    self.write(binding, from, &bytes[from..at]);
-                    begin = None;
-                }
-                _ => {}
+        let known = std::mem::take(&mut self.slots[binding as usize].known);
+        let blocks = (0..bytes.len()).step_by(BLOCK).map(|at| at..(at + BLOCK).min(bytes.len()));
+        let mut changed = blocks.filter(|block| known.get(block.clone()) != bytes.get(block.clone())).peekable();
+        while let Some(Range { start, mut end }) = changed.next() {
+            while let Some(next) = changed.next_if(|block| block.start == end) {
+                end = next.end;
             }
+            self.write(binding, start, &bytes[start..end]);
         }
-        if let Some(from) = begin {
-            self.write(binding, from, &bytes[from..]);
-        }
-        known.clear();
-        known.extend_from_slice(bytes);
         self.slots[binding as usize].known = known;
+        self.note(binding, bytes);
     }
 
     /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.

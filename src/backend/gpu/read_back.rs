@@ -12,23 +12,20 @@ pub(super) struct ReadBack {
     staging: Option<wgpu::Buffer>,
 }
 
-/// The reason why a read-back failed.
-pub(super) type Lost = Box<dyn std::fmt::Display>;
-
 impl ReadBack {
     pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self { device, queue, staging: None }
     }
 
     /// Submits the encoder with copies of the `wanted` bindings, and of the first bytes of another buffer `more`. Waits, writes the
-    /// copies to `wanted`, and returns those of `more` as numbers.
+    /// copies to `wanted`, and returns those of `more` as numbers; else the reason why the device is lost.
     pub fn submit(
         &mut self,
         mut encoder: wgpu::CommandEncoder,
         buffers: &Buffers,
         wanted: &mut [(Binding, &mut [u8])],
         more: Option<(&wgpu::Buffer, u64)>,
-    ) -> Result<Vec<u64>, Lost> {
+    ) -> Result<Vec<u64>, String> {
         let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
         // The numbers are aligned to 8 bytes.
         let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
@@ -50,27 +47,22 @@ impl ReadBack {
             encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
         }
         self.queue.submit([encoder.finish()]);
-        let lost = |e: &dyn std::fmt::Display| -> Lost { Box::new(e.to_string()) };
         if size == 0 {
-            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
             return Ok(Vec::new());
         }
         let slice = staging.slice(..size);
         let (sender, receiver) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
-        let numbers;
-        {
-            let mapped = slice.get_mapped_range().map_err(|e| lost(&e))?;
-            let mut rest = &mapped[..];
-            for (_, rows) in wanted {
-                let (own, others) = rest.split_at(rows.len());
-                rows.copy_from_slice(own);
-                rest = others;
-            }
-            numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
+        receiver.recv().map_err(|e| e.to_string())?.map_err(|e| e.to_string())?;
+        let mapped = slice.get_mapped_range().map_err(|e| e.to_string())?;
+        let mut rest = &mapped[..];
+        for (_, rows) in wanted {
+            rows.copy_from_slice(rest.split_off(..rows.len()).expect("as long as all rows"));
         }
+        let numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
+        drop(mapped);
         staging.unmap();
         Ok(numbers)
     }
