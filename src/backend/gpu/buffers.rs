@@ -16,6 +16,9 @@ pub(super) struct Buffers {
     /// Largest buffer that a kernel can be given (B).
     limit: u64,
     slots: Vec<Slot>,
+    /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back before the next
+    /// submission.
+    staging: Option<wgpu::Buffer>,
     /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
     pub generation: u64,
     sent: u64,
@@ -33,7 +36,7 @@ impl Buffers {
         let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
+        Self { device, queue, adapter, limit, slots, staging: None, generation: 0, sent: 0 }
     }
 
     /// The buffer of a binding.
@@ -124,6 +127,60 @@ impl Buffers {
         known.clear();
         known.extend_from_slice(bytes);
     }
+
+    /// Submits the encoder with copies of the `wanted` bindings, and of the first bytes of another buffer `more`. Waits, writes the
+    /// copies to `wanted`, and returns those of `more` as numbers.
+    pub fn read_back(
+        &mut self,
+        mut encoder: wgpu::CommandEncoder,
+        wanted: &mut [(Binding, &mut [u8])],
+        more: Option<(&wgpu::Buffer, u64)>,
+    ) -> Result<Vec<u64>> {
+        let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
+        // The numbers are aligned to 8 bytes.
+        let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
+        if self.staging.as_ref().is_none_or(|b| b.size() < size) {
+            self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read back"),
+                size: size_of_buffer(size, self.device.limits().max_buffer_size),
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        let staging = self.staging.as_ref().expect("made above");
+        let mut at = 0;
+        for (binding, rows) in wanted.iter().filter(|w| !w.1.is_empty()) {
+            encoder.copy_buffer_to_buffer(self.get(*binding), 0, staging, at, rows.len() as u64);
+            at += rows.len() as u64;
+        }
+        if let Some((buffer, bytes)) = more {
+            encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
+        }
+        self.queue.submit([encoder.finish()]);
+        if size == 0 {
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+            return Ok(Vec::new());
+        }
+        let slice = staging.slice(..size);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+        receiver.recv().map_err(lost)?.map_err(lost)?;
+        let mapped = slice.get_mapped_range().map_err(lost)?;
+        let mut rest = &mapped[..];
+        for (_, rows) in wanted {
+            rows.copy_from_slice(rest.split_off(..rows.len()).expect("as long as all rows"));
+        }
+        let numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
+        drop(mapped);
+        staging.unmap();
+        Ok(numbers)
+    }
+}
+
+/// The error of a device that no longer answers.
+pub(super) fn lost(reason: impl std::fmt::Display) -> Error {
+    Error::Adapter(format!("the device was lost: {reason}"))
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at
