@@ -2,7 +2,8 @@
 
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
-use super::rows::{ContactRow, ImpulseRow, PointRow, points_a_slot};
+use super::points_a_slot;
+use super::rows::{ContactRow, ImpulseRow, PointRow};
 use super::slots::{Slots, Write};
 use super::write::{Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};
