@@ -1,5 +1,5 @@
 // begin_sweep: one thread decides whether the next sweep is still needed, and counts sweeps.
-// Reads and writes convergence. Double: src/backend/cpu/mod.rs.
+// Reads and writes convergence. Double: src/kernels/convergence.rs.
 
 fn begin_sweep(first: bool) {
     // The first sweep of a substep is always needed; a later one only if the sweep before it moved an impulse by more than the tolerance.

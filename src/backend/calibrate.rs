@@ -84,20 +84,12 @@ pub(super) fn pile(side: u32) -> StepProblem {
     // Every other contact along an axis: no body twice.
     for (axis, stride) in [(Vec3::X, 1), (Vec3::Y, side), (Vec3::Z, side * side)] {
         for parity in 0..2 {
-            for body in
-                (0..side * side * side).filter(|b| b / stride % side % 2 == parity && b / stride % side + 1 < side)
-            {
-                let first_point = problem.points.len() as u32;
-                let (body_a, body_b) = (body, body + stride);
-                let framed = ContactRow::framed(axis);
-                problem.contacts.push(ContactRow {
-                    body_a,
-                    body_b,
-                    first_point,
-                    point_count: 4,
-                    friction: 0.5,
-                    ..framed
-                });
+            let place = |body: u32| body / stride % side;
+            for body_a in (0..side.pow(3)).filter(|&body| place(body) % 2 == parity && place(body) + 1 < side) {
+                let (body_b, first_point, framed) =
+                    (body_a + stride, problem.points.len() as u32, ContactRow::framed(axis));
+                let sides = ContactRow { body_a, body_b, first_point, point_count: 4, ..framed };
+                problem.contacts.push(ContactRow { friction: 0.5, ..sides });
                 let (t1, t2) = framed.tangents();
                 for (x, y) in [(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)] {
                     let (r_a, r_b) = (t1 * x + t2 * y + axis * 0.5, t1 * x + t2 * y - axis * 0.5);

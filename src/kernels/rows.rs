@@ -208,13 +208,13 @@ pub struct Pair<L> {
     pub moving: L,
 }
 
-/// `load` and `store` of rows: first the vectors and quaternions, then the numbers.
+/// `load` and `store` of rows: first the vectors and quaternions, then the numbers, then an integer.
 macro_rules! stored {
-    ($($Kernel:ident as $Row:ident { $($Type:ident: $($field:ident),+;)* [$($number:ident),*] })*) => {$(
+    ($($Kernel:ident as $Row:ident { $($Type:ident: $($field:ident),+;)* [$($number:ident),*] $($same:ident)? })*) => {$(
         impl<S: Scalar> $Kernel<S> {
             /// From storage.
             pub fn load(r: &$Row) -> Self {
-                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from_f32(r.$number),)* }
+                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from_f32(r.$number),)* $($same: r.$same)? }
             }
 
             /// To storage, without indices.
@@ -223,6 +223,7 @@ macro_rules! stored {
                 $Row {
                     $($($field: self.$field.store(),)+)*
                     $($number: self.$number.to_f32(),)*
+                    $($same: self.$same,)?
                     ..bytemuck::Zeroable::zeroed()
                 }
             }
@@ -239,6 +240,7 @@ stored! {
     }
     Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
     Joint as JointRow { Vec3: r_a, r_b, gap; [] }
+    Momentum as MomentumRow { [t, factor, square] restarts }
 }
 
 impl<S: Scalar> Mass<S> {
@@ -263,30 +265,24 @@ impl<S: Scalar> Mass<S> {
     }
 }
 
-impl<S: Scalar> Momentum<S> {
-    /// From storage.
-    pub fn load(r: &MomentumRow) -> Self {
-        let [t, factor, square] = [r.t, r.factor, r.square].map(S::from_f32);
-        Self { t, factor, square, restarts: r.restarts }
-    }
-
-    /// To storage.
-    pub fn store(&self) -> MomentumRow {
-        let [t, factor, square] = [self.t, self.factor, self.square].map(S::to_f32);
-        MomentumRow { t, factor, square, restarts: self.restarts }
-    }
+/// `load` of numbers that are the same in every lane.
+macro_rules! constants {
+    ($($Kernel:ident as $Row:ident { [$($number:ident),*] $($softness:ident),* })*) => {$(
+        impl<L: Lane> $Kernel<L> {
+            /// From storage, the same in every lane.
+            #[inline(always)]
+            pub fn load(r: &$Row) -> Self {
+                Self {
+                    $($number: L::constant(r.$number.into()),)*
+                    $($softness: SoftnessOf::load(&r.$softness),)*
+                }
+            }
+        }
+    )*};
 }
 
-impl<L: Lane> SoftnessOf<L> {
-    #[inline(always)]
-    fn load(s: &Softness) -> Self {
-        Self {
-            bias_rate: L::constant(s.bias_rate.into()),
-            mass_scale: L::constant(s.mass_scale.into()),
-            impulse_scale: L::constant(s.impulse_scale.into()),
-            push_limit: L::constant(s.push_limit.into()),
-        }
-    }
+constants! {
+    SoftnessOf as Softness { [bias_rate, mass_scale, impulse_scale, push_limit] }
 }
 
 impl<L: Lane> StepParams<L> {

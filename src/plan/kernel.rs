@@ -78,6 +78,15 @@ impl Kernel {
             _ => None,
         }
     }
+
+    /// Whether the kernel is left out where sweeps are no longer needed.
+    pub fn is_measured(self) -> bool {
+        match self {
+            Self::Extrapolate { measured, .. } => measured,
+            Self::SolveJoints(rules) | Self::SolveContacts(rules) => rules.measured,
+            _ => false,
+        }
+    }
 }
 
 impl fmt::Display for Kernel {

@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
-use super::rows::{ContactRow, ImpulseRow, PointRow, Substep, points_a_slot};
+use super::points_a_slot;
+use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slots, Write};
 use super::write::{Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
+use super::points_a_slot;
 use super::rescale::change_share;
-use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow, points_a_slot};
+use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
 use crate::config::{FrictionRule, SolverConfig};

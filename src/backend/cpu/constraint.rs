@@ -1,7 +1,12 @@
-//! Contacts and joints as lanes see them.
+//! Contacts and joints as lanes see them, and the kernels over one of either.
 
 use std::ops::Range;
 
+use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
+use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::{Contact, Impulse, Joint, Pair, Point, StepParams};
+use crate::math::{Lane, Vec3};
+use crate::plan::Kernel;
 use crate::problem::{ContactRow, JointRow, StepProblem};
 
 /// A kind of constraint: contacts or joints.
@@ -77,5 +82,39 @@ impl Constraint for JointRow {
     }
     fn first(&self, row: u32) -> u32 {
         row
+    }
+}
+
+/// Applies a kernel to a contact of a lane.
+#[inline(always)]
+pub(super) fn sweep_contact<L: Lane>(
+    kernel: Kernel,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    points: &[Point<L>],
+    impulses: &mut [Impulse<L>],
+) {
+    match kernel {
+        Kernel::WarmStart(rules) => warm_start(rules, pair, contact, points, impulses),
+        Kernel::SolveContacts(rules) => solve_contact(rules, params, pair, contact, points, impulses),
+        Kernel::ApplyRestitution(rules) => restitute_contact(rules, params, pair, contact, points, impulses),
+        _ => unreachable!("a kernel over other rows"),
+    }
+}
+
+/// Applies a kernel to a joint of a lane.
+#[inline(always)]
+pub(super) fn sweep_joint<L: Lane>(
+    kernel: Kernel,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    joint: &Joint<L>,
+    impulse: &mut Vec3<L>,
+) {
+    match kernel {
+        Kernel::WarmStartJoints => warm_start_joint(pair, joint, *impulse),
+        Kernel::SolveJoints(rules) => solve_joint(rules, params, pair, joint, impulse),
+        _ => unreachable!("a kernel over other rows"),
     }
 }

@@ -114,11 +114,8 @@ impl Cpu {
     fn run_passes(&mut self, problem: &StepProblem, passes: &[Pass], threads: &Threads) {
         match passes[0].kernel {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
-            Kernel::Extrapolate { first, measured } => {
-                if !(measured && self.convergence.done != 0) {
-                    self.extrapolate(first, threads);
-                }
-            }
+            Kernel::Extrapolate { measured: true, .. } if self.convergence.done != 0 => {}
+            Kernel::Extrapolate { first, .. } => self.extrapolate(first, threads),
             Kernel::MeasureStep => {
                 // Rows that take no part do not move.
                 reset(&mut self.lengths, problem.impulse_count());
@@ -149,7 +146,7 @@ impl Cpu {
             joint_impulses: Shared::new(&mut self.joint_impulses),
             moving: &moving,
         };
-        let is_needed = |pass: &&Pass| self.convergence.done == 0 || !pass.kernel.rules().is_some_and(|r| r.measured);
+        let is_needed = |pass: &&Pass| self.convergence.done == 0 || !pass.kernel.is_measured();
         let for_one = &self.partition.blocks;
         threads.spread_each(0..for_one.len(), &|parts| {
             for part in parts {

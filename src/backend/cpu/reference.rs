@@ -1,13 +1,13 @@
 //! The CPU reference: one thread, one constraint at a time, in the order of the plan.
 
 use super::super::{Backend, CheckedStep};
+use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
-use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, warm_start};
+use crate::kernels::contact::clear_impulse;
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
-use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Contact, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Point, Rules, StepParams};
+use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -55,24 +55,28 @@ impl<S: Scalar> Reference<S> {
     }
 
     fn run_pass(&mut self, problem: &StepProblem, pass: &Pass) {
+        if self.convergence.done != 0 && pass.kernel.is_measured() {
+            return;
+        }
+        let params = self.rows.params[pass.block as usize];
         match pass.kernel {
             Kernel::IntegrateVelocities { warm_start } => {
                 self.free.resize(self.rows.bodies.len(), Free::default());
                 for i in places(problem, pass) {
                     let (mass, body, free) = (&self.rows.masses[i], &mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_velocities(warm_start, &self.rows.params[pass.block as usize], mass, body, free);
+                    integrate_velocities(warm_start, &params, mass, body, free);
                 }
             }
             Kernel::IntegrateGyroscopic => {
                 for row in places(problem, pass) {
                     let i = problem.inertias[row].body as usize;
                     let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_gyroscopic(&self.rows.params[pass.block as usize], &self.rows.inertias[row], body, free);
+                    integrate_gyroscopic(&params, &self.rows.inertias[row], body, free);
                 }
             }
             Kernel::IntegratePositions => {
                 for i in places(problem, pass) {
-                    integrate_positions(&self.rows.params[pass.block as usize], &mut self.rows.bodies[i]);
+                    integrate_positions(&params, &mut self.rows.bodies[i]);
                 }
             }
             Kernel::ClearImpulses => {
@@ -85,11 +89,7 @@ impl<S: Scalar> Reference<S> {
                 }
             }
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
-            Kernel::Extrapolate { first, measured } => {
-                if !(measured && self.convergence.done != 0) {
-                    self.extrapolate(first);
-                }
-            }
+            Kernel::Extrapolate { first, .. } => self.extrapolate(first),
             Kernel::MeasureStep => {
                 let points = self.rows.impulses.iter().map(Impulse::components).zip(&self.point_steps);
                 let joints = self.rows.joint_impulses.iter().copied().zip(&self.joint_steps);
@@ -97,32 +97,24 @@ impl<S: Scalar> Reference<S> {
                 self.lengths.extend(points.chain(joints).map(|(now, step)| step_length(now, step)));
             }
             Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.lengths)),
-            Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
-                warm_start_joint(pair, joint, *impulse);
-            }),
-            Kernel::SolveJoints(rules) => {
-                if !self.is_converged(rules) {
-                    self.over_joints(problem, pass, |params, pair, joint, impulse| {
-                        solve_joint(rules, params, pair, joint, impulse);
-                    });
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
+                for i in places(problem, pass) {
+                    let bodies = problem.joints[i].bodies();
+                    let (mut pair, rows) = (self.load_pair(bodies), &mut self.rows);
+                    sweep_joint(pass.kernel, &params, &mut pair, &rows.joints[i], &mut rows.joint_impulses[i]);
+                    self.store_pair(bodies, &pair);
                 }
             }
-            Kernel::WarmStart(rules) => {
-                self.over_contacts(rules, problem, pass, |_, pair, contact, points, impulses| {
-                    warm_start(rules, pair, contact, points, impulses);
-                });
-            }
-            Kernel::SolveContacts(rules) => {
-                if !self.is_converged(rules) {
-                    self.over_contacts(rules, problem, pass, |params, pair, contact, points, impulses| {
-                        solve_contact(rules, params, pair, contact, points, impulses);
-                    });
+            Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
+                for i in places(problem, pass) {
+                    let row = &problem.contacts[i];
+                    let first = row.first_point as usize;
+                    let own = first..first + row.point_count as usize + usize::from(rules.patch);
+                    let (mut pair, rows) = (self.load_pair(row.bodies()), &mut self.rows);
+                    let (points, impulses) = (&rows.points[own.clone()], &mut rows.impulses[own]);
+                    sweep_contact(pass.kernel, &params, &mut pair, &rows.contacts[i], points, impulses);
+                    self.store_pair(row.bodies(), &pair);
                 }
-            }
-            Kernel::ApplyRestitution(rules) => {
-                self.over_contacts(rules, problem, pass, |params, pair, contact, points, impulses| {
-                    restitute_contact(rules, params, pair, contact, points, impulses);
-                });
             }
         }
     }
@@ -150,54 +142,15 @@ impl<S: Scalar> Reference<S> {
         }
     }
 
-    /// One manifold after another.
-    fn over_contacts(
-        &mut self,
-        rules: Rules,
-        problem: &StepProblem,
-        pass: &Pass,
-        kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Contact<S>, &[Point<S>], &mut [Impulse<S>]),
-    ) {
-        for i in places(problem, pass) {
-            let row = &problem.contacts[i];
-            let bodies = [row.body_a as usize, row.body_b as usize];
-            let mut pair = self.load_pair(bodies);
-            let first = row.first_point as usize;
-            let rows = first..first + row.point_count as usize + usize::from(rules.patch);
-            let (points, impulses) = (&self.rows.points[rows.clone()], &mut self.rows.impulses[rows]);
-            kernel(&self.rows.params[pass.block as usize], &mut pair, &self.rows.contacts[i], points, impulses);
-            self.store_pair(bodies, &pair);
-        }
-    }
-
-    /// One joint after another.
-    fn over_joints(
-        &mut self,
-        problem: &StepProblem,
-        pass: &Pass,
-        kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Joint<S>, &mut Vec3<S>),
-    ) {
-        for i in places(problem, pass) {
-            let row = &problem.joints[i];
-            let bodies = [row.body_a as usize, row.body_b as usize];
-            let mut pair = self.load_pair(bodies);
-            kernel(
-                &self.rows.params[pass.block as usize],
-                &mut pair,
-                &self.rows.joints[i],
-                &mut self.rows.joint_impulses[i],
-            );
-            self.store_pair(bodies, &pair);
-        }
-    }
-
-    fn load_pair(&self, [a, b]: [usize; 2]) -> Pair<S> {
+    fn load_pair(&self, bodies: [u32; 2]) -> Pair<S> {
+        let [a, b] = bodies.map(|body| body as usize);
         let (mass_a, mass_b) = (self.rows.masses[a], self.rows.masses[b]);
         Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
     }
 
     /// A body that cannot move is never written.
-    fn store_pair(&mut self, [a, b]: [usize; 2], pair: &Pair<S>) {
+    fn store_pair(&mut self, bodies: [u32; 2], pair: &Pair<S>) {
+        let [a, b] = bodies.map(|body| body as usize);
         let zero = S::constant(0.0);
         if pair.mass_a.inv_mass > zero {
             (self.rows.bodies[a].v, self.rows.bodies[a].w) = (pair.a.v, pair.a.w);
@@ -208,10 +161,6 @@ impl<S: Scalar> Reference<S> {
         if pair.moving > zero {
             self.convergence.moving = 1;
         }
-    }
-
-    fn is_converged(&self, rules: Rules) -> bool {
-        rules.measured && self.convergence.done != 0
     }
 }
 

@@ -6,12 +6,10 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::bodies::{State, velocity_rows, wide_body};
-use super::constraint::Constraint;
+use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_layout::{BodyLanes, LaneGroup, LaneLayout};
 use super::shared::Shared;
 use super::simd::{Lanes, WIDTH, Wide, Work, row_at};
-use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
-use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::plan::Kernel;
@@ -42,11 +40,10 @@ impl<C: Constraint> Work for Sweep<'_, C> {
 impl<C: Constraint> Sweep<'_, C> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
-        let (kernel, states) = (self.kernel, self.bodies.as_ptr());
+        let states = self.bodies.as_ptr();
         // SAFETY: `BodyLanes::set` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
         // holds that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
-        let rules = kernel.rules().unwrap_or_default();
         let rows = group.impulses();
         // Impulses and rows are used in place: copies were most of what a sweep moved.
         // SAFETY: `Impulse` is `repr(C)` and holds lanes only; `LaneLayout::make_groups` gives each group impulses of its own.
@@ -55,29 +52,21 @@ impl<C: Constraint> Sweep<'_, C> {
             // SAFETY: `Contact` and `Point` are `repr(C)` and hold lanes only.
             let (contact, points): (&Contact<L>, &[Point<L>]) =
                 unsafe { (&as_lanes(std::slice::from_ref(&group.header))[0], as_lanes(&self.layout.points[rows])) };
-            match kernel {
-                Kernel::WarmStart(_) => warm_start(rules, &mut pair, contact, points, impulses),
-                Kernel::SolveContacts(_) => solve_contact(rules, params, &mut pair, contact, points, impulses),
-                _ => restitute_contact(rules, params, &mut pair, contact, points, impulses),
-            }
+            sweep_contact(self.kernel, params, &mut pair, contact, points, impulses);
         } else {
             let [joint @ .., _, _]: &[Wide; 11] = &group.header;
             // SAFETY: `Joint` is `repr(C)` and holds lanes only.
             let joint: &Joint<L> = unsafe { &as_lanes::<_, 9>(std::slice::from_ref(joint))[0] };
             let mut impulse = impulses[0].components();
-            if matches!(kernel, Kernel::WarmStartJoints) {
-                warm_start_joint(&mut pair, joint, impulse);
-            } else {
-                solve_joint(rules, params, &mut pair, joint, &mut impulse);
-                impulses[0].set_components(impulse);
-            }
+            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse);
+            impulses[0].set_components(impulse);
         }
         // SAFETY: as above.
         unsafe {
             store_velocities(states, &group.a, &pair.a);
             store_velocities(states, &group.b, &pair.b);
         }
-        if rules.measured && pair.moving.store().0.iter().any(|&m| m > 0.0) {
+        if self.kernel.is_measured() && pair.moving.store().0.iter().any(|&m| m > 0.0) {
             self.moving.store(true, Ordering::Relaxed);
         }
     }

@@ -52,22 +52,20 @@ pub fn adapters() -> Vec<AdapterSummary> {
     found().into_iter().map(|(_, summary)| summary).collect()
 }
 
+/// The variable `DRYSTONE_ADAPTER`; empty if it is not set.
+fn wanted() -> String {
+    std::env::var("DRYSTONE_ADAPTER").unwrap_or_default()
+}
+
 pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSummary)> {
-    let mut all = found();
-    if choice == AdapterChoice::Hardware {
-        all.retain(|(_, s)| s.hardware);
-    }
-    let wanted = std::env::var("DRYSTONE_ADAPTER").ok();
-    let looked_for = match &wanted {
-        Some(name) => format!("one that DRYSTONE_ADAPTER={name} names, for "),
-        None => String::new(),
-    };
-    let nothing = || {
+    let mut usable = found().into_iter().filter(|(_, s)| choice == AdapterChoice::Best || s.hardware);
+    usable.next().ok_or_else(|| {
+        let named = Some(wanted()).filter(|name| !name.is_empty());
+        let named = named.map_or(String::new(), |name| format!("one that DRYSTONE_ADAPTER={name} names, for "));
         Error::Adapter(format!(
-            "no adapter found; looked for {looked_for}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}"
+            "no adapter found; looked for {named}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}"
         ))
-    };
-    if all.is_empty() { Err(nothing()) } else { Ok(all.swap_remove(0)) }
+    })
 }
 
 /// Opens the adapter that `choice` finds, for drawing.
@@ -81,9 +79,8 @@ pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, 
 }
 
 fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
-    let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
     // `none` loads no driver.
-    if wanted == "none" {
+    if wanted().eq_ignore_ascii_case("none") {
         return Vec::new();
     }
     // OpenGL only where there is nothing better: its loaders are noisy on machines without a display.
@@ -93,7 +90,7 @@ fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         });
-        let usable = usable(&instance, backends, &wanted);
+        let usable = usable(&instance, backends);
         if !usable.is_empty() {
             return usable;
         }
@@ -101,13 +98,14 @@ fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
     Vec::new()
 }
 
-/// Adapters of an instance that can run the kernels and whose summary contains `wanted`, the one with the most hardware first.
-fn usable(instance: &wgpu::Instance, backends: wgpu::Backends, wanted: &str) -> Vec<(wgpu::Adapter, AdapterSummary)> {
-    let all = pollster::block_on(instance.enumerate_adapters(backends));
-    let mut usable: Vec<_> = all.into_iter().filter(can_compute).map(|a| (summarize(&a), a)).collect();
-    usable.retain(|(s, _)| s.to_string().to_lowercase().contains(wanted));
-    usable.sort_by_key(|(_, a)| rank(a.get_info().device_type));
-    usable.into_iter().map(|(s, a)| (a, s)).collect()
+/// Adapters of an instance that can run the kernels and whose summary contains the wanted name, the one with the most hardware first.
+fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgpu::Adapter, AdapterSummary)> {
+    let wanted = wanted().to_lowercase();
+    let all = pollster::block_on(instance.enumerate_adapters(backends)).into_iter().filter(can_compute);
+    let mut usable: Vec<_> = all.map(|adapter| (adapter.clone(), summarize(&adapter))).collect();
+    usable.retain(|(_, s)| wanted != "none" && s.to_string().to_lowercase().contains(&wanted));
+    usable.sort_by_key(|(a, _)| KINDS.iter().position(|(kind, _)| *kind == a.get_info().device_type));
+    usable
 }
 
 /// Opens the best adapter that can draw on `window`.
@@ -118,20 +116,14 @@ pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
 ) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {
-    let wanted = std::env::var("DRYSTONE_ADAPTER").unwrap_or_default().to_lowercase();
+    let none = |why: String| Error::Adapter(format!("no adapter can draw on this display{why}: {INSTALL}"));
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         flags: wgpu::InstanceFlags::empty(),
         ..wgpu::InstanceDescriptor::new_with_display_handle(display)
     });
-    let surface = instance
-        .create_surface(window)
-        .map_err(|e| Error::Adapter(format!("no adapter can draw on this display ({e}): {INSTALL}")))?;
-    let mut all = if wanted == "none" { Vec::new() } else { usable(&instance, wgpu::Backends::all(), &wanted) };
-    all.retain(|(a, _)| a.is_surface_supported(&surface));
-    if all.is_empty() {
-        return Err(Error::Adapter(format!("no adapter can draw on this display: {INSTALL}")));
-    }
-    let (adapter, _) = all.swap_remove(0);
+    let surface = instance.create_surface(window).map_err(|e| none(format!(" ({e})")))?;
+    let mut usable = usable(&instance, wgpu::Backends::all()).into_iter();
+    let (adapter, _) = usable.find(|(a, _)| a.is_surface_supported(&surface)).ok_or_else(|| none(String::new()))?;
     let (device, queue) = open(&adapter, false)?;
     Ok((surface, adapter, device, queue))
 }
@@ -141,27 +133,20 @@ fn can_compute(adapter: &wgpu::Adapter) -> bool {
         && adapter.limits().max_storage_buffers_per_shader_stage >= 8
 }
 
-fn rank(kind: wgpu::DeviceType) -> u8 {
-    match kind {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
-}
+/// Kinds of adapters with their names, the one with the most hardware first.
+const KINDS: [(wgpu::DeviceType, &str); 5] = [
+    (wgpu::DeviceType::DiscreteGpu, "discrete"),
+    (wgpu::DeviceType::IntegratedGpu, "integrated"),
+    (wgpu::DeviceType::VirtualGpu, "virtual"),
+    (wgpu::DeviceType::Other, "unknown kind"),
+    (wgpu::DeviceType::Cpu, "software"),
+];
 
 fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
     let info = adapter.get_info();
     let vulkan = info.backend == wgpu::Backend::Vulkan;
     AdapterSummary {
-        kind: match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => "discrete",
-            wgpu::DeviceType::IntegratedGpu => "integrated",
-            wgpu::DeviceType::VirtualGpu => "virtual",
-            wgpu::DeviceType::Cpu => "software",
-            wgpu::DeviceType::Other => "unknown kind",
-        },
+        kind: KINDS.iter().find(|(kind, _)| *kind == info.device_type).map_or("unknown kind", |(_, name)| name),
         hardware: info.device_type != wgpu::DeviceType::Cpu,
         exact: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
         clock: adapter.features().contains(super::timer::FEATURES),

@@ -1,5 +1,7 @@
 //! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
 
+use std::ops::Range;
+
 use super::bindings::Binding;
 use crate::error::{Error, Result};
 
@@ -14,6 +16,9 @@ pub(super) struct Buffers {
     /// Largest buffer that a kernel can be given (B).
     limit: u64,
     slots: Vec<Slot>,
+    /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back before the next
+    /// submission.
+    staging: Option<wgpu::Buffer>,
     /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
     pub generation: u64,
     sent: u64,
@@ -31,7 +36,7 @@ impl Buffers {
         let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        Self { device, queue, adapter, limit, slots, generation: 0, sent: 0 }
+        Self { device, queue, adapter, limit, slots, staging: None, generation: 0, sent: 0 }
     }
 
     /// The buffer of a binding.
@@ -103,28 +108,17 @@ impl Buffers {
     /// Sends the rows of a binding that the device does not have yet.
     pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
         self.reserve(binding, bytes.len());
-        let mut known = std::mem::take(&mut self.slots[binding as usize].known);
-        let same = |at: usize| {
-            let end = (at + BLOCK).min(bytes.len());
-            known.get(at..end) == Some(&bytes[at..end])
-        };
-        let mut begin = None;
-        for at in (0..bytes.len()).step_by(BLOCK) {
-            match (same(at), begin) {
-                (false, None) => begin = Some(at),
-                (true, Some(from)) => {
-                    self.write(binding, from, &bytes[from..at]);
-                    begin = None;
-                }
-                _ => {}
+        let known = std::mem::take(&mut self.slots[binding as usize].known);
+        let blocks = (0..bytes.len()).step_by(BLOCK).map(|at| at..(at + BLOCK).min(bytes.len()));
+        let mut changed = blocks.filter(|block| known.get(block.clone()) != bytes.get(block.clone())).peekable();
+        while let Some(Range { start, mut end }) = changed.next() {
+            while let Some(next) = changed.next_if(|block| block.start == end) {
+                end = next.end;
             }
+            self.write(binding, start, &bytes[start..end]);
         }
-        if let Some(from) = begin {
-            self.write(binding, from, &bytes[from..]);
-        }
-        known.clear();
-        known.extend_from_slice(bytes);
         self.slots[binding as usize].known = known;
+        self.note(binding, bytes);
     }
 
     /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.
@@ -133,6 +127,60 @@ impl Buffers {
         known.clear();
         known.extend_from_slice(bytes);
     }
+
+    /// Submits the encoder with copies of the `wanted` bindings, and of the first bytes of another buffer `more`. Waits, writes the
+    /// copies to `wanted`, and returns those of `more` as numbers.
+    pub fn read_back(
+        &mut self,
+        mut encoder: wgpu::CommandEncoder,
+        wanted: &mut [(Binding, &mut [u8])],
+        more: Option<(&wgpu::Buffer, u64)>,
+    ) -> Result<Vec<u64>> {
+        let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
+        // The numbers are aligned to 8 bytes.
+        let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
+        if self.staging.as_ref().is_none_or(|b| b.size() < size) {
+            self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read back"),
+                size: size_of_buffer(size, self.device.limits().max_buffer_size),
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        let staging = self.staging.as_ref().expect("made above");
+        let mut at = 0;
+        for (binding, rows) in wanted.iter().filter(|w| !w.1.is_empty()) {
+            encoder.copy_buffer_to_buffer(self.get(*binding), 0, staging, at, rows.len() as u64);
+            at += rows.len() as u64;
+        }
+        if let Some((buffer, bytes)) = more {
+            encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
+        }
+        self.queue.submit([encoder.finish()]);
+        if size == 0 {
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+            return Ok(Vec::new());
+        }
+        let slice = staging.slice(..size);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+        receiver.recv().map_err(lost)?.map_err(lost)?;
+        let mapped = slice.get_mapped_range().map_err(lost)?;
+        let mut rest = &mapped[..];
+        for (_, rows) in wanted {
+            rows.copy_from_slice(rest.split_off(..rows.len()).expect("as long as all rows"));
+        }
+        let numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
+        drop(mapped);
+        staging.unmap();
+        Ok(numbers)
+    }
+}
+
+/// The error of a device that no longer answers.
+pub(super) fn lost(reason: impl std::fmt::Display) -> Error {
+    Error::Adapter(format!("the device was lost: {reason}"))
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at

@@ -16,7 +16,6 @@ mod buffers;
 mod dispatch;
 mod one_dispatch;
 mod pipelines;
-mod read_back;
 pub(crate) mod reflect;
 pub(crate) mod resident;
 pub(crate) mod rows;
@@ -38,7 +37,6 @@ use bindings::Binding;
 use buffers::Buffers;
 use dispatch::Dispatch;
 use pipelines::Pipelines;
-use read_back::ReadBack;
 use resident::ResidentRows;
 use timer::Timer;
 
@@ -50,7 +48,6 @@ pub struct Gpu {
     exact: bool,
     pipelines: Pipelines,
     buffers: Buffers,
-    read_back: ReadBack,
     timer: Option<Timer>,
     times: Vec<KernelTime>,
     traffic: Traffic,
@@ -86,7 +83,6 @@ impl Gpu {
             pipelines: Pipelines::new(device.clone(), exact),
             buffers: Buffers::new(device.clone(), queue.clone(), summary.name.clone()),
             timer: None,
-            read_back: ReadBack::new(device.clone(), queue.clone()),
             device,
             queue,
             summary,
@@ -199,11 +195,11 @@ impl Gpu {
     /// Submits, waits, and reads the `wanted` rows back.
     fn finish(&mut self, mut encoder: wgpu::CommandEncoder, wanted: &mut [(Binding, &mut [u8])]) -> Result<()> {
         let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
-        let read = self.read_back.submit(encoder, &self.buffers, wanted, times);
+        let read = self.buffers.read_back(encoder, wanted, times);
         if let Some(message) = self.device_error.lock().expect("no panic holds it").take() {
             return Err(Error::Adapter(format!("{}: {message}", self.summary.name)));
         }
-        let ticks = read.map_err(|e| Error::Adapter(format!("the device was lost: {e}")))?;
+        let ticks = read?;
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
         self.traffic = Traffic { up: self.buffers.take_sent(), down, ..self.traffic };
@@ -269,6 +265,7 @@ impl Backend for Gpu {
         self.rows = Some(ResidentRows::of(problem));
         Ok(())
     }
+
     fn keeps_rows(&self) -> bool {
         self.rows.is_some()
     }

@@ -5,11 +5,12 @@ use bytemuck::{Pod, Zeroable};
 use super::bindings::Binding;
 use super::buffers::Buffers;
 use super::dispatch::Dispatch;
+use super::rows;
 use super::wgsl::Program;
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 use crate::problem::carry::{Carry, NO_POINT, Preload};
-use crate::problem::{ContactRow, ImpulseRow, PointRow, StepProblem, points_a_slot};
+use crate::problem::{StepProblem, points_a_slot};
 
 // The shader writes no impulse to a point whose number before is `MAX_POINTS` or more.
 const _: () = assert!(NO_POINT as usize == MAX_POINTS);
@@ -17,8 +18,8 @@ const _: () = assert!(NO_POINT as usize == MAX_POINTS);
 /// The rows that a step left on the device.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResidentRows {
-    contacts: usize,
-    points: usize,
+    /// Bytes of the rows of contacts, in the order of `rows::of_contacts`.
+    sizes: [usize; 3],
     /// Whether the problem on the host has the same impulses and preloads.
     pub fetched: bool,
 }
@@ -26,7 +27,7 @@ pub(super) struct ResidentRows {
 impl ResidentRows {
     /// Those of a problem that just ran.
     pub fn of(problem: &StepProblem) -> Self {
-        Self { contacts: problem.contacts.len(), points: problem.points.len(), fetched: false }
+        Self { sizes: rows::of_contacts(problem).map(|(_, rows)| rows.len()), fetched: false }
     }
 }
 
@@ -74,14 +75,9 @@ pub(super) fn begin(
     if problem.contacts.is_empty() {
         return Ok(programs);
     }
-    let kept: [(Binding, usize, usize); 3] = [
-        (Binding::Contacts, before.contacts * size_of::<ContactRow>(), size_of_val(&problem.contacts[..])),
-        (Binding::Points, before.points * size_of::<PointRow>(), size_of_val(&problem.points[..])),
-        (Binding::Impulses, before.points * size_of::<ImpulseRow>(), size_of_val(&problem.impulses[..])),
-    ];
     buffers.reserve(Binding::Sags, size_of_val(&problem.sags[..]));
-    for (binding, kept, size) in kept {
-        buffers.grow(binding, kept, size);
+    for ((binding, rows), kept) in rows::of_contacts(problem).into_iter().zip(before.sizes) {
+        buffers.grow(binding, kept, rows.len());
     }
     if !carry.written.is_empty() {
         send_written(buffers, problem, carry)?;

@@ -6,8 +6,9 @@
 
 use std::time::{Duration, Instant};
 
+use super::buffers::lost;
 use super::wgsl::Program;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::stats::KernelTime;
 
 /// The features of the adapter that a timer needs.
@@ -111,7 +112,6 @@ pub(super) fn copy_bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Resu
         (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
         let start = Instant::now();
         queue.submit([encoder.finish()]);
-        let lost = |e| Error::Adapter(format!("the device was lost: {e}"));
         device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
         Ok(start.elapsed().as_secs_f64())
     };

@@ -133,14 +133,10 @@ fn rules_text(rules: Rules) -> String {
     )
 }
 
-fn is_measured(kernel: &Kernel) -> bool {
-    matches!(kernel, Kernel::Extrapolate { measured: true, .. }) || kernel.rules().is_some_and(|rules| rules.measured)
-}
-
 /// The WGSL of some kernels. `colors` is the WGSL of the colors of a pass; `main` makes the body of the entry point of the calls.
 fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[String]) -> String) -> String {
     // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections.
-    let is_measured = kernels.iter().any(is_measured);
+    let is_measured = kernels.iter().any(|kernel| kernel.is_measured());
     let mut parts = vec![
         part!("lib/types"),
         part!("lib/math"),
