@@ -158,11 +158,6 @@ impl Shape {
         self.0.as_cuboid().map(|c| c.half_extents)
     }
 
-    /// Every number of the shape, as text.
-    pub(crate) fn geometry(&self) -> String {
-        format!("{:?}", self.0.as_typed_shape())
-    }
-
     /// Radius of the smallest sphere around the shape's own origin that contains it (m); infinite for a half-space.
     pub fn bounding_radius(&self) -> f32 {
         let sphere = self.0.compute_local_bounding_sphere();
