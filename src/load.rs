@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DVec3};
 
 use crate::config::{SolverConfig, Stabilization};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, input};
 use crate::world::{Body, BodyKind, World, pose};
 
 /// Most substeps that the settings take.
@@ -81,11 +81,11 @@ impl Load {
             return Ok(substeps as u32);
         }
         let (upper, lower, force) = (self.upper, self.lower, self.force);
-        Err(Error::input(format!(
+        Err(input!(
             "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
              substeps, more than {MOST_SUBSTEPS}; shorten the step",
             most * 1e3
-        )))
+        ))
     }
 }
 

@@ -214,7 +214,7 @@ macro_rules! stored {
         impl<S: Scalar> $Kernel<S> {
             /// From storage.
             pub fn load(r: &$Row) -> Self {
-                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from_f32(r.$number),)* }
+                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from(r.$number),)* }
             }
 
             /// To storage, without indices.
@@ -246,7 +246,7 @@ impl<S: Scalar> Mass<S> {
     pub fn load(r: &MassRow) -> Self {
         Self {
             inv_inertia: Sym3 { x: Vec3::load(r.inv_inertia_x), yz: Vec3::load(r.inv_inertia_yz) },
-            inv_mass: S::from_f32(r.inv_mass),
+            inv_mass: S::from(r.inv_mass),
             acceleration: Vec3::load(r.acceleration),
         }
     }
@@ -266,7 +266,7 @@ impl<S: Scalar> Mass<S> {
 impl<S: Scalar> Momentum<S> {
     /// From storage.
     pub fn load(r: &MomentumRow) -> Self {
-        let [t, factor, square] = [r.t, r.factor, r.square].map(S::from_f32);
+        let [t, factor, square] = [r.t, r.factor, r.square].map(S::from);
         Self { t, factor, square, restarts: r.restarts }
     }
 

@@ -8,7 +8,7 @@ use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
 use super::schema::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
 use crate::config::check_step_length;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, input};
 use crate::scenes::scene::Scene;
 use crate::world::{Body, BodyKind, MassProperties, Shape, World};
 
@@ -34,7 +34,7 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
-    Error::input(format!("version = {version}: only version 1 is known"))
+    input!("version = {version}: only version 1 is known")
 }
 
 /// What a message calls a body: its index and, if it has one, its name.
