@@ -7,7 +7,7 @@ use std::str::{FromStr, Lines, SplitWhitespace};
 use glam::{DMat3, DVec3};
 
 use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
-use crate::error::{Error, Result, input};
+use crate::error::{Error, Result, ensure, input};
 
 /// The first bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -84,15 +84,10 @@ impl ContactProblem {
 
 fn body(f: &mut Fields) -> Result<FreeBody> {
     let mass = f.number("mass")?;
-    if mass <= 0.0 {
-        return Err(input!("mass {mass:?}: must be more than 0"));
-    }
-    let [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
+    ensure(mass > 0.0, || format!("mass {mass:?}: must be more than 0"))?;
+    let entries @ [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
     let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-    if !is_positive_definite(inertia) {
-        let inertia = [xx, xy, xz, yy, yz, zz];
-        return Err(input!("inertia {inertia:?}: must be positive definite"));
-    }
+    ensure(is_positive_definite(inertia), || format!("inertia {entries:?}: must be positive definite"))?;
     let free = Velocity { linear: f.vector("velocity")?, angular: f.vector("angular velocity")? };
     Ok(FreeBody { mass, inertia, free })
 }
@@ -104,14 +99,11 @@ fn contact(f: &mut Fields, bodies: u32) -> Result<PointContact> {
         return Err(input!("a contact of {which}"));
     }
     let friction = f.number("friction")?;
-    if friction < 0.0 {
-        return Err(input!("friction {friction:?}: must not be negative"));
-    }
+    ensure(friction >= 0.0, || format!("friction {friction:?}: must not be negative"))?;
     let offset = f.vector("offset")?;
     let frame = [f.vector("normal")?, f.vector("first tangent")?, f.vector("second tangent")?];
-    if (frame[0].length() - 1.0).abs() > 1e-6 {
-        return Err(input!("normal {:?}: must have length 1", frame[0].to_array()));
-    }
+    let message = || format!("normal {:?}: must have length 1", frame[0].to_array());
+    ensure((frame[0].length() - 1.0).abs() <= 1e-6, message)?;
     Ok(PointContact { a, b, friction, offset, frame, r_a: f.vector("arm of a")?, r_b: f.vector("arm of b")? })
 }
 
@@ -168,7 +160,8 @@ impl Fields<'_> {
 
     fn number(&mut self, what: &str) -> Result<f64> {
         let x: f64 = self.take(what)?;
-        if x.is_finite() { Ok(x) } else { Err(input!("{what} {x:?}: must be finite")) }
+        ensure(x.is_finite(), || format!("{what} {x:?}: must be finite"))?;
+        Ok(x)
     }
 
     fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {

@@ -6,7 +6,7 @@ use super::catalogue::{CATALOGUE, MOST_BODIES};
 #[cfg(feature = "serde")]
 use super::file::load;
 use super::scene::{Group, Scene};
-use crate::error::{Result, input};
+use crate::error::{Result, ensure, input};
 use crate::memory;
 use crate::suggest::hint;
 
@@ -39,12 +39,12 @@ impl Scene {
         let mut all = Self::find(name_or_path, parameters)?;
         let each = all.world.dynamic_count();
         // A world without dynamic bodies takes memory and time all the same.
-        if count == 0 || each.max(1).saturating_mul(count) > MOST_BODIES as usize {
-            return Err(input!(
+        ensure(count > 0 && each.max(1).saturating_mul(count) <= MOST_BODIES as usize, || {
+            format!(
                 "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MOST_BODIES} worlds, and at most {MOST_BODIES} such bodies in all"
-            ));
-        }
-        let begin = vary.map(|key| whole(name_or_path, parameters, key)).transpose()?;
+            )
+        })?;
+        let vary = vary.map(|key| Ok((key, whole(name_or_path, parameters, key)?))).transpose()?;
         if count == 1 {
             return Ok(all);
         }
@@ -54,19 +54,20 @@ impl Scene {
         let first = all.clone();
         let mut dynamic = each;
         for k in 1..count {
-            match (vary, begin) {
-                (Some(key), Some(begin)) => {
-                    let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
-                    let next = Self::find(name_or_path, &varied)?;
-                    dynamic += next.world.dynamic_count();
-                    if dynamic > MOST_BODIES as usize {
-                        let what = format!("{} of {count} worlds have {dynamic} dynamic bodies", k + 1);
-                        return Err(input!("{what}: must be at most {MOST_BODIES} in all"));
-                    }
-                    all.beside(&next)?;
-                }
-                _ => all.beside(&first)?,
-            }
+            let Some((key, begin)) = vary else {
+                all.beside(&first)?;
+                continue;
+            };
+            let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
+            let next = Self::find(name_or_path, &varied)?;
+            dynamic += next.world.dynamic_count();
+            ensure(dynamic <= MOST_BODIES as usize, || {
+                let worlds = k + 1;
+                format!(
+                    "{worlds} of {count} worlds have {dynamic} dynamic bodies: must be at most {MOST_BODIES} in all"
+                )
+            })?;
+            all.beside(&next)?;
         }
         Ok(all)
     }

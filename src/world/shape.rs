@@ -75,8 +75,8 @@ impl Shape {
         if let Some((k, v)) = vertices.iter().enumerate().find(|(_, v)| !is_place(**v)) {
             return Err(input!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size"));
         }
-        let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
-        SharedShape::trimesh_with_flags(vertices, triangles, flags).map(Self).map_err(|e| input!("mesh: {e}"))
+        let mesh = SharedShape::trimesh_with_flags(vertices, triangles, TriMeshFlags::FIX_INTERNAL_EDGES);
+        mesh.map(Self).map_err(|e| input!("mesh: {e}"))
     }
 
     /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` (m).
@@ -106,12 +106,11 @@ impl Shape {
     /// # Errors
     /// One line that names the shape, the number and its range.
     pub(crate) fn check(&self) -> Result<()> {
-        let sizes = |kind: &str, sizes: &[(&str, f32)]| match sizes.iter().find(|s| !(s.1 > 0.0 && s.1 <= MOST_LENGTH))
-        {
-            None => Ok(()),
-            Some((name, size)) => {
-                Err(input!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m"))
-            }
+        let sizes = |kind: &str, sizes: &[(&str, f32)]| {
+            sizes.iter().try_for_each(|(name, size)| {
+                let message = || format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m");
+                ensure(*size > 0.0 && *size <= MOST_LENGTH, message)
+            })
         };
         match self.0.as_typed_shape() {
             TypedShape::Ball(ball) => sizes("ball", &[("radius", ball.radius)]),
@@ -122,10 +121,10 @@ impl Shape {
             TypedShape::Capsule(c) => sizes("capsule", &[("half height", c.half_height()), ("radius", c.radius)]),
             TypedShape::Cylinder(c) => sizes("cylinder", &[("half height", c.half_height), ("radius", c.radius)]),
             TypedShape::Cone(c) => sizes("cone", &[("half height", c.half_height), ("radius", c.radius)]),
-            TypedShape::HalfSpace(plane) if (plane.normal.length() - 1.0).abs() <= 1e-3 => Ok(()),
             TypedShape::HalfSpace(plane) => {
                 let (normal, length) = (plane.normal, plane.normal.length());
-                Err(input!("half-space of normal {normal}: must have length 1, but has length {length}"))
+                let message = || format!("half-space of normal {normal}: must have length 1, but has length {length}");
+                ensure((length - 1.0).abs() <= 1e-3, message)
             }
             _ => {
                 let extents = self.0.compute_local_aabb();

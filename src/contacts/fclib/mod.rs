@@ -17,7 +17,7 @@ use glam::{DMat3, DVec3};
 
 use super::operator::inverse;
 use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
-use crate::error::{Error, Result, input};
+use crate::error::{Error, Result, ensure, input};
 use frames::{Lever, arm, rotation};
 use table::{Global, Sparse, Tables};
 
@@ -44,12 +44,8 @@ impl ContactProblem {
             }));
         }
         let dimensions = tables.number("fclib_global/spacedim")?;
-        if dimensions != 3 {
-            return Err(input!("fclib_global/spacedim: {dimensions}: must be 3"));
-        }
-        if tables.has("fclib_global/G") {
-            return Err(Error::input("fclib_global/G: joints cannot be read"));
-        }
+        ensure(dimensions == 3, || format!("fclib_global/spacedim: {dimensions}: must be 3"))?;
+        ensure(!tables.has("fclib_global/G"), || "fclib_global/G: joints cannot be read".into())?;
         let (m, h) = (tables.matrix("fclib_global/M")?, tables.matrix("fclib_global/H")?);
         let blocks = mass_blocks(&m).map_err(|e| e.within("fclib_global/M"))?;
         let contacts = contact_rows(&h, m.rows).map_err(|e| e.within("fclib_global/H"))?;
@@ -138,14 +134,12 @@ fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
         return Err(input!("{rows} x {columns}: rigid bodies have 6 rows and columns each"));
     }
     // Before as much memory is asked for.
-    if m.entries.len() < m.rows {
-        return Err(input!("{} entries for {} rows: a mass is missing", m.entries.len(), m.rows));
-    }
+    let (entries, rows) = (m.entries.len(), m.rows);
+    ensure(entries >= rows, || format!("{entries} entries for {rows} rows: a mass is missing"))?;
     let mut entries = vec![[[0.0; 6]; 6]; m.rows / 6];
     for &(row, column, x) in m.entries.iter().filter(|e| e.2 != 0.0) {
-        if row / 6 != column / 6 {
-            return Err(input!("({row}, {column}) ties two bodies: only rigid bodies can be read"));
-        }
+        let message = || format!("({row}, {column}) ties two bodies: only rigid bodies can be read");
+        ensure(row / 6 == column / 6, message)?;
         entries[row / 6][row % 6][column % 6] += x;
     }
     let block = |(i, e): (usize, &[[f64; 6]; 6])| {
@@ -193,9 +187,8 @@ fn contact_rows(h: &Sparse, rows: usize) -> Result<Vec<Sides>> {
         let (found, columns) = (h.rows, h.columns);
         return Err(input!("{found} x {columns}: {rows} rows and 3 columns a contact are needed"));
     }
-    if h.entries.len() < h.columns {
-        return Err(input!("{} entries for {} columns: a contact is empty", h.entries.len(), h.columns));
-    }
+    let (entries, columns) = (h.entries.len(), h.columns);
+    ensure(entries >= columns, || format!("{entries} entries for {columns} columns: a contact is empty"))?;
     let mut contacts = vec![Vec::<Rows>::new(); h.columns / 3];
     for &(row, column, x) in h.entries.iter().filter(|e| e.2 != 0.0) {
         let (contact, body) = (&mut contacts[column / 3], row / 6);
@@ -213,9 +206,7 @@ fn sides(rows: &[Rows]) -> Result<Sides> {
     let mut sides = Sides::default();
     for &rows in rows {
         let volume = directions(&rows).determinant();
-        if volume == 0.0 {
-            return Err(input!("its directions on body {} are in one plane", rows.body));
-        }
+        ensure(volume != 0.0, || format!("its directions on body {} are in one plane", rows.body))?;
         let side = if volume > 0.0 { &mut sides.b } else { &mut sides.a };
         if let Some(other) = side.replace(rows) {
             let (one, other) = (other.body, rows.body);

@@ -2,7 +2,7 @@
 
 use hdf5_pure::{Dataset, File, FileBuilder, GroupBuilder, LibVer};
 
-use crate::error::{Error, Result, input};
+use crate::error::{Error, Result, ensure, input};
 
 /// An open file; every error names the dataset.
 pub(super) struct Tables {
@@ -15,10 +15,8 @@ impl Tables {
         let file = File::from_bytes(bytes).map_err(|e| input!("not a whole HDF5 file: {e}"))?;
         // Else what comes last, and may be left out, would not be missed.
         let whole = file.superblock().eof_address;
-        match length < whole {
-            true => Err(input!("not a whole HDF5 file: {length} of {whole} bytes")),
-            false => Ok(Self { file }),
-        }
+        ensure(length >= whole, || format!("not a whole HDF5 file: {length} of {whole} bytes"))?;
+        Ok(Self { file })
     }
 
     /// Whether there is a group of that name.
@@ -34,10 +32,7 @@ impl Tables {
 
     /// One whole number.
     pub(super) fn number(&self, path: &str) -> Result<i64> {
-        match self.whole(path, 1)?[..] {
-            [number] => Ok(number),
-            _ => unreachable!("one was asked for"),
-        }
+        Ok(self.whole(path, 1)?[0])
     }
 
     /// So many whole numbers.
@@ -65,14 +60,11 @@ impl Tables {
         let shape = dataset.shape().map_err(wrong)?;
         // Before anything is read, so that a wrong size asks for no memory.
         let found = shape.iter().try_fold(1_u64, |all, &n| all.checked_mul(n));
-        if found != Some(count as u64) {
-            return Err(input!("{path}: has the shape {shape:?}, and {count} numbers are needed"));
-        }
+        let message = || format!("{path}: has the shape {shape:?}, and {count} numbers are needed");
+        ensure(found == Some(count as u64), message)?;
         let numbers = read(&dataset).map_err(wrong)?;
-        match numbers.len() == count {
-            true => Ok(numbers),
-            false => Err(input!("{path}: holds {} of {count} numbers", numbers.len())),
-        }
+        ensure(numbers.len() == count, || format!("{path}: holds {} of {count} numbers", numbers.len()))?;
+        Ok(numbers)
     }
 
     /// A sparse matrix, in any of the three forms: `nz` entries by row `i` and column `p`, columns (-1) or rows (-2) one after

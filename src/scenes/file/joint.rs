@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::numbers::lengths;
 use super::schema::{BodyRef, JointFile};
-use crate::error::{Error, Result, input};
+use crate::error::{Error, Result, ensure, input};
 use crate::world::{BallJoint, BodyKind, World};
 
 impl fmt::Display for BodyRef {
@@ -45,13 +45,10 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
         [a, b] => (a.find(world)?, Some(b.find(world)?)),
         _ => return Err(input!("{} bodies: a joint ties one or two", bodies.len())),
     };
-    if b == Some(a) {
-        return Err(input!("bodies {} and {}: the same body twice", bodies[0], bodies[1]));
-    }
+    ensure(b != Some(a), || format!("bodies {} and {}: the same body twice", bodies[0], bodies[1]))?;
     let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
-    if !dynamic(a) && !b.is_some_and(dynamic) {
-        return Err(Error::input("nothing that it ties can be moved: one of the bodies must be dynamic"));
-    }
+    let message = "nothing that it ties can be moved: one of the bodies must be dynamic";
+    ensure(dynamic(a) || b.is_some_and(dynamic), || message.into())?;
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
             let point = lengths("anchor", *point)?.into();
