@@ -57,6 +57,12 @@ impl Error {
     }
 }
 
+/// An [`Error::Input`] with a text as of `format!`.
+macro_rules! input {
+    ($($text:tt)*) => { $crate::error::Error::Input(format!($($text)*)) };
+}
+pub(crate) use input;
+
 /// Refuses the caller's input with a message unless a condition holds.
 pub(crate) fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Input(message())) }

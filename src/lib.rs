@@ -39,7 +39,6 @@
 
 pub mod backend;
 mod collide;
-mod compare;
 pub mod config;
 pub mod contacts;
 mod effort;

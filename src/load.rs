@@ -4,13 +4,14 @@
 //! w = 2 pi times the contact frequency, which is tied to the substep (docs/derivation.md, section 5). So the overlap of
 //! whatever stands falls with the square of the substeps, and is known before the first step.
 
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
+use parry3d::bounding_volume::Aabb;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 
 use crate::config::{SolverConfig, Stabilization};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, input};
 use crate::world::{Body, BodyKind, World, pose};
 
 /// Most substeps that the settings take.
@@ -45,7 +46,7 @@ impl Load {
     /// All interfaces of `world`, as those of [`Self::heaviest`].
     pub fn all(world: &World, config: &SolverConfig) -> Vec<Self> {
         let boxes = upright_boxes(world);
-        let grid = Grid::new(&boxes);
+        let tree = tree(&boxes);
         let gravity = world.gravity.as_dvec3().length();
         let weight = |b: &Body| f64::from(b.mass.mass) * gravity;
         let mut borne: Vec<f64> = world.bodies.iter().map(weight).collect();
@@ -54,7 +55,7 @@ impl Load {
         from_the_top.sort_by(|&i, &j| boxes[j].low.y.total_cmp(&boxes[i].low.y).then(i.cmp(&j)));
         let mut all = Vec::new();
         for upper in from_the_top {
-            let below = grid.supports(&boxes, upper);
+            let below = supports(&tree, &boxes, upper);
             let total: f64 = below.iter().map(|s| s.1).sum();
             for (lower, area) in below {
                 let force = borne[upper] * area / total;
@@ -85,11 +86,11 @@ impl Load {
             return Ok(substeps as u32);
         }
         let (upper, lower, force) = (self.upper, self.lower, self.force);
-        Err(Error::input(format!(
+        Err(input!(
             "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
              substeps, more than {MOST_SUBSTEPS}; shorten the step",
             most * 1e3
-        )))
+        ))
     }
 }
 
@@ -163,53 +164,36 @@ fn upright_boxes(world: &World) -> Vec<Box3> {
     world.bodies.iter().map(of).collect()
 }
 
-/// Boxes by the column of square cells, seen from above, in which their centers are.
-struct Grid {
-    cell: f64,
-    columns: HashMap<(i64, i64), Vec<usize>>,
-    /// Those that are wider than a cell.
-    wide: Vec<usize>,
+/// Farther than any body is (m), and small enough for areas in single precision.
+const FAR: f64 = 1e15;
+
+/// The boxes of all bodies that have shapes, to be asked for those under a body.
+fn tree(boxes: &[Box3]) -> Bvh {
+    let leaves = boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
+    Bvh::from_iter(BvhBuildStrategy::Binned, leaves.map(|(i, b)| (i, aabb(b.low, b.high))))
 }
 
-impl Grid {
-    fn new(boxes: &[Box3]) -> Self {
-        let width = |b: &Box3| (b.high.x - b.low.x).max(b.high.z - b.low.z);
-        let mut widths: Vec<f64> = boxes.iter().filter(|b| !b.is_empty()).map(width).collect();
-        widths.sort_by(f64::total_cmp);
-        // Wide enough for most, narrow enough for few to share a column.
-        let cell = 2.0 * widths.get(widths.len() / 2).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
-        let mut grid = Self { cell, columns: HashMap::new(), wide: Vec::new() };
-        for (i, b) in boxes.iter().enumerate().filter(|(_, b)| !b.is_empty()) {
-            if width(b) <= cell {
-                grid.columns.entry(grid.column(b.center())).or_default().push(i);
-            } else {
-                grid.wide.push(i);
-            }
-        }
-        grid
-    }
+fn aabb(low: DVec3, high: DVec3) -> Aabb {
+    Aabb::new(low.max(DVec3::splat(-FAR)).as_vec3(), high.min(DVec3::splat(FAR)).as_vec3())
+}
 
-    fn column(&self, at: DVec3) -> (i64, i64) {
-        ((at.x / self.cell).floor() as i64, (at.z / self.cell).floor() as i64)
-    }
-
-    /// The bodies that bear `upper`, with the areas by which they overlap it from above.
-    fn supports(&self, boxes: &[Box3], upper: usize) -> Vec<(usize, f64)> {
-        let above = &boxes[upper];
-        let height = above.high.y - above.low.y;
-        let area = |i: usize| {
-            let shared = above.overlap_from_above(&boxes[i]);
-            (shared.high.x - shared.low.x).max(0.0) * (shared.high.z - shared.low.z).max(0.0)
-        };
-        // A narrow box that overlaps has its center at most a cell further out.
-        let (first, last) = (self.column(above.low - self.cell), self.column(above.high + self.cell));
-        let near = (first.0..=last.0).flat_map(|x| (first.1..=last.1).filter_map(move |z| self.columns.get(&(x, z))));
-        let lower = |i: &usize| *i != upper && boxes[*i].high.y < above.low.y + 0.5 * height;
-        let below: Vec<_> = near.flatten().chain(&self.wide).copied().filter(lower).map(|i| (i, area(i))).collect();
-        let below: Vec<_> = below.into_iter().filter(|s| s.1 > 0.0).collect();
-        let top = below.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
-        below.into_iter().filter(|s| boxes[s.0].high.y >= top - LEVEL * height).collect()
-    }
+/// The bodies that bear `upper`, with the areas by which they overlap it from above.
+fn supports(tree: &Bvh, boxes: &[Box3], upper: usize) -> Vec<(usize, f64)> {
+    let above = &boxes[upper];
+    let height = above.high.y - above.low.y;
+    let area = |i: usize| {
+        let shared = above.overlap_from_above(&boxes[i]);
+        (shared.high.x - shared.low.x).max(0.0) * (shared.high.z - shared.low.z).max(0.0)
+    };
+    let middle = above.low.y + 0.5 * height;
+    let column = aabb(above.low.with_y(-FAR), above.high.with_y(middle));
+    let lower = |i: &usize| *i != upper && boxes[*i].high.y < middle;
+    let near = tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
+    let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
+    below.sort_unstable_by_key(|s| s.0);
+    let top = below.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
+    below.retain(|s| boxes[s.0].high.y >= top - LEVEL * height);
+    below
 }
 
 #[cfg(test)]

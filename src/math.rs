@@ -56,13 +56,9 @@ pub trait Lane:
 }
 
 /// A lane of one number, which can be converted to and from `f32` storage.
-pub trait Scalar: Lane + PartialOrd {
-    /// From storage.
-    fn from_f32(x: f32) -> Self;
+pub trait Scalar: Lane + PartialOrd + From<f32> {
     /// To storage, rounded to nearest.
     fn to_f32(self) -> f32;
-    /// The same number in `f64`, for measuring.
-    fn to_f64(self) -> f64;
 }
 
 /// Less half of the bits of a positive number, it is the bits of a first guess at the inverse square root.
@@ -138,31 +134,15 @@ impl Lane for f64 {
 
 impl Scalar for f32 {
     #[inline(always)]
-    fn from_f32(x: f32) -> Self {
-        x
-    }
-    #[inline(always)]
     fn to_f32(self) -> f32 {
         self
-    }
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self.into()
     }
 }
 
 impl Scalar for f64 {
     #[inline(always)]
-    fn from_f32(x: f32) -> Self {
-        x.into()
-    }
-    #[inline(always)]
     fn to_f32(self) -> f32 {
         self as f32
-    }
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self
     }
 }
 
@@ -215,21 +195,20 @@ pub fn vec3<L>(x: L, y: L, z: L) -> Vec3<L> {
     Vec3 { x, y, z }
 }
 
-impl<L: Lane> Add for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        vec3(self.x + o.x, self.y + o.y, self.z + o.z)
-    }
+/// Operators that work component by component, as in WGSL.
+macro_rules! component_by_component {
+    ($($Operator:ident $name:ident $sign:tt;)*) => {$(
+        impl<L: Lane> $Operator for Vec3<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, o: Self) -> Self {
+                vec3(self.x $sign o.x, self.y $sign o.y, self.z $sign o.z)
+            }
+        }
+    )*};
 }
 
-impl<L: Lane> Sub for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        vec3(self.x - o.x, self.y - o.y, self.z - o.z)
-    }
-}
+component_by_component! { Add add +; Sub sub -; Mul mul *; }
 
 impl<L: Lane> AddAssign for Vec3<L> {
     #[inline(always)]
@@ -245,15 +224,6 @@ impl<L: Lane> SubAssign for Vec3<L> {
     }
 }
 
-/// Component by component, as in WGSL.
-impl<L: Lane> Mul for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, o: Self) -> Self {
-        vec3(self.x * o.x, self.y * o.y, self.z * o.z)
-    }
-}
-
 impl<L: Lane> Mul<L> for Vec3<L> {
     type Output = Self;
     #[inline(always)]
@@ -266,7 +236,8 @@ impl<S: Scalar> Vec3<S> {
     /// From storage.
     #[inline(always)]
     pub fn load(v: [f32; 3]) -> Self {
-        vec3(S::from_f32(v[0]), S::from_f32(v[1]), S::from_f32(v[2]))
+        let [x, y, z] = v.map(S::from);
+        vec3(x, y, z)
     }
 
     /// To storage.
@@ -301,7 +272,8 @@ impl<S: Scalar> Quat<S> {
     /// From storage, x y z w.
     #[inline(always)]
     pub fn load(q: [f32; 4]) -> Self {
-        Self { axis: Vec3::load([q[0], q[1], q[2]]), w: S::from_f32(q[3]) }
+        let [x, y, z, w] = q.map(S::from);
+        Self { axis: vec3(x, y, z), w }
     }
 
     /// To storage, x y z w.

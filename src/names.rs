@@ -25,7 +25,7 @@ macro_rules! named {
             type Err = $crate::error::Error;
 
             fn from_str(name: &str) -> $crate::error::Result<Self> {
-                let unknown = || $crate::error::Error::input(format!("{name:?} is none of {}", [$($name),+].join(", ")));
+                let unknown = || $crate::error::input!("{name:?} is none of {}", [$($name),+].join(", "));
                 Self::ALL.into_iter().find(|value| value.name() == name).ok_or_else(unknown)
             }
         }

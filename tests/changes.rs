@@ -1,8 +1,12 @@
 //! What the caller changes between two steps: the next step follows it, whatever it is, or says why not.
 
+#[allow(dead_code)]
+#[path = "../cli/src/compare.rs"]
+mod compare;
+
+use compare::Difference;
 use drystone::config::{Clamping, Friction, FrictionAt, FrictionOrder, FrictionSweeps, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
-use drystone::stages::compare::Difference;
 use drystone::{Backend, BallJoint, Body, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
 const DT: f32 = 1.0 / 60.0;

@@ -12,11 +12,12 @@ const LIBRARY: &[&[&str]] = &[
     &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
-    &["compare", "stages"],
+    &["stages"],
 ];
 
 /// The modules of the command, above the library.
-const COMMAND: &[&[&str]] = &[&["files", "settings"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
+const COMMAND: &[&[&str]] =
+    &[&["files", "settings", "compare"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
 
 const LIB: &str = include_str!("../src/lib.rs");
 const CLI: &str = include_str!("../cli/src/lib.rs");

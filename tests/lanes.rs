@@ -1,9 +1,12 @@
 //! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
+#[allow(dead_code)]
+#[path = "../cli/src/compare.rs"]
+mod compare;
 #[path = "common/settings.rs"]
 mod settings;
 
-use drystone::stages::compare::{Comparison, compare};
+use compare::{Comparison, compare};
 use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
 use settings::set;
 

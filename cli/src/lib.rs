@@ -4,6 +4,7 @@
 #![warn(missing_docs)]
 
 pub mod commands;
+pub mod compare;
 pub mod files;
 pub mod hard;
 pub mod maze;

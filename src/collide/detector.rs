@@ -11,7 +11,7 @@ use super::pair::Pair;
 use super::report::{Activity, Change, DetectStats};
 use super::world_contacts::{DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
-use crate::error::{Error, Result};
+use crate::error::{Result, input};
 use crate::world::{Body, BodyKind, Collider, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
@@ -70,11 +70,11 @@ impl Detector {
     pub fn check_bodies(&self, world: &World) -> Result<()> {
         let (had, has) = (self.kinds.len(), world.bodies.len());
         if had != has || world.begins != self.begins {
-            return Err(Error::input(format!(
+            return Err(input!(
                 "there are {has} bodies in {} worlds, and there were {had} in {} when its simulation began: {ANEW}",
                 world.begins.len() + 1,
                 self.begins.len() + 1
-            )));
+            ));
         }
         let mut colliders = self.worlds.iter().flat_map(WorldContacts::colliders).peekable();
         for (i, (body, kind)) in world.bodies.iter().zip(&self.kinds).enumerate() {
@@ -82,7 +82,7 @@ impl Detector {
             let all = body.kind == *kind && body.colliders.iter().all(same);
             if !all || colliders.peek().is_some_and(|next| next.body as usize == i) {
                 let name = &body.name;
-                return Err(Error::input(format!("body {i} {name:?} changed its kind or shapes: {ANEW}")));
+                return Err(input!("body {i} {name:?} changed its kind or shapes: {ANEW}"));
             }
         }
         Ok(())

@@ -8,11 +8,12 @@
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
+use parry3d::query::TrackedContact;
 use parry3d::query::details::{NormalConstraints, contact_support_map_support_map_with_params};
 use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
-use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
+use super::query::ask;
 use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, ParryManifold, Patch, Solid, add_above, clip, clip_to};
 
 /// The contact of a half-space with a convex shape at `pos12`; none for a ball.
@@ -57,16 +58,7 @@ pub(super) fn composite_contacts(
         } else {
             let cone = cone();
             let cone = cone.as_ref().map(|cone| cone as &dyn NormalConstraints);
-            // Every pair of convex shapes is supported.
-            let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(
-                pos12,
-                triangle,
-                shape,
-                cone,
-                None,
-                search.prediction,
-                &mut found,
-            );
+            ask((triangle, shape), pos12, cone, search.prediction, &mut found);
         }
         if !found.points.is_empty() {
             many.push(found);

@@ -73,18 +73,14 @@ impl Manifold {
     pub(super) fn succeed(&mut self, old: &Self, distance: f32) {
         self.slot = old.slot;
         let mut taken = [false; MAX_POINTS];
-        let mut matched = [false; MAX_POINTS];
-        for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
+        for point in &mut self.points[..self.count as usize] {
             let same = |o: &ManifoldPoint| o.features == point.features && point.features != 0;
             if let Some(j) = (0..old.points().len()).find(|&j| !taken[j] && same(&old.points[j])) {
                 point.before = Some(j as u8);
-                (taken[j], matched[i]) = (true, true);
+                taken[j] = true;
             }
         }
-        for (i, point) in self.points[..self.count as usize].iter_mut().enumerate() {
-            if matched[i] {
-                continue;
-            }
+        for point in self.points[..self.count as usize].iter_mut().filter(|point| point.before.is_none()) {
             let apart = |o: &ManifoldPoint| {
                 let on_a = o.anchor_a.distance_squared(point.anchor_a);
                 on_a.min(o.anchor_b.distance_squared(point.anchor_b))

@@ -76,6 +76,9 @@ impl Placed {
     }
 }
 
+/// A collider, and where its body is.
+type Side<'a> = (&'a ColliderInfo, &'a BodyState);
+
 /// Memory that one thread reuses from pair to pair.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -179,30 +182,19 @@ impl Pair {
         self.computed_at = Some([Placed::of(a), Placed::of(b)]);
         self.motion = Motion::default();
         self.predicted = prediction;
-        let (ca, cb) = (&colliders[self.collider_a as usize], &colliders[self.collider_b as usize]);
         let before = self.manifolds.len();
-        self.compute(ca, cb, a, b, prediction, size, scratch);
+        let sides = [(&colliders[self.collider_a as usize], a), (&colliders[self.collider_b as usize], b)];
+        self.compute(sides, ContactQuery { prediction, size }, scratch);
         let same = |(now, then): (&Manifold, &Manifold)| now.points().len() == then.points().len();
         let all_same = self.manifolds.len() == before && self.manifolds.iter().zip(&scratch.old).all(same);
         if all_same { Update::Computed } else { Update::Reshaped }
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn compute(
-        &mut self,
-        ca: &ColliderInfo,
-        cb: &ColliderInfo,
-        a: &BodyState,
-        b: &BodyState,
-        prediction: f32,
-        size: f32,
-        scratch: &mut Scratch,
-    ) {
-        let pose_a = Pose::from_parts(a.position, a.rotation) * ca.local;
-        let pose_b = Pose::from_parts(b.position, b.rotation) * cb.local;
+    fn compute(&mut self, sides: [Side; 2], search: ContactQuery, scratch: &mut Scratch) {
+        let [(ca, _), (cb, _)] = sides;
+        let [pose_a, pose_b] = sides.map(|(c, body)| Pose::from_parts(body.position, body.rotation) * c.local);
         let pos12 = pose_a.inv_mul(&pose_b);
         let Scratch { buffers, one, many, candidates, old } = scratch;
-        let search = ContactQuery { prediction, size };
         many.clear();
         let found: &[ParryManifold] = if ca.is_composite() {
             composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, buffers, many);
@@ -222,7 +214,7 @@ impl Pair {
         self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
-            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, [(ca, a), (cb, b)], prediction)));
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, sides, search.prediction)));
             if candidates.is_empty() {
                 continue;
             }
@@ -233,7 +225,7 @@ impl Pair {
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
             manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
             if let Some(o) = old.iter_mut().find(|o| o.subshapes == manifold.subshapes && !o.has_ended()) {
-                manifold.succeed(o, 0.1 * size);
+                manifold.succeed(o, 0.1 * search.size);
                 o.slot = NO_SLOT;
             }
             self.manifolds.push(manifold);
@@ -251,7 +243,7 @@ impl Pair {
 fn candidate(
     m: &ParryManifold,
     p: &TrackedContact<()>,
-    [(ca, a), (cb, b)]: [(&ColliderInfo, &BodyState); 2],
+    [(ca, a), (cb, b)]: [Side; 2],
     prediction: f32,
 ) -> Option<ManifoldPoint> {
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);

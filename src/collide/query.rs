@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::query::details::{NormalConstraints, contact_manifold_cuboid_cuboid};
 use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher};
-use parry3d::shape::SharedShape;
+use parry3d::shape::{Shape, SharedShape};
 
 use super::facet::half_space_contact;
 use super::solid::{ClipBuffers, ContactQuery, DEEP, ParryManifold, Solid, add_above, clip_to};
@@ -57,11 +57,11 @@ fn searched_contact(
     // A half-space reaches further than any other shape.
     if let Some(plane) = a.as_halfspace() {
         if half_space_contact(plane.normal, &**b, pos12, buffers, &mut found).is_none() {
-            ask((a, b), pos12, prediction, &mut found);
+            ask((&**a, &**b), pos12, None, prediction, &mut found);
         }
         return found;
     }
-    ask((a, b), pos12, prediction, &mut found);
+    ask((&**a, &**b), pos12, None, prediction, &mut found);
     let (Some(map_a), Some(map_b)) = (a.as_support_map(), b.as_support_map()) else { return found };
     let along = |d: Vec3| {
         let own = pos12.rotation.inverse() * -d;
@@ -88,7 +88,7 @@ fn searched_contact(
         let mut apart = *pos12;
         apart.translation += away * push;
         let mut again = ParryManifold::new();
-        ask((a, b), &apart, prediction + push, &mut again);
+        ask((&**a, &**b), &apart, None, prediction + push, &mut again);
         let (distance, pushed) = (along(again.local_n1), push * again.local_n1.dot(away));
         again.points.iter_mut().for_each(|p| p.dist -= pushed);
         if is_better(distance, best, found_is_true) && is_true(&again, distance) {
@@ -119,9 +119,15 @@ fn searched_contact(
     found
 }
 
-/// parry's answer. Every pair of convex shapes is supported.
-fn ask((a, b): (&SharedShape, &SharedShape), pos12: &Pose, prediction: f32, found: &mut ParryManifold) {
-    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, &**a, &**b, None, None, prediction, found);
+/// parry's answer, with normals of a within `cone`. Every pair of convex shapes is supported.
+pub(super) fn ask(
+    (a, b): (&dyn Shape, &dyn Shape),
+    pos12: &Pose,
+    cone: Option<&dyn NormalConstraints>,
+    prediction: f32,
+    found: &mut ParryManifold,
+) {
+    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
 }
 
 /// The contact of `other` across the face of `solid` with the unit normal `face`.

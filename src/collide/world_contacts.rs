@@ -25,7 +25,7 @@ pub(super) struct DetectionInput<'a> {
 }
 
 /// The colliders of one world, which meet no others.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct WorldContacts {
     colliders: Vec<ColliderInfo>,
     unbounded: Vec<u32>,
@@ -61,21 +61,7 @@ const FAT: f32 = 0.1;
 impl WorldContacts {
     pub fn new(colliders: Vec<ColliderInfo>) -> Self {
         let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
-        Self {
-            colliders,
-            unbounded,
-            tree: Bvh::new(),
-            workspace: BvhWorkspace::default(),
-            fat: Vec::new(),
-            left: Vec::new(),
-            moved: Vec::new(),
-            pairs: Vec::new(),
-            slots: HashMap::default(),
-            found: Vec::new(),
-            ended: Vec::new(),
-            changed: Vec::new(),
-            look_again: false,
-        }
+        Self { colliders, unbounded, ..Self::default() }
     }
 
     /// The colliders, in the order of the bodies.

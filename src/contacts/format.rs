@@ -7,7 +7,7 @@ use std::str::{FromStr, Lines, SplitWhitespace};
 use glam::{DMat3, DVec3};
 
 use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure, input};
 
 /// The first bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -38,7 +38,7 @@ impl ContactProblem {
         let mut problem = Self::default();
         reader.row("contacts", |f| match f.take::<u32>("version")? {
             1 => Ok(()),
-            version => Err(Error::input(format!("version {version}: only 1 is known"))),
+            version => Err(input!("version {version}: only 1 is known")),
         })?;
         problem.name = reader.next("the name")?.trim().to_owned();
         let (bodies, contacts) = reader.row("bodies", |f| {
@@ -84,15 +84,10 @@ impl ContactProblem {
 
 fn body(f: &mut Fields) -> Result<FreeBody> {
     let mass = f.number("mass")?;
-    if mass <= 0.0 {
-        return Err(Error::input(format!("mass {mass:?}: must be more than 0")));
-    }
-    let [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
+    ensure(mass > 0.0, || format!("mass {mass:?}: must be more than 0"))?;
+    let entries @ [xx, xy, xz, yy, yz, zz] = f.numbers("inertia")?;
     let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-    if !is_positive_definite(inertia) {
-        let inertia = [xx, xy, xz, yy, yz, zz];
-        return Err(Error::input(format!("inertia {inertia:?}: must be positive definite")));
-    }
+    ensure(is_positive_definite(inertia), || format!("inertia {entries:?}: must be positive definite"))?;
     let free = Velocity { linear: f.vector("velocity")?, angular: f.vector("angular velocity")? };
     Ok(FreeBody { mass, inertia, free })
 }
@@ -101,17 +96,14 @@ fn contact(f: &mut Fields, bodies: u32) -> Result<PointContact> {
     let [a, b] = [f.body("a", bodies)?, f.body("b", bodies)?];
     if a == b {
         let which = a.map_or("two fixed bodies".into(), |i| format!("body {i} with itself"));
-        return Err(Error::input(format!("a contact of {which}")));
+        return Err(input!("a contact of {which}"));
     }
     let friction = f.number("friction")?;
-    if friction < 0.0 {
-        return Err(Error::input(format!("friction {friction:?}: must not be negative")));
-    }
+    ensure(friction >= 0.0, || format!("friction {friction:?}: must not be negative"))?;
     let offset = f.vector("offset")?;
     let frame = [f.vector("normal")?, f.vector("first tangent")?, f.vector("second tangent")?];
-    if (frame[0].length() - 1.0).abs() > 1e-6 {
-        return Err(Error::input(format!("normal {:?}: must have length 1", frame[0].to_array())));
-    }
+    let message = || format!("normal {:?}: must have length 1", frame[0].to_array());
+    ensure((frame[0].length() - 1.0).abs() <= 1e-6, message)?;
     Ok(PointContact { a, b, friction, offset, frame, r_a: f.vector("arm of a")?, r_b: f.vector("arm of b")? })
 }
 
@@ -124,7 +116,7 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn next(&mut self, expected: &str) -> Result<&'a str> {
         self.line += 1;
-        let end = || Error::input(format!("line {}: ends where {expected} should be", self.line));
+        let end = || input!("line {}: ends where {expected} should be", self.line);
         self.lines.next().ok_or_else(end)
     }
 
@@ -132,7 +124,7 @@ impl<'a> Reader<'a> {
     fn row<T>(&mut self, head: &str, take: impl FnOnce(&mut Fields) -> Result<T>) -> Result<T> {
         let mut fields = Fields { words: self.next(&format!("{head:?}"))?.split_whitespace() };
         let taken = fields.word(head).and_then(|()| take(&mut fields)).and_then(|row| match fields.words.next() {
-            Some(word) => Err(Error::input(format!("{word:?} is one field too many"))),
+            Some(word) => Err(input!("{word:?} is one field too many")),
             None => Ok(row),
         });
         taken.map_err(|e| e.within(format!("line {}", self.line)))
@@ -141,7 +133,7 @@ impl<'a> Reader<'a> {
     /// Nothing but blank lines follows.
     fn end(mut self) -> Result<()> {
         match self.lines.by_ref().inspect(|_| self.line += 1).find(|line| !line.trim().is_empty()) {
-            Some(line) => Err(Error::input(format!("line {}: {line:?} after the last contact", self.line))),
+            Some(line) => Err(input!("line {}: {line:?} after the last contact", self.line)),
             None => Ok(()),
         }
     }
@@ -156,19 +148,20 @@ impl Fields<'_> {
     fn word(&mut self, expected: &str) -> Result<()> {
         match self.words.next() {
             Some(word) if word == expected => Ok(()),
-            Some(word) => Err(Error::input(format!("{word:?} where {expected:?} should be"))),
-            None => Err(Error::input(format!("ends where {expected:?} should be"))),
+            Some(word) => Err(input!("{word:?} where {expected:?} should be")),
+            None => Err(input!("ends where {expected:?} should be")),
         }
     }
 
     fn take<T: FromStr>(&mut self, what: &str) -> Result<T> {
-        let word = self.words.next().ok_or_else(|| Error::input(format!("ends where {what} should be")))?;
-        word.parse().map_err(|_| Error::input(format!("{what} {word:?}: cannot be read")))
+        let word = self.words.next().ok_or_else(|| input!("ends where {what} should be"))?;
+        word.parse().map_err(|_| input!("{what} {word:?}: cannot be read"))
     }
 
     fn number(&mut self, what: &str) -> Result<f64> {
         let x: f64 = self.take(what)?;
-        if x.is_finite() { Ok(x) } else { Err(Error::input(format!("{what} {x:?}: must be finite"))) }
+        ensure(x.is_finite(), || format!("{what} {x:?}: must be finite"))?;
+        Ok(x)
     }
 
     fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
@@ -188,7 +181,7 @@ impl Fields<'_> {
         match self.take::<i64>(what)? {
             -1 => Ok(None),
             i if (0..i64::from(bodies)).contains(&i) => Ok(Some(i as u32)),
-            i => Err(Error::input(format!("body {what} = {i}: must be -1 or one of 0 to {}", i64::from(bodies) - 1))),
+            i => Err(input!("body {what} = {i}: must be -1 or one of 0 to {}", i64::from(bodies) - 1)),
         }
     }
 }

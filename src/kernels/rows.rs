@@ -214,7 +214,7 @@ macro_rules! stored {
         impl<S: Scalar> $Kernel<S> {
             /// From storage.
             pub fn load(r: &$Row) -> Self {
-                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from_f32(r.$number),)* $($same: r.$same)? }
+                Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from(r.$number),)* $($same: r.$same)? }
             }
 
             /// To storage, without indices.
@@ -248,7 +248,7 @@ impl<S: Scalar> Mass<S> {
     pub fn load(r: &MassRow) -> Self {
         Self {
             inv_inertia: Sym3 { x: Vec3::load(r.inv_inertia_x), yz: Vec3::load(r.inv_inertia_yz) },
-            inv_mass: S::from_f32(r.inv_mass),
+            inv_mass: S::from(r.inv_mass),
             acceleration: Vec3::load(r.acceleration),
         }
     }

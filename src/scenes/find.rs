@@ -6,7 +6,7 @@ use super::catalogue::{CATALOGUE, MOST_BODIES};
 #[cfg(feature = "serde")]
 use super::file::load;
 use super::scene::{Group, Scene};
-use crate::error::{Error, Result};
+use crate::error::{Result, ensure, input};
 use crate::memory;
 use crate::suggest::hint;
 
@@ -39,12 +39,12 @@ impl Scene {
         let mut all = Self::find(name_or_path, parameters)?;
         let each = all.world.dynamic_count();
         // A world without dynamic bodies takes memory and time all the same.
-        if count == 0 || each.max(1).saturating_mul(count) > MOST_BODIES as usize {
-            return Err(Error::input(format!(
+        ensure(count > 0 && each.max(1).saturating_mul(count) <= MOST_BODIES as usize, || {
+            format!(
                 "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MOST_BODIES} worlds, and at most {MOST_BODIES} such bodies in all"
-            )));
-        }
-        let begin = vary.map(|key| whole(name_or_path, parameters, key)).transpose()?;
+            )
+        })?;
+        let vary = vary.map(|key| Ok((key, whole(name_or_path, parameters, key)?))).transpose()?;
         if count == 1 {
             return Ok(all);
         }
@@ -54,19 +54,20 @@ impl Scene {
         let first = all.clone();
         let mut dynamic = each;
         for k in 1..count {
-            match (vary, begin) {
-                (Some(key), Some(begin)) => {
-                    let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
-                    let next = Self::find(name_or_path, &varied)?;
-                    dynamic += next.world.dynamic_count();
-                    if dynamic > MOST_BODIES as usize {
-                        let what = format!("{} of {count} worlds have {dynamic} dynamic bodies", k + 1);
-                        return Err(Error::input(format!("{what}: must be at most {MOST_BODIES} in all")));
-                    }
-                    all.beside(&next)?;
-                }
-                _ => all.beside(&first)?,
-            }
+            let Some((key, begin)) = vary else {
+                all.beside(&first)?;
+                continue;
+            };
+            let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
+            let next = Self::find(name_or_path, &varied)?;
+            dynamic += next.world.dynamic_count();
+            ensure(dynamic <= MOST_BODIES as usize, || {
+                let worlds = k + 1;
+                format!(
+                    "{worlds} of {count} worlds have {dynamic} dynamic bodies: must be at most {MOST_BODIES} in all"
+                )
+            })?;
+            all.beside(&next)?;
         }
         Ok(all)
     }
@@ -82,7 +83,7 @@ impl Scene {
         for assignment in parameters.split(',').filter(|a| !a.is_empty()) {
             match assignment.split_once('=') {
                 Some(("worlds", number)) => {
-                    let refusal = |_| Error::input(format!("{spec}: worlds = {number:?}: must be a whole number"));
+                    let refusal = |_| input!("{spec}: worlds = {number:?}: must be a whole number");
                     count = number.parse().map_err(refusal)?;
                 }
                 Some(("vary", key)) => vary = Some(key),
@@ -109,27 +110,24 @@ fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
     let path = Path::new(name_or_path);
     if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
         let hint = hint(name_or_path, CATALOGUE.iter().map(|e| e.name), "`drystone scenes` lists the scenes");
-        return Err(Error::input(format!("{name_or_path:?} is neither a scene nor a scene file{hint}")));
+        return Err(input!("{name_or_path:?} is neither a scene nor a scene file{hint}"));
     }
     match parameters.first() {
-        Some(p) => Err(Error::input(format!("{name_or_path}: a scene file takes no parameter, such as {p:?}"))),
+        Some(p) => Err(input!("{name_or_path}: a scene file takes no parameter, such as {p:?}")),
         None => load(path),
     }
 }
 
 #[cfg(not(feature = "serde"))]
 fn load(path: &Path) -> Result<Scene> {
-    Err(Error::input(format!(
-        "{}: a scene file: drystone was built without the feature serde, which reads it",
-        path.display()
-    )))
+    Err(input!("{}: a scene file: drystone was built without the feature serde, which reads it", path.display()))
 }
 
 /// The value of a parameter that is a whole number.
 fn whole(scene: &str, parameters: &[String], key: &str) -> Result<f64> {
     let refusal = |known: &[&str], list: &str| {
         let hint = hint(key, known.iter().copied(), format_args!("it has: {list}"));
-        Error::input(format!("{scene} has no whole number {key:?} to vary{hint}"))
+        input!("{scene} has no whole number {key:?} to vary{hint}")
     };
     let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal(&[], "none, being a file"))?;
     let known: Vec<_> = entry.parameters.iter().filter(|p| p.whole).map(|p| p.name).collect();

@@ -4,7 +4,6 @@ mod catalogue;
 #[cfg(feature = "serde")]
 mod file;
 mod find;
-mod hash;
 mod scene;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{Order, Sequence};
 use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
-use crate::error::{Error, Result};
+use crate::error::{Result, input};
 use crate::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::problem::effective::tangent_mass;
@@ -95,7 +95,7 @@ fn hand(index: usize, contact: &PointContact) -> Result<f64> {
         Ok(-1.0)
     } else {
         let t_2 = t_2.to_array();
-        Err(Error::input(format!("contact {index}: second tangent {t_2:?} is not the normal times the first")))
+        Err(input!("contact {index}: second tangent {t_2:?} is not the normal times the first"))
     }
 }
 

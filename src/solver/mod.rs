@@ -23,6 +23,7 @@ use crate::backend::{Backend, CheckedStep};
 use crate::config::Method;
 use crate::contacts::{ContactProblem, Operator, Velocity};
 use crate::error::Result;
+use crate::kernels::{Body, Impulse};
 use crate::math::Vec3;
 use crate::plan::StepPlan;
 use crate::problem::StepProblem;
@@ -139,35 +140,25 @@ impl<'a> Solver<'a> {
     /// The impulses of the last sweep in the order of the problem, each in its contact's coordinates (N s).
     pub fn impulses(&self) -> Vec<DVec3> {
         let impulse = |(&point, &hand): (&u32, &f64)| {
-            let r = match &self.work {
-                Work::Exact(reference) => to_f64(reference.rows().impulses[point as usize].components()),
-                Work::Rounded(_) => {
-                    let row = &self.problem.impulses[point as usize];
-                    DVec3::new(row.normal.into(), row.tangent_1.into(), row.tangent_2.into())
-                }
+            let impulse = match &self.work {
+                Work::Exact(reference) => reference.rows().impulses[point as usize],
+                Work::Rounded(_) => Impulse::load(&self.problem.impulses[point as usize]),
             };
-            DVec3::new(r.x, r.y, r.z * hand)
+            to_f64(impulse.components()) * DVec3::new(1.0, 1.0, hand)
         };
         self.points.iter().zip(&self.hands).map(impulse).collect()
     }
 
     /// The velocities of the last sweep, carried along with the impulses.
     pub fn velocities(&self) -> Vec<Velocity> {
-        let movable = 0..self.problem.bodies.len() - 1;
-        let velocity = |i: usize| match &self.work {
-            Work::Exact(reference) => {
-                let body = &reference.rows().bodies[i];
-                Velocity { linear: to_f64(body.v), angular: to_f64(body.w) }
-            }
-            Work::Rounded(_) => {
-                let row = &self.problem.bodies[i];
-                Velocity {
-                    linear: DVec3::from_array(row.v.map(f64::from)),
-                    angular: DVec3::from_array(row.w.map(f64::from)),
-                }
-            }
+        let velocity = |i: usize| {
+            let body = match &self.work {
+                Work::Exact(reference) => reference.rows().bodies[i],
+                Work::Rounded(_) => Body::load(&self.problem.bodies[i]),
+            };
+            Velocity { linear: to_f64(body.v), angular: to_f64(body.w) }
         };
-        movable.map(velocity).collect()
+        (0..self.problem.bodies.len() - 1).map(velocity).collect()
     }
 
     fn restarts(&self) -> u32 {

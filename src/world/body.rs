@@ -88,7 +88,8 @@ pub struct Body {
 }
 
 impl Body {
-    fn new(kind: BodyKind) -> Self {
+    /// A body of this kind, without shapes.
+    pub(crate) fn new(kind: BodyKind) -> Self {
         Self {
             name: String::new(),
             kind,

@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::error::{Error, Result, ensure};
+use crate::error::{Result, ensure, input};
 use limits::{is_place, is_within};
 
 /// A set of rigid bodies under one gravity.
@@ -114,10 +114,7 @@ impl World {
     pub fn check(&self) -> Result<()> {
         self.check_gravity()?;
         if let Some(k) = self.worlds().position(|range| range.start > range.end || range.end > self.bodies.len()) {
-            return Err(Error::input(format!(
-                "world {k}: begins or ends beyond the last of {} bodies",
-                self.bodies.len()
-            )));
+            return Err(input!("world {k}: begins or ends beyond the last of {} bodies", self.bodies.len()));
         }
         self.check_bodies(Body::check)?;
         self.check_joints()

@@ -7,7 +7,7 @@ use parry3d::math::Pose;
 use parry3d::shape::{HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
 use super::limits::{MOST_LENGTH, is_place};
-use crate::error::{Error, Result, ensure};
+use crate::error::{Error, Result, ensure, input};
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
 ///
@@ -55,8 +55,7 @@ impl Shape {
     pub fn convex_hull(points: &[Vec3]) -> Result<Self> {
         // Checked here, because a flat cloud makes the hull code panic rather than refuse.
         let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
-        hull.map(Self)
-            .ok_or_else(|| Error::input(format!("a convex hull of {} points that spans no volume", points.len())))
+        hull.map(Self).ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
     }
 
     /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.
@@ -71,15 +70,13 @@ impl Shape {
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
             let count = vertices.len();
-            return Err(Error::input(format!("mesh triangle {t:?} names a vertex beyond the last, {count}")));
+            return Err(input!("mesh triangle {t:?} names a vertex beyond the last, {count}"));
         }
         if let Some((k, v)) = vertices.iter().enumerate().find(|(_, v)| !is_place(**v)) {
-            return Err(Error::input(format!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size")));
+            return Err(input!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size"));
         }
-        let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
-        SharedShape::trimesh_with_flags(vertices, triangles, flags)
-            .map(Self)
-            .map_err(|e| Error::input(format!("mesh: {e}")))
+        let mesh = SharedShape::trimesh_with_flags(vertices, triangles, TriMeshFlags::FIX_INTERNAL_EDGES);
+        mesh.map(Self).map_err(|e| input!("mesh: {e}"))
     }
 
     /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` (m).
@@ -109,12 +106,11 @@ impl Shape {
     /// # Errors
     /// One line that names the shape, the number and its range.
     pub(crate) fn check(&self) -> Result<()> {
-        let sizes = |kind: &str, sizes: &[(&str, f32)]| match sizes.iter().find(|s| !(s.1 > 0.0 && s.1 <= MOST_LENGTH))
-        {
-            None => Ok(()),
-            Some((name, size)) => {
-                Err(Error::input(format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m")))
-            }
+        let sizes = |kind: &str, sizes: &[(&str, f32)]| {
+            sizes.iter().try_for_each(|(name, size)| {
+                let message = || format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m");
+                ensure(*size > 0.0 && *size <= MOST_LENGTH, message)
+            })
         };
         match self.0.as_typed_shape() {
             TypedShape::Ball(ball) => sizes("ball", &[("radius", ball.radius)]),
@@ -125,10 +121,10 @@ impl Shape {
             TypedShape::Capsule(c) => sizes("capsule", &[("half height", c.half_height()), ("radius", c.radius)]),
             TypedShape::Cylinder(c) => sizes("cylinder", &[("half height", c.half_height), ("radius", c.radius)]),
             TypedShape::Cone(c) => sizes("cone", &[("half height", c.half_height), ("radius", c.radius)]),
-            TypedShape::HalfSpace(plane) if (plane.normal.length() - 1.0).abs() <= 1e-3 => Ok(()),
             TypedShape::HalfSpace(plane) => {
                 let (normal, length) = (plane.normal, plane.normal.length());
-                Err(Error::input(format!("half-space of normal {normal}: must have length 1, but has length {length}")))
+                let message = || format!("half-space of normal {normal}: must have length 1, but has length {length}");
+                ensure((length - 1.0).abs() <= 1e-3, message)
             }
             _ => {
                 let extents = self.0.compute_local_aabb();
@@ -156,11 +152,6 @@ impl Shape {
     /// Half extents if this is a cuboid (m).
     pub fn as_cuboid(&self) -> Option<Vec3> {
         self.0.as_cuboid().map(|c| c.half_extents)
-    }
-
-    /// Every number of the shape, as text.
-    pub(crate) fn geometry(&self) -> String {
-        format!("{:?}", self.0.as_typed_shape())
     }
 
     /// Radius of the smallest sphere around the shape's own origin that contains it (m); infinite for a half-space.

@@ -8,6 +8,7 @@ mod plot;
 pub mod rounds;
 mod rules;
 mod run;
+mod scene_hash;
 mod solve;
 mod trajectory;
 

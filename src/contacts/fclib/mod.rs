@@ -17,7 +17,7 @@ use glam::{DMat3, DVec3};
 
 use super::operator::inverse;
 use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure, input};
 use frames::{Lever, arm, rotation};
 use table::{Global, Sparse, Tables};
 
@@ -44,12 +44,8 @@ impl ContactProblem {
             }));
         }
         let dimensions = tables.number("fclib_global/spacedim")?;
-        if dimensions != 3 {
-            return Err(Error::input(format!("fclib_global/spacedim: {dimensions}: must be 3")));
-        }
-        if tables.has("fclib_global/G") {
-            return Err(Error::input("fclib_global/G: joints cannot be read"));
-        }
+        ensure(dimensions == 3, || format!("fclib_global/spacedim: {dimensions}: must be 3"))?;
+        ensure(!tables.has("fclib_global/G"), || "fclib_global/G: joints cannot be read".into())?;
         let (m, h) = (tables.matrix("fclib_global/M")?, tables.matrix("fclib_global/H")?);
         let blocks = mass_blocks(&m).map_err(|e| e.within("fclib_global/M"))?;
         let contacts = contact_rows(&h, m.rows).map_err(|e| e.within("fclib_global/H"))?;
@@ -57,10 +53,7 @@ impl ContactProblem {
         let w = tables.reals("fclib_global/vectors/w", h.columns)?;
         let mu = tables.reals("fclib_global/vectors/mu", contacts.len())?;
         if let Some(i) = mu.iter().position(|&mu| mu < 0.0) {
-            return Err(Error::input(format!(
-                "fclib_global/vectors/mu: {:?} of contact {i}: must not be negative",
-                mu[i]
-            )));
+            return Err(input!("fclib_global/vectors/mu: {:?} of contact {i}: must not be negative", mu[i]));
         }
 
         let turns = rotations(blocks.len(), &contacts).map_err(|e| e.within("fclib_global/H"))?;
@@ -138,21 +131,19 @@ struct Block {
 fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
     if m.rows != m.columns || !m.rows.is_multiple_of(6) {
         let (rows, columns) = (m.rows, m.columns);
-        return Err(Error::input(format!("{rows} x {columns}: rigid bodies have 6 rows and columns each")));
+        return Err(input!("{rows} x {columns}: rigid bodies have 6 rows and columns each"));
     }
     // Before as much memory is asked for.
-    if m.entries.len() < m.rows {
-        return Err(Error::input(format!("{} entries for {} rows: a mass is missing", m.entries.len(), m.rows)));
-    }
+    let (entries, rows) = (m.entries.len(), m.rows);
+    ensure(entries >= rows, || format!("{entries} entries for {rows} rows: a mass is missing"))?;
     let mut entries = vec![[[0.0; 6]; 6]; m.rows / 6];
     for &(row, column, x) in m.entries.iter().filter(|e| e.2 != 0.0) {
-        if row / 6 != column / 6 {
-            return Err(Error::input(format!("({row}, {column}) ties two bodies: only rigid bodies can be read")));
-        }
+        let message = || format!("({row}, {column}) ties two bodies: only rigid bodies can be read");
+        ensure(row / 6 == column / 6, message)?;
         entries[row / 6][row % 6][column % 6] += x;
     }
     let block = |(i, e): (usize, &[[f64; 6]; 6])| {
-        let wrong = |what: String| Err(Error::input(format!("body {i}: {what}")));
+        let wrong = |what: String| Err(input!("body {i}: {what}"));
         let mass = e[0][0];
         let axes = || (0..3).flat_map(|row| (0..3).map(move |column| (row, column)));
         let scalar = |(row, column): (usize, usize)| {
@@ -194,11 +185,10 @@ impl Sides {
 fn contact_rows(h: &Sparse, rows: usize) -> Result<Vec<Sides>> {
     if h.rows != rows || !h.columns.is_multiple_of(3) {
         let (found, columns) = (h.rows, h.columns);
-        return Err(Error::input(format!("{found} x {columns}: {rows} rows and 3 columns a contact are needed")));
+        return Err(input!("{found} x {columns}: {rows} rows and 3 columns a contact are needed"));
     }
-    if h.entries.len() < h.columns {
-        return Err(Error::input(format!("{} entries for {} columns: a contact is empty", h.entries.len(), h.columns)));
-    }
+    let (entries, columns) = (h.entries.len(), h.columns);
+    ensure(entries >= columns, || format!("{entries} entries for {columns} columns: a contact is empty"))?;
     let mut contacts = vec![Vec::<Rows>::new(); h.columns / 3];
     for &(row, column, x) in h.entries.iter().filter(|e| e.2 != 0.0) {
         let (contact, body) = (&mut contacts[column / 3], row / 6);
@@ -216,13 +206,11 @@ fn sides(rows: &[Rows]) -> Result<Sides> {
     let mut sides = Sides::default();
     for &rows in rows {
         let volume = directions(&rows).determinant();
-        if volume == 0.0 {
-            return Err(Error::input(format!("its directions on body {} are in one plane", rows.body)));
-        }
+        ensure(volume != 0.0, || format!("its directions on body {} are in one plane", rows.body))?;
         let side = if volume > 0.0 { &mut sides.b } else { &mut sides.a };
         if let Some(other) = side.replace(rows) {
             let (one, other) = (other.body, rows.body);
-            return Err(Error::input(format!("its directions on bodies {one} and {other} are not opposite")));
+            return Err(input!("its directions on bodies {one} and {other} are not opposite"));
         }
     }
     match (sides.a, sides.b) {
@@ -230,7 +218,7 @@ fn sides(rows: &[Rows]) -> Result<Sides> {
         (Some(a), Some(b))
             if (0..3).any(|k| (a.linear[k] + b.linear[k]).length() > TOLERANCE * b.linear[k].length()) =>
         {
-            Err(Error::input(format!("its directions on bodies {} and {} are not opposite", a.body, b.body)))
+            Err(input!("its directions on bodies {} and {} are not opposite", a.body, b.body))
         }
         _ => Ok(sides),
     }
@@ -256,7 +244,7 @@ fn rotations(bodies: usize, contacts: &[Sides]) -> Result<Vec<DMat3>> {
         levers[side.body].push(Lever { map: map(&side), outward: -side.linear[0] });
     }
     let of = |(i, levers): (usize, &Vec<Lever>)| {
-        rotation(levers).ok_or_else(|| Error::input(format!("body {i}: its angular rows are not those of arms")))
+        rotation(levers).ok_or_else(|| input!("body {i}: its angular rows are not those of arms"))
     };
     levers.iter().enumerate().map(of).collect()
 }

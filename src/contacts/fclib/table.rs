@@ -2,7 +2,7 @@
 
 use hdf5_pure::{Dataset, File, FileBuilder, GroupBuilder, LibVer};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure, input};
 
 /// An open file; every error names the dataset.
 pub(super) struct Tables {
@@ -12,13 +12,11 @@ pub(super) struct Tables {
 impl Tables {
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self> {
         let length = bytes.len() as u64;
-        let file = File::from_bytes(bytes).map_err(|e| Error::input(format!("not a whole HDF5 file: {e}")))?;
+        let file = File::from_bytes(bytes).map_err(|e| input!("not a whole HDF5 file: {e}"))?;
         // Else what comes last, and may be left out, would not be missed.
         let whole = file.superblock().eof_address;
-        match length < whole {
-            true => Err(Error::input(format!("not a whole HDF5 file: {length} of {whole} bytes"))),
-            false => Ok(Self { file }),
-        }
+        ensure(length >= whole, || format!("not a whole HDF5 file: {length} of {whole} bytes"))?;
+        Ok(Self { file })
     }
 
     /// Whether there is a group of that name.
@@ -34,10 +32,7 @@ impl Tables {
 
     /// One whole number.
     pub(super) fn number(&self, path: &str) -> Result<i64> {
-        match self.whole(path, 1)?[..] {
-            [number] => Ok(number),
-            _ => unreachable!("one was asked for"),
-        }
+        Ok(self.whole(path, 1)?[0])
     }
 
     /// So many whole numbers.
@@ -49,7 +44,7 @@ impl Tables {
     pub(super) fn reals(&self, path: &str, count: usize) -> Result<Vec<f64>> {
         let numbers = self.read(path, count, |d| d.read_f64())?;
         match numbers.iter().position(|x| !x.is_finite()) {
-            Some(i) => Err(Error::input(format!("{path}: number {i} is {:?}: must be finite", numbers[i]))),
+            Some(i) => Err(input!("{path}: number {i} is {:?}: must be finite", numbers[i])),
             None => Ok(numbers),
         }
     }
@@ -60,19 +55,16 @@ impl Tables {
         count: usize,
         read: impl FnOnce(&Dataset) -> std::result::Result<Vec<T>, hdf5_pure::Error>,
     ) -> Result<Vec<T>> {
-        let wrong = |e: hdf5_pure::Error| Error::input(format!("{path}: {e}"));
+        let wrong = |e: hdf5_pure::Error| input!("{path}: {e}");
         let dataset = self.file.dataset(path).map_err(wrong)?;
         let shape = dataset.shape().map_err(wrong)?;
         // Before anything is read, so that a wrong size asks for no memory.
         let found = shape.iter().try_fold(1_u64, |all, &n| all.checked_mul(n));
-        if found != Some(count as u64) {
-            return Err(Error::input(format!("{path}: has the shape {shape:?}, and {count} numbers are needed")));
-        }
+        let message = || format!("{path}: has the shape {shape:?}, and {count} numbers are needed");
+        ensure(found == Some(count as u64), message)?;
         let numbers = read(&dataset).map_err(wrong)?;
-        match numbers.len() == count {
-            true => Ok(numbers),
-            false => Err(Error::input(format!("{path}: holds {} of {count} numbers", numbers.len()))),
-        }
+        ensure(numbers.len() == count, || format!("{path}: holds {} of {count} numbers", numbers.len()))?;
+        Ok(numbers)
     }
 
     /// A sparse matrix, in any of the three forms: `nz` entries by row `i` and column `p`, columns (-1) or rows (-2) one after
@@ -81,27 +73,26 @@ impl Tables {
         let path = |name: &str| format!("{group}/{name}");
         let size = |name: &str| {
             let number = self.number(&path(name))?;
-            usize::try_from(number).map_err(|_| Error::input(format!("{}: {number}: is not a size", path(name))))
+            usize::try_from(number).map_err(|_| input!("{}: {number}: is not a size", path(name)))
         };
         let (rows, columns) = (size("m")?, size("n")?);
         let form = self.number(&path("nz"))?;
         let (count, pointers) = match form {
             -1 => (size("nzmax")?, Some(columns)),
             -2 => (size("nzmax")?, Some(rows)),
-            nz => (usize::try_from(nz).map_err(|_| Error::input(format!("{}: {nz}: is no form", path("nz"))))?, None),
+            nz => (usize::try_from(nz).map_err(|_| input!("{}: {nz}: is no form", path("nz")))?, None),
         };
         let outer = self.whole(&path("p"), pointers.map_or(count, |n| n.saturating_add(1)))?;
         let inner = self.whole(&path("i"), count)?;
         let outer = match pointers {
             None => outer,
-            Some(_) => unfold(&outer, count).ok_or_else(|| {
-                Error::input(format!("{}: must rise from 0 to the number of entries, {count}", path("p")))
-            })?,
+            Some(_) => unfold(&outer, count)
+                .ok_or_else(|| input!("{}: must rise from 0 to the number of entries, {count}", path("p")))?,
         };
         let values = self.reals(&path("x"), count)?;
         let place = |name: &str, index: i64, least: usize| match usize::try_from(index) {
             Ok(i) if i < least => Ok(i),
-            _ => Err(Error::input(format!("{}: {index}: must be 0 or more and less than {least}", path(name)))),
+            _ => Err(input!("{}: {index}: must be 0 or more and less than {least}", path(name))),
         };
         let entries = inner.into_iter().zip(outer).zip(values).map(|((inner, outer), x)| match form {
             -2 => Ok((place("p", outer, rows)?, place("i", inner, columns)?, x)),
@@ -137,7 +128,7 @@ impl Sparse {
     /// As entries by row and column: the only form that all readers of the global problem take.
     fn write(&self, group: &mut GroupBuilder, name: &str) -> Result<()> {
         let mut matrix = group.create_group(name);
-        let index = |i: usize| i32::try_from(i).map_err(|_| Error::input(format!("{i} does not fit an FCLIB file")));
+        let index = |i: usize| i32::try_from(i).map_err(|_| input!("{i} does not fit an FCLIB file"));
         let indices = |of: fn(&(usize, usize, f64)) -> usize| self.entries.iter().map(|e| index(of(e))).collect();
         let (i, p): (Result<Vec<i32>>, Result<Vec<i32>>) = (indices(|e| e.0), indices(|e| e.1));
         let x: Vec<f64> = self.entries.iter().map(|e| e.2).collect();

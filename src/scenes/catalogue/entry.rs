@@ -1,6 +1,6 @@
 //! An entry of the catalogue: a name, what should hold, parameters.
 
-use crate::error::{Error, Result};
+use crate::error::{Result, input};
 use crate::memory;
 use crate::scenes::scene::Scene;
 use crate::suggest::hint;
@@ -37,7 +37,7 @@ impl Parameter {
         let fits = |x: &f64| (least..=most).contains(x) && (!self.whole || x.fract() == 0.0);
         text.parse().ok().filter(fits).ok_or_else(|| {
             let kind = if self.whole { "whole number" } else { "number" };
-            Error::input(format!("{} = {text:?}: must be a {kind} from {least} to {most}", self.name))
+            input!("{} = {text:?}: must be a {kind} from {least} to {most}", self.name)
         })
     }
 }
@@ -91,13 +91,12 @@ impl Entry {
     pub(in crate::scenes) fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
         let mut values: Vec<f64> = self.parameters.iter().map(|p| p.default).collect();
         for assignment in assignments {
-            let (key, value) = assignment
-                .split_once('=')
-                .ok_or_else(|| Error::input(format!("{assignment:?}: write it as key=value")))?;
+            let (key, value) =
+                assignment.split_once('=').ok_or_else(|| input!("{assignment:?}: write it as key=value"))?;
             let index = self.parameters.iter().position(|p| p.name == key.trim()).ok_or_else(|| {
                 let known: Vec<_> = self.parameters.iter().map(|p| p.name).collect();
                 let hint = hint(key, known.iter().copied(), format_args!("known: {}", known.join(", ")));
-                Error::input(format!("unknown parameter {key:?}{hint}"))
+                input!("unknown parameter {key:?}{hint}")
             })?;
             values[index] = self.parameters[index].parse(value.trim())?;
         }

@@ -12,7 +12,7 @@ mod stacks;
 
 pub use entry::{Entry, MOST_BODIES, Parameter};
 
-use crate::error::{Error, Result};
+use crate::error::{Result, ensure};
 
 const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of the slope [degrees]");
 const CUBES: Parameter = Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes");
@@ -26,11 +26,7 @@ fn triangle(n: f64) -> f64 {
 
 /// Refuses a parameter that is larger than another one.
 fn at_most([name, limit]: [&str; 2], value: f64, most: f64) -> Result<()> {
-    if value <= most {
-        Ok(())
-    } else {
-        Err(Error::input(format!("{name} = {value}: must be at most {limit} = {most}")))
-    }
+    ensure(value <= most, || format!("{name} = {value}: must be at most {limit} = {most}"))
 }
 
 /// Every scene that comes with the crate.
@@ -227,12 +223,8 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| 2.0 * triangle(v[0]) + v[0] - 1.0,
         build: |v| {
-            if v[4] > 0.2 * v[3] {
-                return Err(Error::input(format!(
-                    "thickness = {}: must be at most a fifth of length = {}",
-                    v[4], v[3]
-                )));
-            }
+            let message = || format!("thickness = {}: must be at most a fifth of length = {}", v[4], v[3]);
+            ensure(v[4] <= 0.2 * v[3], message)?;
             Ok(masonry::card_house(v[0] as usize, v[1], v[2] as f32, v[3], v[4]))
         },
     },

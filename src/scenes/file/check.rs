@@ -8,7 +8,7 @@ use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
 use super::schema::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
 use crate::config::check_step_length;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, input};
 use crate::scenes::scene::Scene;
 use crate::world::{Body, BodyKind, MassProperties, Shape, World};
 
@@ -34,7 +34,7 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
-    Error::input(format!("version = {version}: only version 1 is known"))
+    input!("version = {version}: only version 1 is known")
 }
 
 /// What a message calls a body: its index and, if it has one, its name.
@@ -52,11 +52,7 @@ fn container(corners: [[f64; 3]; 2]) -> Result<(Vec3, Vec3)> {
 }
 
 fn body(file: &BodyFile) -> Result<Body> {
-    let mut body = match file.kind {
-        BodyKind::Fixed => Body::fixed(),
-        BodyKind::Kinematic => Body::kinematic(),
-        BodyKind::Dynamic => Body::dynamic(),
-    };
+    let mut body = Body::new(file.kind);
     let [x, y, z] = finite("position", file.position)?;
     let velocity = |name, v| if file.kind == BodyKind::Fixed { zero(name, v) } else { finite(name, v) };
     let linear = velocity("linear_velocity", file.linear_velocity)?;
@@ -122,21 +118,18 @@ fn mass_properties(file: &MassFile) -> Result<MassProperties> {
 /// The shape, its position and its rotation, all checked before the body computes a mass from them.
 fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
     let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
+    let round = |of: fn(f32, f32) -> Shape, half_height: f64, radius: f64| -> Result<Shape> {
+        Ok(of(extent("half_height", half_height)?, extent("radius", radius)?))
+    };
     let shape = match &file.geometry {
         Geometry::Ball { radius } => Shape::ball(extent("radius", *radius)?),
         Geometry::Cuboid { half_extents } => {
             let [x, y, z] = finite("half_extents", *half_extents)?;
             Shape::cuboid(x, y, z)
         }
-        Geometry::Capsule { half_height, radius } => {
-            Shape::capsule(extent("half_height", *half_height)?, extent("radius", *radius)?)
-        }
-        Geometry::Cylinder { half_height, radius } => {
-            Shape::cylinder(extent("half_height", *half_height)?, extent("radius", *radius)?)
-        }
-        Geometry::Cone { half_height, radius } => {
-            Shape::cone(extent("half_height", *half_height)?, extent("radius", *radius)?)
-        }
+        Geometry::Capsule { half_height, radius } => round(Shape::capsule, *half_height, *radius)?,
+        Geometry::Cylinder { half_height, radius } => round(Shape::cylinder, *half_height, *radius)?,
+        Geometry::Cone { half_height, radius } => round(Shape::cone, *half_height, *radius)?,
         Geometry::ConvexHull { points } => Shape::convex_hull(&vertices("points", points)?)?,
         Geometry::HalfSpace { normal } => Shape::half_space(unit("normal", *normal)?.into()),
         Geometry::Mesh { vertices: corners, triangles } => {

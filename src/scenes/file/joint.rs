@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::numbers::lengths;
 use super::schema::{BodyRef, JointFile};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, ensure, input};
 use crate::world::{BallJoint, BodyKind, World};
 
 impl fmt::Display for BodyRef {
@@ -22,14 +22,14 @@ impl BodyRef {
         let count = world.bodies.len();
         match self {
             Self::Index(index) if *index < count => Ok(*index),
-            Self::Index(index) => Err(Error::input(format!("body {index}: there are {count}, counted from 0"))),
+            Self::Index(index) => Err(input!("body {index}: there are {count}, counted from 0")),
             Self::Name(name) => {
                 let mut named = (0..count).filter(|&i| world.bodies[i].name == *name);
                 match (named.next(), named.next()) {
                     (Some(index), None) => Ok(index),
-                    (None, _) => Err(Error::input(format!("body {name:?}: no body has that name"))),
+                    (None, _) => Err(input!("body {name:?}: no body has that name")),
                     (Some(a), Some(b)) => {
-                        Err(Error::input(format!("body {name:?}: bodies {a} and {b} have that name; give an index")))
+                        Err(input!("body {name:?}: bodies {a} and {b} have that name; give an index"))
                     }
                 }
             }
@@ -43,15 +43,12 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
     let (a, b) = match &bodies[..] {
         [a] => (a.find(world)?, None),
         [a, b] => (a.find(world)?, Some(b.find(world)?)),
-        _ => return Err(Error::input(format!("{} bodies: a joint ties one or two", bodies.len()))),
+        _ => return Err(input!("{} bodies: a joint ties one or two", bodies.len())),
     };
-    if b == Some(a) {
-        return Err(Error::input(format!("bodies {} and {}: the same body twice", bodies[0], bodies[1])));
-    }
+    ensure(b != Some(a), || format!("bodies {} and {}: the same body twice", bodies[0], bodies[1]))?;
     let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
-    if !dynamic(a) && !b.is_some_and(dynamic) {
-        return Err(Error::input("nothing that it ties can be moved: one of the bodies must be dynamic"));
-    }
+    let message = "nothing that it ties can be moved: one of the bodies must be dynamic";
+    ensure(dynamic(a) || b.is_some_and(dynamic), || message.into())?;
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
             let point = lengths("anchor", *point)?.into();

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use glam::Quat;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, input};
 use crate::world::MOST_LENGTH;
 
 /// How far a quaternion or a normal may be from length 1; nearer ones are normalized.
@@ -58,7 +58,7 @@ pub(super) fn unit<const N: usize>(name: &str, values: [f64; N]) -> Result<[f32;
 
 /// One line: what a value is called, what it is, and what it must be.
 pub(super) fn refusal(name: impl Display, values: &[f64], must: &str) -> Error {
-    Error::input(format!("{name} = {}: must be {must}", shown(values)))
+    input!("{name} = {}: must be {must}", shown(values))
 }
 
 /// Numbers as in the file: `-1`, `1e39`, `[0.5, 0, 0]`.

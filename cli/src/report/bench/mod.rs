@@ -15,6 +15,7 @@ pub use machine::Machine;
 use serde::{Deserialize, Serialize};
 
 use crate::report::rounds::{interleave, quartiles};
+use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::Simulation;
 use drystone::backend::Backend;
@@ -168,7 +169,7 @@ pub fn bench(
 /// until preloads and warm starts have come to rest, too.
 fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32)> {
     let scene = Scene::find_spec(spec)?;
-    let (hash, dt, falls) = (scene.content_hash(), scene.dt, scene.container.is_some());
+    let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());
     let coarse = config.clone().with(|c| c.substeps = 1);
     let mut simulation = Simulation::new(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
     for _ in 0..if falls { COARSE } else { 0 } {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
 use crate::report::rounds::{Clock, interleave, quartiles};
+use crate::report::scene_hash::content_hash;
 use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
 use drystone::scenes::Scene;
@@ -176,7 +177,7 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {
         scene: scene.name.clone(),
-        hash: scene.content_hash(),
+        hash: content_hash(scene),
         run: run.into(),
         build: origin.build.clone(),
         commit: origin.commit.clone(),

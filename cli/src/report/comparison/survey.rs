@@ -9,6 +9,7 @@ use super::page;
 use super::solves::{self, SolveRow, solves};
 use super::table::Table;
 use crate::files;
+use crate::report::scene_hash::content_hash;
 use drystone::contacts::ContactProblem;
 use drystone::scenes::Scene;
 use drystone::{Error, Result};
@@ -94,7 +95,7 @@ impl Survey<'_> {
 
 /// The rows of `settings`, in their order, of the last run that has all of them.
 fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) -> Option<Vec<Row>> {
-    let (hash, steps) = (scene.content_hash(), super::measure::steps(scene));
+    let (hash, steps) = (content_hash(scene), super::measure::steps(scene));
     let fit = |row: &&Row| {
         let Origin { build, commit: _, machine, threads } = origin;
         row.hash == hash

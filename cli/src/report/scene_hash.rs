@@ -1,0 +1,63 @@
+//! A hash of the content of a scene.
+
+use std::fmt::{self, Write};
+use std::hash::Hasher;
+
+use drystone::Scene;
+use fnv::FnvHasher;
+
+/// Feeds text to a hasher.
+struct Sink(FnvHasher);
+
+impl Write for Sink {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.write(text.as_bytes());
+        Ok(())
+    }
+}
+
+/// 64-bit FNV-1a hash of the bodies, joints, worlds, gravity and the length of a step, as 16 hexadecimal digits. Names do not count.
+pub fn content_hash(scene: &Scene) -> String {
+    let mut sink = Sink(FnvHasher::default());
+    // Writing to a hasher does not fail. Numbers are written with as many digits as tell them apart.
+    let _ = write!(sink, "{:?} {:?}", scene.dt, scene.world.gravity);
+    for b in &scene.world.bodies {
+        let pose = (b.kind, b.position, b.rotation, b.linear_velocity, b.angular_velocity);
+        let _ = write!(sink, "{pose:?} {:?} {:?} {:?}", b.force, b.mass, b.material);
+        for c in &b.colliders {
+            let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
+        }
+    }
+    let _ = write!(sink, "{:?}", scene.world.joints);
+    if !scene.world.begins.is_empty() {
+        let _ = write!(sink, "{:?}", scene.world.begins);
+    }
+    format!("{:016x}", sink.0.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_sees_what_a_step_sees() {
+        let scene = Scene::find("drop", &[]).unwrap();
+        assert_eq!(content_hash(&scene), content_hash(&Scene::find("drop", &[]).unwrap()));
+        let changes: [fn(&mut Scene); 6] = [
+            |s| s.dt *= 0.5,
+            |s| s.world.bodies[3].position.x += 1e-6,
+            |s| s.world.bodies[3].force.y = 1e-3,
+            |s| s.world.bodies[3].material.friction = 0.51,
+            |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),
+            |s| s.world.begins.push(3),
+        ];
+        for change in changes {
+            let mut changed = scene.clone();
+            change(&mut changed);
+            assert_ne!(content_hash(&scene), content_hash(&changed));
+        }
+        let mut renamed = scene.clone();
+        renamed.world.bodies[3].name = "other".into();
+        assert_eq!(content_hash(&scene), content_hash(&renamed));
+    }
+}
