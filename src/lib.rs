@@ -39,6 +39,7 @@
 
 pub mod backend;
 mod collide;
+mod compare;
 pub mod config;
 pub mod contacts;
 mod effort;

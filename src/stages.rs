@@ -61,6 +61,11 @@ pub mod random {
     pub use crate::random::SplitMix64;
 }
 
+/// Two backends on the same scene.
+pub mod compare {
+    pub use crate::compare::*;
+}
+
 /// Whether what is asked for fits into memory.
 pub mod memory {
     pub use crate::memory::*;

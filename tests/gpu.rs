@@ -2,18 +2,15 @@
 
 #[macro_use]
 mod common;
-#[allow(dead_code)]
-#[path = "../cli/src/compare.rs"]
-mod compare;
 #[path = "common/settings.rs"]
 mod settings;
 
 use common::difference::of_velocities;
 use common::gpu;
 use common::tolerance;
-use compare::{Difference, compare};
 use drystone::glam::Vec3;
 use drystone::stages::backend::{CheckedStep, crossover};
+use drystone::stages::compare::{Difference, compare};
 use drystone::stages::plan::Kernel;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;

@@ -1,12 +1,9 @@
 //! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
-#[allow(dead_code)]
-#[path = "../cli/src/compare.rs"]
-mod compare;
 #[path = "common/settings.rs"]
 mod settings;
 
-use compare::{Comparison, compare};
+use drystone::stages::compare::{Comparison, compare};
 use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
 use settings::set;
 

@@ -3,15 +3,12 @@
 
 #[macro_use]
 mod common;
-#[allow(dead_code)]
-#[path = "../cli/src/compare.rs"]
-mod compare;
 
 use common::gpu;
-use compare::Difference;
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::Difference;
 use drystone::stages::problem::carry::Carry;
 use drystone::stages::problem::{BodyRow, ContactRow, ConvergenceRow, MomentumRow, PointRow};
 use drystone::stats::Traffic;

@@ -4,7 +4,6 @@
 #![warn(missing_docs)]
 
 pub mod commands;
-pub mod compare;
 pub mod files;
 pub mod hard;
 pub mod maze;

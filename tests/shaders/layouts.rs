@@ -8,7 +8,7 @@ use drystone::stages::backend::shader::{ResidentParams, SCRATCH_ROW};
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassColors, PointRow, Softness,
+    MomentumRow, Params, PassRow, PointRow, Softness,
 };
 
 const TYPES: &str = include_str!("../../shaders/lib/types.wgsl");
@@ -21,12 +21,14 @@ struct Layout {
 }
 
 macro_rules! layouts {
-    ($($twin:ident = $row:ident { $($field:ident)* })*) => {
+    (@offset $row:ident $field:ident) => { offset_of!($row, $field) };
+    (@offset $row:ident $field:ident $outer:ident $inner:ident) => { offset_of!($row, $outer.$inner) };
+    ($($twin:ident = $row:ident { $($field:ident $(: $outer:ident . $inner:ident)?)* })*) => {
         BTreeMap::from([$((
             stringify!($twin).to_owned(),
             Layout {
                 size: size_of::<$row>(),
-                fields: BTreeMap::from([$((stringify!($field).to_owned(), offset_of!($row, $field))),*]),
+                fields: BTreeMap::from([$((stringify!($field).to_owned(), layouts!(@offset $row $field $($outer $inner)?))),*]),
             },
         )),*])
     };
@@ -49,7 +51,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Inertia = InertiaRow { principal body inv_principal frame }
         Contact = ContactRow {
             normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
-            preload
+            preload substep_share
         }
         Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
         Joint = JointRow { r_a body_a r_b body_b gap }
@@ -60,10 +62,12 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
         Params = Params {
-            substep inverse_substep restitution_threshold inertia_count movable fixed joint
-            body_count point_count slop relaxation tolerance joint_count patches
+            restitution_threshold slop relaxation tolerance body_count point_count joint_count patches
         }
-        PassColors = PassColors { first end }
+        PassRow = PassRow {
+            first end substep: substep.length inverse_substep: substep.inverse_length
+            movable: substep.movable fixed: substep.fixed joint: substep.joint
+        }
         Preload = Preload { movable_compliance fixed_compliance share warm_start }
         ResidentParams = ResidentParams {
             preload body_count contact_count order written_count has_points
@@ -110,7 +114,7 @@ fn a_changed_twin_is_found() {
         ("first_point: u32, point_count: u32", "point_count: u32, first_point: u32", "Contact"),
         ("peak: f32 }", "peak: f32, more: f32 }", "Impulse"),
         ("push_limit: f32", "limit: f32", "Softness"),
-        ("struct PassColors", "struct Colors", "Colors"),
+        ("struct PassRow", "struct Row", "Row"),
     ] {
         let changed = TYPES.replace(before, after);
         assert_ne!(changed, TYPES, "{before} is not in the text");

@@ -6,9 +6,9 @@ use super::output::{print, print_json};
 use super::progress::Progress;
 use super::scene::SceneArgs;
 use super::words;
-use crate::compare::{Difference, compare};
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
+use drystone::stages::compare::{Difference, compare};
 use drystone::{Error, Result};
 
 /// Arguments of `drystone compare`.

@@ -1,9 +1,9 @@
 //! The comparison of backends finds what a backend does wrong, and where.
 
 use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::{Difference, FirstDifference, Stage, compare, first_difference};
 use drystone::stages::problem::{JointImpulseRow, JointRow};
 use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
-use drystone_cli::compare::{Difference, FirstDifference, Stage, compare, first_difference};
 
 /// What goes wrong at one pass.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,17 @@
 //! Two backends on the same scene, step by step: how far apart they are, and where that began.
 
-use drystone::stages::plan::Pass;
-use drystone::{Backend, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem, World};
-use serde::Serialize;
+use crate::backend::Backend;
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::plan::{Pass, StepPlan};
+use crate::problem::StepProblem;
+use crate::scenes::Scene;
+use crate::simulation::Simulation;
+use crate::world::World;
 
 /// How far two worlds are apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Difference {
     /// Bodies of which any number differs in any bit.
     pub bodies: usize,
@@ -53,18 +59,19 @@ fn distance(x: f32, y: f32) -> f64 {
 }
 
 /// Where two backends first disagree.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FirstDifference {
     /// Step, from 1.
     pub step: u32,
     /// Where in that step.
-    #[serde(flatten)]
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub stage: Stage,
 }
 
 /// The first stage of a step whose results are not the same.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(untagged))]
 pub enum Stage {
     /// Before the first pass: the backends were given different rows.
     Rows {
@@ -101,7 +108,8 @@ impl std::fmt::Display for FirstDifference {
 }
 
 /// The result of a comparison.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Comparison {
     /// After each step.
     pub steps: Vec<Difference>,

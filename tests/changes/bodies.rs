@@ -1,0 +1,169 @@
+//! Masses, materials and numbers of bodies that change, and changes that are refused.
+
+use drystone::glam::Vec3;
+use drystone::stages::compare::Difference;
+use drystone::{BallJoint, Body, Shape, Simulation, SolverConfig, World};
+
+use super::{BOTH, DT, cpu, cube, run, simulation, standing};
+
+#[test]
+fn masses_and_materials_may_change() {
+    let mut simulation =
+        simulation(&standing(), &SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3), cpu);
+    run(&mut simulation, 240);
+    let (slope, block) = (16, 17);
+    assert!(simulation.is_asleep(block));
+    // The slope becomes ice, though what lies on it sleeps.
+    simulation.world.bodies[slope].material.friction = 0.0;
+    run(&mut simulation, 30);
+    let slid = simulation.world.bodies[block].linear_velocity.length();
+    assert!((slid - 9.81 * 0.2_f32.sin() * 30.0 * DT).abs() < 0.02, "{slid} m/s");
+    // A cube becomes a hundred times as heavy under its own weight, and what it lies on bears that.
+    let force = |s: &mut Simulation| -> f32 {
+        let of_top = s.manifolds().filter(|m| [m.body_a, m.body_b] == [4, 5] || [m.body_a, m.body_b] == [5, 4]);
+        of_top.map(|m| m.normal_impulse()).sum::<f32>() * 8.0 / DT
+    };
+    let light = force(&mut simulation);
+    assert!((light / 9810.0 - 1.0).abs() < 0.02, "{light} N");
+    let mass = &mut simulation.world.bodies[5].mass;
+    (mass.mass, mass.principal_inertia) = (1e5, mass.principal_inertia * 100.0);
+    run(&mut simulation, 200);
+    let heavy = force(&mut simulation);
+    assert!((heavy / 981_000.0 - 1.0).abs() < 0.05, "{heavy} N");
+}
+
+type Change = fn(&mut World);
+
+/// Bodies cannot come, go or change kind or shape yet: the step says so and does nothing.
+#[test]
+fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
+    let cases: [(&str, Change); 10] = [
+        ("there are 25 bodies", |w| {
+            w.add(cube(0.0, 20.0, 0.0));
+        }),
+        ("there are 23 bodies", |w| {
+            w.bodies.pop();
+        }),
+        ("there are 24 bodies in 2 worlds", |w| w.begins.push(5)),
+        ("body 3 \"\" changed", |w| w.bodies[3].kind = drystone::BodyKind::Fixed),
+        ("body 3 \"\" changed", |w| w.bodies[3] = cube(0.0, 2.5, 0.0).shape(Shape::ball(0.5))),
+        ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].shape = Shape::ball(0.5)),
+        ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].position.x = 0.1),
+        ("body 3 \"\" changed", |w| w.bodies[3].colliders.clear()),
+        ("body 3 \"\" changed", |w| w.bodies.swap(3, 4)),
+        ("body 3 \"\" changed", |w| {
+            let shape = w.bodies[4].colliders.remove(0);
+            w.bodies[3].colliders.push(shape);
+        }),
+    ];
+    for (start, change) in cases {
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
+        run(&mut simulation, 10);
+        let good = simulation.world.clone();
+        change(&mut simulation.world);
+        let changed = simulation.world.clone();
+        let line = simulation.step(DT).expect_err(start).to_string();
+        assert!(line.starts_with(start) && line.contains("make a new simulation") && !line.contains('\n'), "{line}");
+        assert_eq!(Difference::between(&changed, &simulation.world), Difference::default());
+        // Put right, it goes on.
+        simulation.world = good;
+        run(&mut simulation, 10);
+    }
+}
+
+#[test]
+fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
+    for backend in BOTH {
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), backend);
+        run(&mut simulation, 5);
+        let before = simulation.world.clone();
+        for dt in [0.0, -DT, f32::NAN, f32::INFINITY, 1e9, 1.1, 1e-30, f32::MIN_POSITIVE] {
+            let line = simulation.step(dt).expect_err("no length").to_string();
+            assert!(line.starts_with("dt = "), "{line}");
+            assert!(simulation.next_problem(dt).is_err());
+            assert_eq!(Difference::between(&before, &simulation.world), Difference::default(), "{dt}");
+        }
+        for dt in [drystone::config::SHORTEST_STEP, 1e-6, DT, drystone::config::LONGEST_STEP] {
+            let stats = simulation.step(dt).expect("a length");
+            assert_eq!(stats.first_non_finite, None, "{dt} s");
+        }
+    }
+}
+
+#[test]
+fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
+    let cases: [(&str, Change); 6] = [
+        ("gravity", |w| w.gravity.y = f32::NAN),
+        ("joint 6: names a body beyond", |w| w.joints.push(BallJoint::to_world(99, Vec3::ZERO, Vec3::ZERO))),
+        ("joint 0: ties body 1 to itself", |w| w.joints[0] = BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
+        ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
+        ("body 2 \"\": mass", |w| w.bodies[2].mass.mass = -1.0),
+        ("body 2 \"\": friction", |w| w.bodies[2].material.friction = f32::NAN),
+    ];
+    for (start, change) in cases {
+        let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
+        run(&mut simulation, 3);
+        change(&mut simulation.world);
+        let line = simulation.step(DT).expect_err(start).to_string();
+        assert!(line.starts_with(start), "{line}");
+    }
+}
+
+/// Trouble in the numbers is data, wherever it comes from.
+#[test]
+fn no_number_that_a_body_can_have_makes_a_step_panic() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38, -1e25, 1e19, 1e-40] {
+        let changes: [fn(&mut Body, f32); 6] = [
+            |b, x| b.position.y = x,
+            |b, x| b.rotation.x = x,
+            |b, x| b.linear_velocity.x = x,
+            |b, x| b.angular_velocity.z = x,
+            |b, x| b.force.y = x,
+            |b, x| (b.position, b.linear_velocity) = (Vec3::splat(x), Vec3::splat(-x)),
+        ];
+        for (k, change) in changes.into_iter().enumerate() {
+            for early in [true, false] {
+                let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
+                run(&mut simulation, if early { 0 } else { 3 });
+                change(&mut simulation.world.bodies[4], bad);
+                let others: Vec<usize> = (6..15).collect();
+                for _ in 0..5 {
+                    simulation.step(DT).expect("a step");
+                }
+                simulation.penetration();
+                simulation.manifolds().count();
+                // What does not touch it does not mind.
+                assert!(others.iter().all(|&i| simulation.world.bodies[i].is_finite()), "{bad} in change {k}");
+            }
+        }
+    }
+}
+
+/// A body whose numbers are none touches nothing: its neighbors stay numbers, and what falls is still found.
+#[test]
+fn a_body_whose_numbers_are_none_touches_nothing() {
+    let changes: [fn(&mut Body, f32); 4] = [
+        |b, x| b.position.y = x,
+        |b, x| b.rotation.x = x,
+        |b, x| b.linear_velocity.x = x,
+        |b, x| b.angular_velocity.z = x,
+    ];
+    for bad in [f32::NAN, f32::INFINITY] {
+        for (k, change) in changes.into_iter().enumerate() {
+            for early in [true, false] {
+                let mut world = standing();
+                let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 1.5, 0.0));
+                let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
+                run(&mut simulation, if early { 0 } else { 3 });
+                change(&mut simulation.world.bodies[4], bad);
+                run(&mut simulation, 1);
+                assert!(simulation.manifolds().all(|m| ![m.body_a, m.body_b].contains(&4)));
+                run(&mut simulation, 90);
+                let bodies = &simulation.world.bodies;
+                let others = bodies.iter().enumerate().filter(|(i, _)| *i != 4);
+                assert!(others.clone().all(|(_, b)| b.is_finite()), "{bad} in change {k}");
+                assert!((bodies[ball].position.y - 0.3).abs() < 0.01, "{bad} in change {k}: {}", bodies[ball].position);
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What the caller changes between two steps: the next step follows it, whatever it is, or says why not.
+
+mod bodies;
+mod joints;
+mod plan;
+mod settings;
+
+use drystone::glam::{Quat, Vec3};
+use drystone::{Backend, BallJoint, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+
+const DT: f32 = 1.0 / 60.0;
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn cpu() -> Box<dyn Backend> {
+    Box::new(Cpu::new())
+}
+
+const BOTH: [fn() -> Box<dyn Backend>; 2] = [reference, cpu];
+
+fn simulation(world: &World, config: &SolverConfig, backend: fn() -> Box<dyn Backend>) -> Simulation {
+    Simulation::new(world.clone(), config.clone(), backend()).expect("a good world")
+}
+
+fn run(simulation: &mut Simulation, steps: u32) {
+    for _ in 0..steps {
+        simulation.step(DT).expect("a step");
+    }
+}
+
+fn fastest(world: &World) -> f32 {
+    world.bodies.iter().map(|b| b.linear_velocity.length() + b.angular_velocity.length()).fold(0.0, f32::max)
+}
+
+fn ground() -> Body {
+    Body::fixed().shape(Shape::cuboid(50.0, 0.5, 50.0)).position(0.0, -0.5, 0.0)
+}
+
+fn cube(x: f32, y: f32, z: f32) -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, y, z)
+}
+
+/// Three towers of cubes, a block on a slope and a chain of rods: contacts of every kind and joints.
+fn standing() -> World {
+    let mut world = World::new();
+    world.add(ground());
+    for tower in 0..3 {
+        for level in 0..5 {
+            let offset = 0.05 * ((tower + level) % 2) as f32;
+            world.add(cube(3.0 * tower as f32 + offset, 0.5 + level as f32, 0.0));
+        }
+    }
+    let tilt = Quat::from_rotation_z(0.2);
+    let up = tilt * Vec3::Y;
+    let at = Vec3::new(-8.0, 3.0, 0.0);
+    world.add(Body::fixed().shape(Shape::cuboid(3.0, 0.5, 3.0)).position(at.x, at.y, at.z).rotation(tilt));
+    let block = at + up * 0.75;
+    world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5)).position(block.x, block.y, block.z).rotation(tilt));
+    let mut above = None;
+    for i in 0..6 {
+        let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.25, 0.5, 0.25)).position(12.0, 8.0 - i as f32, 0.0));
+        let end = Vec3::new(0.0, 0.5, 0.0);
+        world.join(match above {
+            None => BallJoint::to_world(rod, end, Vec3::new(12.0, 8.5, 0.0)),
+            Some(above) => BallJoint::new(above, -end, rod, end),
+        });
+        above = Some(rod);
+    }
+    world
+}
+
+/// A square of balls that are tied to their neighbors, and pulled out of shape.
+fn net() -> World {
+    let mut world = World::new();
+    let ball = |x: u32, z: u32| Body::dynamic().shape(Shape::ball(0.2)).position(x as f32, 0.0, z as f32);
+    for i in 0..16 {
+        world.add(ball(i % 4, i / 4));
+    }
+    let half = 0.5 * Vec3::X;
+    for i in 0..16 {
+        if i % 4 < 3 {
+            world.join(BallJoint::new(i, half, i + 1, -half));
+        }
+        if i < 12 {
+            world.join(BallJoint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
+        }
+    }
+    world.join(BallJoint::to_world(0, Vec3::ZERO, Vec3::ZERO));
+    world.join(BallJoint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
+    world
+}
