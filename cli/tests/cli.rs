@@ -293,7 +293,7 @@ fn help_fits_a_hundred_columns_and_short_help_a_page() {
         let lines = pages.each_ref().map(|p| p.lines().count());
         assert!(lines[0] <= 45 && lines[0] <= lines[1], "{name}: {lines:?}");
         if name == "run" {
-            let headings = ["Arguments:", "Scene:", "Settings of the solver:", "What it runs on:", "Output:"];
+            let headings = ["Arguments:", "Scene:", "Settings of the solver:", "Machine:", "Output:"];
             assert!(headings.iter().all(|h| pages[0].lines().any(|l| l == *h)), "{}", pages[0]);
             assert!(lines[1] > lines[0] + 20, "{lines:?}");
         }

@@ -7,33 +7,27 @@ use clap::Args;
 use super::output::{print, replacing};
 use super::scene::step_with_contacts;
 use crate::files;
-use drystone::Simulation;
-use drystone::backend::cpu::Cpu;
-use drystone::config::SolverConfig;
-use drystone::contacts::ContactProblem;
-use drystone::scenes::{CATALOGUE, Scene};
-use drystone::{Error, Result};
+use drystone::scenes::CATALOGUE;
+use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
 
-/// Arguments of `drystone export`.
 #[derive(Args)]
 pub struct ExportArgs {
     /// A scene, or a contact problem.
     ///
-    /// A scene is a name of the catalogue, or a scene file that ends in .json; any other file is a contact problem.
+    /// A name of the catalogue or a .json file is a scene; any other file is a contact problem.
     source: String,
     /// Parameter of the scene; may be given several times.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
     parameter: Vec<String>,
-    /// What step N of the scene asks of the velocities; 1 is the first.
+    /// Export the contact problem of step N of the scene; 1 is the first.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     step: Option<u32>,
-    /// Write it as FCLIB's HDF5, global form.
+    /// File for the problem in FCLIB's HDF5, global form.
     #[arg(long, value_name = "FILE")]
     fclib: PathBuf,
 }
 
 impl ExportArgs {
-    /// Reads or makes the problem and writes it.
     pub fn run(&self) -> Result<()> {
         let path = Path::new(&self.source);
         let is_scene = CATALOGUE.iter().any(|e| e.name == self.source) || path.extension().is_none_or(|e| e == "json");
@@ -45,10 +39,7 @@ impl ExportArgs {
 
     fn of_file(&self, path: &Path) -> Result<ContactProblem> {
         if self.step.is_some() || !self.parameter.is_empty() {
-            return Err(Error::input(format!(
-                "{}: a contact problem has no --step and no --parameter",
-                path.display()
-            )));
+            return Err(Error::input(format!("{}: a contact problem has no --step and no --parameter", self.source)));
         }
         ContactProblem::read(path)
     }

@@ -8,9 +8,7 @@ use std::collections::HashMap;
 use glam::{Quat, Vec2, Vec3};
 
 use super::map::{Cell, Map};
-use drystone::Result;
-use drystone::scenes::Scene;
-use drystone::world::{Body, Shape, World};
+use drystone::{Body, Result, Scene, Shape, World};
 
 /// Side of a cell (m).
 pub const CELL: f32 = 0.06;

@@ -6,12 +6,7 @@ use serde::Serialize;
 use super::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
 use super::map::Map;
 use super::script::{Script, TILT_LIMIT};
-use drystone::Result;
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
-use drystone::world::World;
+use drystone::{Backend, Result, Scene, Simulation, SolverConfig, World};
 
 /// How fast the board tilts (degrees/s).
 const TILT_RATE: f32 = 60.0;

@@ -3,14 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use drystone::Simulation;
-use drystone::backend::cpu::Cpu;
-use drystone::config::{Method, SolverConfig};
-use drystone::contacts::ContactProblem;
-use drystone::scenes::Scene;
+use drystone::config::Method;
 use drystone::solver::Order;
 use drystone::stats::median;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
 
 use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};

@@ -6,13 +6,10 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
-use drystone::scenes::{Group, Scene};
-use drystone::stats::{KernelTime, StepStats, median};
-use drystone::world::{Body, BodyKind, World};
+use drystone::scenes::Group;
+use drystone::stats::{KernelTime, median};
+use drystone::{Backend, Body, BodyKind, Scene, Simulation, SolverConfig, StepStats, World};
 use glam::Vec3;
 
 /// Report of one run; its fields are the keys of the JSON object.

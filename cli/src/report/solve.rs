@@ -4,12 +4,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use drystone::Result;
-use drystone::backend::Backend;
 use drystone::config::Method;
-use drystone::contacts::ContactProblem;
 use drystone::residuals::{Measure, Residuals};
 use drystone::solver::{Order, Solver};
+use drystone::{Backend, ContactProblem, Result};
 
 use super::rounds::Clock;
 

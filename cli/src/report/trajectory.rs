@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::files;
-use drystone::world::{BodyKind, World};
-use drystone::{Error, Result};
+use drystone::{BodyKind, Error, Result, World};
 
 /// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes. The file is
 /// there when it is finished.

@@ -3,8 +3,7 @@
 use super::pipeline::Quality;
 use super::renderer::{Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Result, World};
 
 /// Rows of pixels from the top, four bytes a pixel, sRGB.
 #[derive(Clone, Debug, PartialEq, Eq)]

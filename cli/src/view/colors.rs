@@ -1,7 +1,6 @@
 //! What the color of a body says.
 
-use drystone::world::{BodyKind, World};
-use drystone::{Simulation, SolvedManifold};
+use drystone::{BodyKind, Simulation, SolvedManifold, World};
 
 /// What bodies are colored by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -168,10 +167,7 @@ fn on_scale(x: f32) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::Simulation;
-    use drystone::backend::cpu::Reference;
-    use drystone::config::SolverConfig;
-    use drystone::scenes::Scene;
+    use drystone::{Reference, Scene, Simulation, SolverConfig};
 
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");

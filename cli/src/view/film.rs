@@ -10,10 +10,7 @@ use super::colors::ColorBy;
 use super::mesh::{Poses, poses};
 use super::overlay::ropes;
 use super::renderer::Shot;
-use drystone::Simulation;
-use drystone::scenes::Scene;
-use drystone::world::{BodyKind, World};
-use drystone::{Error, Result};
+use drystone::{BodyKind, Error, Result, Scene, Simulation, World};
 
 /// A world at one time.
 #[derive(Clone, Debug)]

@@ -9,10 +9,8 @@ use super::colors::Rgba;
 use super::renderer::Shot;
 use super::show::{Pointer, Show};
 use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
-use drystone::Result;
 use drystone::backend::{BackendChoice, choose};
-use drystone::config::SolverConfig;
-use drystone::world::World;
+use drystone::{Result, SolverConfig, World};
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];
 const GOAL_COLOR: Rgba = [92, 170, 96, 255];

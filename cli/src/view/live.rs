@@ -8,12 +8,8 @@ use super::camera::Bounds;
 use super::colors::ColorBy;
 use super::film::bounds;
 use super::overlay::Overlay;
-use drystone::Result;
-use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
-use drystone::stats::StepStats;
+use drystone::{Result, Scene, Simulation, SolverConfig, StepStats};
 
 /// How fast a body that is pulled closes the gap to the mouse (1/s): soft, however stiff joints are.
 const PULL: f32 = 10.0;

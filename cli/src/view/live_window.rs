@@ -12,8 +12,7 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::Result;
-use drystone::world::{BallJoint, BodyKind, World};
+use drystone::{BallJoint, BodyKind, Result, World};
 
 /// Steps keep a picture waiting for this long, or for as long as drawing takes if that is longer.
 const PATIENCE: Duration = Duration::from_millis(30);

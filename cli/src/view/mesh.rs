@@ -5,7 +5,8 @@ use std::ops::Range;
 use glam::{Quat, Vec3};
 
 use super::camera::Bounds;
-use drystone::world::{BodyKind, Collider, Shape, Triangles, World};
+use drystone::world::{Collider, Triangles};
+use drystone::{BodyKind, Shape, World};
 
 /// A corner of a triangle, as the shader takes it.
 #[repr(C)]
@@ -178,7 +179,7 @@ fn corners((vertices, triangles): &Triangles) -> Vec<Vertex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::scenes::Scene;
+    use drystone::Scene;
 
     #[test]
     fn equal_geometry_is_one_draw_and_every_collider_is_an_instance() {

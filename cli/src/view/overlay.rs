@@ -5,8 +5,7 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::world::{BallJoint, BodyKind, World};
-use drystone::{Simulation, SolvedManifold};
+use drystone::{BallJoint, BodyKind, Simulation, SolvedManifold, World};
 
 /// One end of a line, as the shader takes it.
 #[repr(C)]
@@ -88,9 +87,7 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::backend::cpu::Reference;
-    use drystone::config::SolverConfig;
-    use drystone::scenes::Scene;
+    use drystone::{Reference, Scene, SolverConfig};
 
     #[test]
     fn every_contact_joint_and_box_has_its_lines() {

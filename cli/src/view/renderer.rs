@@ -13,7 +13,7 @@ use super::colors::Rgba;
 use super::mesh::{Instance, Meshes, Poses, Vertex};
 use super::overlay::LineEnd;
 use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
-use drystone::world::World;
+use drystone::World;
 
 /// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];

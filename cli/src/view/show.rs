@@ -6,8 +6,7 @@ use winit::keyboard::Key;
 use super::camera::{Bounds, Camera};
 use super::colors::Rgba;
 use super::overlay::LineEnd;
-use drystone::Result;
-use drystone::world::World;
+use drystone::{Result, World};
 
 /// Where the mouse is.
 #[derive(Clone, Copy, Debug)]

@@ -48,8 +48,7 @@ pub fn compare_with(now: &Bench, then: &Bench) -> Vec<Change> {
 mod tests {
     use super::*;
     use crate::report::bench::bench;
-    use drystone::backend::Backend;
-    use drystone::config::SolverConfig;
+    use drystone::{Backend, SolverConfig};
 
     fn measured() -> Bench {
         let open = || Ok(vec![Box::new(drystone::Cpu::new()) as Box<dyn Backend>]);

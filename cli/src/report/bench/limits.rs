@@ -8,16 +8,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use drystone::Result;
-use drystone::backend::Backend;
-use drystone::backend::cpu::Cpu;
-use drystone::config::{FrictionRule, SolverConfig};
+use drystone::config::FrictionRule;
 use drystone::stages::backend::{InstructionSet, Lanes, WIDTH, Work};
 use drystone::stages::kernels::contact::solve_contact;
 use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
 use drystone::stages::math::Lane;
-use drystone::stages::plan::StepPlan;
-use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Cpu, Result, SolverConfig, StepPlan, StepProblem};
 
 use super::settled;
 use crate::report::rounds::interleave;

@@ -16,16 +16,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::rounds::{interleave, quartiles};
 use crate::settings;
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::backend::cpu::Reference;
-use drystone::config::SolverConfig;
 use drystone::metrics::rms_speed;
 use drystone::residuals::Residuals;
-use drystone::scenes::Scene;
 use drystone::stages::plan::Kernel;
 use drystone::stats::{StageTimes, median};
-use drystone::{Error, Result};
+use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig};
 
 /// The scenes of a whole bench: `name:key=value,...`, see [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [

@@ -3,12 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::settings;
-use drystone::Result;
-use drystone::Simulation;
 use drystone::backend::BackendKind;
-use drystone::config::{Friction, Method, SolverConfig};
-use drystone::scenes::Scene;
-use drystone::world::World;
+use drystone::config::{Friction, Method};
+use drystone::{Result, Scene, Simulation, SolverConfig, World};
 
 /// An engine with its settings, stepping one scene.
 pub trait Contender {

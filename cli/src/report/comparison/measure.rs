@@ -6,12 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
 use crate::report::rounds::{Clock, interleave, quartiles};
-use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
-use drystone::scenes::Scene;
 use drystone::stats::quantile;
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Result, Scene, SolverConfig, World};
 
 /// Steps of one contender before it is the next one's turn.
 const BLOCK: u32 = 10;

@@ -2,10 +2,8 @@
 
 use super::contender::{Contender, Drystone, Extent};
 use crate::settings;
-use drystone::Result;
 use drystone::backend::gpu::adapters;
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
+use drystone::{Result, Scene, SolverConfig};
 
 /// Scenes of the whole report.
 const FULL: [&str; 9] = [

@@ -9,13 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::origin::Origin;
 use crate::report::rounds::interleave;
 use crate::report::solve::{SolveReport, SolveSettings};
-use drystone::Result;
-use drystone::backend::Backend;
-use drystone::backend::cpu::Cpu;
 use drystone::config::Method;
-use drystone::contacts::ContactProblem;
 use drystone::solver::Order;
 use drystone::stats::quantile;
+use drystone::{Backend, ContactProblem, Cpu, Result};
 
 /// Who solves: a method, in f64 or on the CPU's lanes.
 const SOLVERS: [(Method, &str); 4] =

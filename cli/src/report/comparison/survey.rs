@@ -9,9 +9,7 @@ use super::page;
 use super::solves::{self, SolveRow, solves};
 use super::table::Table;
 use crate::files;
-use drystone::contacts::ContactProblem;
-use drystone::scenes::Scene;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Error, Result, Scene};
 
 /// What is run, and where it is written.
 pub struct Survey<'a> {

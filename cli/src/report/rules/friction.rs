@@ -4,10 +4,8 @@ use std::fmt::Write as _;
 
 use super::{DT, RulesReport, simulate};
 use crate::report::plot::Scale;
-use drystone::Result;
 use drystone::metrics::{fastest, in_place, in_place_count};
-use drystone::scenes::Scene;
-use drystone::world::{Body, Shape, World};
+use drystone::{Body, Result, Scene, Shape, World};
 use glam::{Quat, Vec3};
 
 /// Settings of a rule, with enough substeps that the rule and not the step decides.

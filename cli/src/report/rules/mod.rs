@@ -9,11 +9,8 @@ use std::path::Path;
 
 use crate::files;
 use crate::settings;
-use drystone::Simulation;
-use drystone::backend::cpu::Reference;
 use drystone::metrics::{drift, in_place_count, rms_speed};
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Reference, Result, Simulation, World};
 
 use super::plot::{Frame, Scale, Series, svg};
 

@@ -4,10 +4,8 @@ use std::fmt::Write as _;
 
 use super::{DT, RulesReport, simulate, stand};
 use crate::report::plot::Scale;
-use drystone::Result;
 use drystone::metrics::rms_speed;
-use drystone::scenes::Scene;
-use drystone::world::{Body, Shape, World};
+use drystone::{Body, Result, Scene, Shape, World};
 use glam::Vec3;
 
 /// The settings of the course sheet: no substeps, `iterations` sweeps, no soft contacts.

@@ -3,8 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{RulesReport, Standing, stand};
-use drystone::Result;
-use drystone::scenes::Scene;
+use drystone::{Result, Scene};
 
 /// Whether a tower of `n` boxes, with offsets of 1 cm, stands for 20 s.
 fn tower_stands(n: u32, text: &str) -> Result<bool> {
