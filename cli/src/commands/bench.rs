@@ -9,7 +9,7 @@ use super::output::{plain_table, print, print_json};
 use super::progress::Progress;
 use super::words;
 use crate::files;
-use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
+use crate::report::bench::{Bench, Change, Machine, QUICK, STANDARD, StagesRow, bench, compare_with, limits};
 use crate::settings;
 use drystone::backend::{BackendChoice, choose};
 use drystone::{Backend, Result};
@@ -121,7 +121,7 @@ impl BenchArgs {
     }
 }
 
-fn table(rows: &[BenchRow], changes: Option<&[Change]>) -> Table {
+fn table(rows: &[StagesRow], changes: Option<&[Change]>) -> Table {
     let mut table = plain_table();
     let usual =
         "scene,backend,threads,bodies,manifolds,ms,quartiles,detect,color,prepare,run,store,overlap mm,residual,hash";
