@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::output::{print, replacing};
-use super::scene::step_with_contacts;
+use super::scene::check_touching;
 use crate::files;
+use crate::report::problem_of_step;
 use drystone::scenes::CATALOGUE;
-use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
+use drystone::{ContactProblem, Error, Result, Scene};
 
 #[derive(Args)]
 pub struct ExportArgs {
@@ -44,17 +45,11 @@ impl ExportArgs {
         ContactProblem::read(path)
     }
 
-    /// Runs the scene up to the step, at default settings.
     fn of_scene(&self) -> Result<ContactProblem> {
-        let Some(step) = self.step else {
-            return Err(Error::input(format!("{}: which step of the scene? Say --step N", self.source)));
-        };
-        let scene = Scene::find(&self.source, &self.parameter)?;
-        let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
-        for _ in 1..step {
-            simulation.step(scene.dt)?;
-        }
-        Ok(step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?.0)
+        let missing = || Error::input(format!("{}: a scene needs --step N", self.source));
+        let step = self.step.ok_or_else(missing)?;
+        let problem = problem_of_step(Scene::find(&self.source, &self.parameter)?, step)?;
+        check_touching(&problem)?;
+        Ok(problem)
     }
 }

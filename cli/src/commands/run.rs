@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::output::{plain_table, print, print_json, replacing, say};
 use super::progress::Progress;
-use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, step_with_contacts};
+use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, check_touching};
 use crate::files;
 use crate::report::{RunReport, Trajectory};
 use drystone::backend::choose;
@@ -98,7 +98,9 @@ impl RunArgs {
             if step > 0 {
                 let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
                     Some(save) => {
-                        let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
+                        let name = format!("{}, step {step}", scene.name);
+                        let (problem, stats) = simulation.step_with_contacts(&name, scene.dt)?;
+                        check_touching(&problem)?;
                         replacing(&save.file, || files::write(&save.file, problem.to_text().as_bytes()))?;
                         stats
                     }

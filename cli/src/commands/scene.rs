@@ -13,7 +13,7 @@ use drystone::load::Load;
 use drystone::preset::Preset;
 use drystone::scenes::CATALOGUE;
 use drystone::stages::memory;
-use drystone::{ContactProblem, Error, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{ContactProblem, Error, Result, Scene, SolverConfig};
 
 // Headings of options in the help.
 pub(super) const SCENE: &str = "Scene";
@@ -43,14 +43,8 @@ pub(super) struct SceneArgs {
     /// Choose the substeps by the largest overlap of bodies at rest, as 1mm.
     ///
     /// A bare number is in meters. A heavy load that is applied suddenly overlaps up to twice as deep.
-    #[arg(
-        long,
-        value_name = "LENGTH",
-        value_parser = length,
-        allow_hyphen_values = true,
-        conflicts_with = "substeps",
-        help_heading = SETTINGS
-    )]
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    #[arg(conflicts_with = "substeps", help_heading = SETTINGS)]
     pub(super) max_penetration: Option<f64>,
     /// Substeps per step.
     #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
@@ -73,13 +67,8 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
     pub(super) config: Option<PathBuf>,
     /// Threads on the CPU; 0 means one per core.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 0,
-        value_parser = clap::value_parser!(u16).range(0..=1024),
-        help_heading = MACHINE
-    )]
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = MACHINE)]
+    #[arg(value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub(super) threads: u16,
     /// Print one JSON object instead of a table.
     #[arg(long, help_heading = OUTPUT)]
@@ -162,18 +151,12 @@ impl SceneArgs {
     }
 }
 
-/// Makes the step with this number and returns its contact problem, which must have a contact.
-pub(super) fn step_with_contacts(
-    simulation: &mut Simulation,
-    scene: &str,
-    dt: f32,
-    number: u32,
-) -> Result<(ContactProblem, StepStats)> {
-    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
-    match problem.contacts.is_empty() {
-        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
-        false => Ok((problem, stats)),
+/// Refuses a contact problem without contacts.
+pub(super) fn check_touching(problem: &ContactProblem) -> Result<()> {
+    if !problem.contacts.is_empty() {
+        return Ok(());
     }
+    Err(Error::input(format!("{}: nothing touches that is awake", problem.name)))
 }
 
 /// Worlds with fewer bodies take less than a second to build.

@@ -1,4 +1,4 @@
-//! A window: events in, pictures out. What it shows, and what keys and mouse do to it, is a [`Show`].
+//! The event loop of a window with a [`Show`].
 
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, KeyEvent, MouseScrollDelta, WindowEvent};
@@ -10,7 +10,7 @@ use super::open::{Open, no_display};
 use super::show::Show;
 use drystone::{Error, Result};
 
-/// Opens a window and shows `show` until it is closed.
+/// Shows `show` in a window until the window is closed.
 pub fn run(show: Box<dyn Show>) -> Result<()> {
     let events = EventLoop::new().map_err(|_| no_display())?;
     events.set_control_flow(ControlFlow::Poll);
@@ -78,12 +78,12 @@ impl ApplicationHandler for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // Before the event loop, whose display it is on.
+        // The window must be dropped before the event loop.
         self.open = None;
     }
 }
 
-/// Shift and caps lock make no difference.
+/// Makes keys independent of shift and caps lock.
 fn in_lower_case(key: Key) -> Key {
     match key {
         Key::Character(text) => Key::Character(text.to_lowercase().into()),
@@ -92,7 +92,7 @@ fn in_lower_case(key: Key) -> Key {
 }
 
 impl App {
-    /// Closes the window if something failed.
+    /// Closes the window after an error.
     fn end(&mut self, events: &ActiveEventLoop, result: Result<()>) {
         if let Err(e) = result {
             self.failed = Some(e);

@@ -1,4 +1,4 @@
-//! Rows in a CSV file, which grows whenever a block of them is finished.
+//! Rows in a CSV file that grows by blocks.
 
 use std::path::PathBuf;
 
@@ -8,14 +8,13 @@ use serde::de::DeserializeOwned;
 use crate::files;
 use drystone::{Error, Result};
 
-/// Rows and the file that they are in.
 pub struct Table<R> {
     path: PathBuf,
     rows: Vec<R>,
 }
 
-impl<R: Serialize + DeserializeOwned> Table<R> {
-    /// The rows of a file; none if it is not there.
+impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
+    /// Reads the rows of a file; a missing file has none.
     pub fn open(path: PathBuf) -> Result<Self> {
         if !path.exists() {
             return Ok(Self { path, rows: Vec::new() });
@@ -30,10 +29,15 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
         Ok(Self { path, rows })
     }
 
-    /// Adds a block of rows: to the file too, which has all of them afterwards or none.
-    pub fn add(&mut self, block: Vec<R>) -> Result<()> {
-        self.rows.extend(block);
-        files::write(&self.path, &files::csv(&self.rows)?)
+    /// Returns the block `known`, or makes a block and adds it to the rows and to the file.
+    pub fn add_unless(&mut self, known: Option<Vec<R>>, make: impl FnOnce() -> Result<Vec<R>>) -> Result<Vec<R>> {
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let block = make()?;
+        self.rows.extend_from_slice(&block);
+        files::write(&self.path, &files::csv(&self.rows)?)?;
+        Ok(block)
     }
 
     /// All rows, the oldest first.
