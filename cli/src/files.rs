@@ -1,7 +1,7 @@
 //! Files that appear under their names only when they are complete.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -89,38 +89,11 @@ fn discard(draft: &Path) {
     let _ = if draft.is_dir() { std::fs::remove_dir_all(draft) } else { std::fs::remove_file(draft) };
 }
 
-/// A file that is written in pieces and appears when `finish` is called.
-pub struct Writer {
-    file: File,
-    draft: Draft,
-}
-
-impl Writer {
-    pub fn create(path: &Path) -> Result<Self> {
-        let draft = Draft::of(path)?;
-        Ok(Self { file: draft.create()?, draft })
-    }
-
-    pub fn finish(self) -> Result<()> {
-        self.draft.keep()
-    }
-}
-
-impl Write for Writer {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
 /// Writes a file at once: a reader finds the old contents or all of the new.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut writer = Writer::create(path)?;
-    writer.write_all(bytes).map_err(Error::file(path))?;
-    writer.finish()
+    let draft = Draft::of(path)?;
+    draft.create()?.write_all(bytes).map_err(Error::file(path))?;
+    draft.keep()
 }
 
 #[cfg(test)]
@@ -139,10 +112,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         write(&path, b"old").unwrap();
-        let mut writer = Writer::create(&path).unwrap();
-        writer.write_all(b"half of a r").unwrap();
+        let draft = Draft::of(&path).unwrap();
+        draft.create().unwrap().write_all(b"half of a r").unwrap();
         assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (2, b"old".to_vec()));
-        drop(writer);
+        drop(draft);
         assert_eq!(names(folder.path()), ["a.csv"]);
         write(&path, b"new").unwrap();
         assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (1, b"new".to_vec()));

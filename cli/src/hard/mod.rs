@@ -149,7 +149,8 @@ fn weightless() -> World {
     World { gravity: Vec3::ZERO, ..World::new() }
 }
 
-fn energy(world: &World) -> f64 {
+/// Kinetic and potential energy (J).
+pub(crate) fn energy(world: &World) -> f64 {
     world.kinetic_energy() + world.potential_energy()
 }
 

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use drystone::config::Method;
-use drystone::solver::Order;
 use drystone::stats::median;
 use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
 
@@ -49,9 +48,12 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
     for problem in problems {
         let mut first = None;
         for (kind, (fewer, lower)) in KINDS.iter().zip(&mut gains) {
-            let report = solved(problem, *kind, MOST, 1e-4)?;
+            let solved = |sweeps, tolerance| {
+                SolveReport::new(problem, &SolveSettings::by_manifolds(kind.0, kind.1, sweeps, tolerance), None)
+            };
+            let report = solved(MOST, 1e-4)?;
             let to = |i: usize| report.reached[i].sweeps.map_or(f64::INFINITY, f64::from);
-            let after_32 = solved(problem, *kind, 32, 0.0)?.curve.last().map_or(f64::NAN, |row| row.residuals.e_vel);
+            let after_32 = solved(32, 0.0)?.curve.last().map_or(f64::NAN, |row| row.residuals.e_vel);
             let (plain_sweeps, plain_error) = *first.get_or_insert((to(2), after_32));
             fewer.push(plain_sweeps / to(2));
             lower.push(plain_error / after_32);
@@ -110,16 +112,6 @@ fn runs(page: &mut String) -> Result<()> {
 
 fn kind_name((method, passes): (Method, u8)) -> String {
     format!("{method:?}, {passes} pass{}", if passes == 1 { "" } else { "es" }).to_lowercase()
-}
-
-fn solved(
-    problem: &ContactProblem,
-    (method, passes): (Method, u8),
-    sweeps: u32,
-    tolerance: f64,
-) -> Result<SolveReport> {
-    let settings = SolveSettings { method, order: Order::Manifolds, passes, sweeps, tolerance };
-    SolveReport::new(problem, &settings, None)
 }
 
 /// The contact problem of a step of a scene at default settings without sleep; step 1 is the first.

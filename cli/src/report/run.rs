@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use serde::Serialize;
 
+use crate::hard::energy;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::stats::{KernelTime, median};
 use drystone::{Backend, BodyKind, Scene, Simulation, SolverConfig, StepStats, World};
@@ -264,10 +265,6 @@ impl RunReport {
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
         self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
     }
-}
-
-fn energy(world: &World) -> f64 {
-    world.kinetic_energy() + world.potential_energy()
 }
 
 /// Number of manifolds with a dynamic body, asleep or awake, and of their points.

@@ -69,6 +69,12 @@ pub struct CurveRow {
     pub residuals: Residuals,
 }
 
+impl SolveSettings {
+    pub fn by_manifolds(method: Method, passes: u8, sweeps: u32, tolerance: f64) -> Self {
+        Self { method, order: Order::Manifolds, passes, sweeps, tolerance }
+    }
+}
+
 impl SolveReport {
     /// Whether the last error is not a number.
     pub fn is_spoiled(&self) -> bool {

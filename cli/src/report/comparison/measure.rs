@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
+use crate::hard::energy;
 use crate::report::rounds::{Clock, interleave, quartiles};
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
 use drystone::stats::quantile;
@@ -148,7 +149,6 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
     let [ms_low, ms, ms_high] = quartiles(&lane.ms);
     let [ratio_low, ratio, ratio_high] = quartiles(&ratios);
     let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
-    let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
     let clock = Clock::of(&setting.backend).name().into();
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {

@@ -26,7 +26,8 @@ impl Origin {
         let Machine { processor, cores, system, .. } = Machine::this();
         let facts = [Some(processor), Some(format!("{cores} cores")), Some(system), adapter];
         let machine = facts.into_iter().flatten().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(", ");
-        Self { build: build(), commit: commit(), machine, threads: rayon::current_num_threads() }
+        let build = fnv(&std::env::current_exe().and_then(std::fs::read).unwrap_or_default());
+        Self { build, commit: commit(), machine, threads: rayon::current_num_threads() }
     }
 
     /// The time as text that sorts.
@@ -35,10 +36,10 @@ impl Origin {
     }
 }
 
-fn build() -> String {
+/// 64-bit FNV-1a hash, as 16 hexadecimal digits.
+pub(super) fn fnv(bytes: &[u8]) -> String {
     let mut hasher = FnvHasher::default();
-    let program = std::env::current_exe().and_then(std::fs::read);
-    hasher.write(&program.unwrap_or_default());
+    hasher.write(bytes);
     format!("{:016x}", hasher.finish())
 }
 

@@ -1,16 +1,13 @@
 //! Contact problems: time against error for each solver.
 
 use std::fmt::Debug;
-use std::hash::Hasher;
 
-use fnv::FnvHasher;
 use serde::{Deserialize, Serialize};
 
-use super::origin::Origin;
+use super::origin::{Origin, fnv};
 use crate::report::rounds::interleave;
 use crate::report::solve::{SolveReport, SolveSettings};
 use drystone::config::Method;
-use drystone::solver::Order;
 use drystone::stats::quantile;
 use drystone::{Backend, ContactProblem, Cpu, Result};
 
@@ -61,8 +58,7 @@ pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>
     let run = Origin::now();
     let mut solvers = SOLVERS.map(|solver| (solver, Vec::new()));
     interleave(TURNS, &mut solvers, |_, ((method, backend), reports)| {
-        let settings =
-            SolveSettings { method: *method, order: Order::Manifolds, passes: 1, sweeps: MOST, tolerance: 1e-4 };
+        let settings = SolveSettings::by_manifolds(*method, 1, MOST, 1e-4);
         let backend = (*backend == "cpu").then(|| Box::new(Cpu::new()) as Box<dyn Backend>);
         reports.push(SolveReport::new(problem, &settings, backend)?);
         Ok(())
@@ -104,9 +100,6 @@ fn points(report: &SolveReport) -> Vec<(u32, f64, f64)> {
     points
 }
 
-/// 64-bit FNV-1a hash of a problem, as 16 hexadecimal digits.
 pub fn hash(problem: &impl Debug) -> String {
-    let mut hasher = FnvHasher::default();
-    hasher.write(format!("{problem:?}").as_bytes());
-    format!("{:016x}", hasher.finish())
+    fnv(format!("{problem:?}").as_bytes())
 }

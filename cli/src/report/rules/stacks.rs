@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{DT, RulesReport, Standing, simulate, stand};
+use crate::hard::energy;
 use crate::report::plot::Scale;
 use drystone::metrics::rms_speed;
 use drystone::{Body, Result, Scene, Shape, World};
@@ -52,7 +53,6 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
     );
     for (rule, text) in STABILIZATIONS {
         let mut simulation = simulate(scene.world.clone(), text)?;
-        let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
         let (mut lowest, mut added) = (energy(&simulation.world), 0.0_f64);
         let mut points = Vec::new();
         for step in 1..=1200_u32 {
