@@ -227,7 +227,7 @@ mod tests {
 
     /// Two cubes overlap by 0.2 m and separate at 0.1 m/s at most: the overlap is 0.17 m after half a second and 0 after five.
     #[test]
-    fn the_deepest_overlap_is_measured_during_the_run() {
+    fn overlap_is_looked_at_on_the_way() {
         let mut world = weightless();
         world.add(cube(0.0, 0.0));
         world.add(cube(0.8, 0.0));

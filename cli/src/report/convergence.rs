@@ -149,7 +149,7 @@ mod tests {
 
     /// With one problem, medians are its own values.
     #[test]
-    fn gains_are_relative_to_plain_sweeps_with_one_pass() {
+    fn gains_are_plain_over_own() {
         let problem = problem_of_step(Scene::find_spec("tower:n=4").expect("the scene"), 1).expect("a problem");
         let (mut page, mut solved) = (String::new(), 0);
         solves(&mut page, std::slice::from_ref(&problem), || solved += 1).expect("solves");
