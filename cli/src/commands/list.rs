@@ -82,7 +82,6 @@ fn first_sentence(property: &Value) -> String {
     text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first).to_owned()
 }
 
-/// The definition that a property refers to.
 fn definition<'a>(schema: &'a Value, property: &Value) -> Option<&'a Value> {
     property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name])
 }

@@ -21,7 +21,6 @@ pub(super) const SETTINGS: &str = "Settings of the solver";
 pub(super) const MACHINE: &str = "Machine";
 pub(super) const OUTPUT: &str = "Output";
 
-/// A scene and its settings.
 #[derive(Args)]
 pub(super) struct SceneArgs {
     /// A scene of the catalogue, or a scene file.
@@ -113,7 +112,6 @@ impl SceneArgs {
         self.load_from(self.base()?, worlds, vary)
     }
 
-    /// The settings before the other options change them.
     fn base(&self) -> Result<SolverConfig> {
         self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
     }

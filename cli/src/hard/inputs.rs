@@ -40,7 +40,6 @@ fn settled(setup: &Setup, x: f32) -> Result<World> {
     Ok(simulation.world)
 }
 
-/// Bodies with a number that is not finite, or negative where it must not be.
 fn bad_bodies() -> Vec<Body> {
     let set: [fn(&mut Body, f32); 9] = [
         |b, x| b.mass.mass = x,

@@ -13,15 +13,13 @@ use glam::Vec3;
 pub use motions::{Tumble, flip_time, rolling_error};
 
 pub struct Case {
-    /// Short name, as the command line takes it.
     pub name: &'static str,
     pub summary: &'static str,
-    /// Whether it takes minutes.
+    /// Whether the case takes minutes.
     pub long: bool,
     run: fn(&Setup, &mut Checks) -> Result<()>,
 }
 
-/// A quantity of a case, with its limit.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Check {
     /// The quantity, with its unit.
@@ -77,7 +75,6 @@ impl Checks {
     }
 }
 
-/// Settings and backend of the cases.
 pub struct Setup<'a> {
     pub config: SolverConfig,
     /// Opens the backend that runs the sweeps.
@@ -118,7 +115,6 @@ impl Setup<'_> {
 /// Length of a step (s).
 const DT: f32 = 1.0 / 60.0;
 
-/// The state of a world after a run.
 #[derive(Clone, Copy, Debug)]
 struct Outcome {
     /// Number of dynamic bodies that are not in place.

@@ -10,13 +10,10 @@ use glam::{Quat, Vec2, Vec3};
 use super::map::{Cell, Map};
 use drystone::{Body, Result, Scene, Shape, World};
 
-/// Side of a cell (m).
+// Side of a cell, radii of ball and hole, height of the walls and depth of the holes (m).
 pub const CELL: f32 = 0.06;
-/// Radius of the ball (m).
 pub const RADIUS: f32 = 0.015;
-/// Radius of a hole (m).
 const HOLE: f32 = 0.4 * CELL;
-/// Height of the walls and depth of the holes (m).
 const HEIGHT: f32 = 0.022;
 const DEPTH: f32 = 0.04;
 /// Corners of a hole, a multiple of four.
@@ -24,11 +21,9 @@ const SEGMENTS: u16 = 24;
 /// Steps per second.
 const RATE: f32 = 120.0;
 
-/// Index of the board in the world of [`scene`].
+// Indices of the bodies in the world of [`scene`].
 pub const BOARD: usize = 0;
-/// Index of the floor of the goal.
 pub const GOAL: usize = 1;
-/// Index of the ball.
 pub const BALL: usize = 3;
 
 /// The world of a map: kinematic board, goal and lids of the walls around the origin, and the ball at rest on the start. Rows lie
@@ -117,7 +112,6 @@ fn wall_runs(map: &Map) -> Vec<(Vec3, f32)> {
     runs.iter().map(run).collect()
 }
 
-/// Triangles with shared vertices.
 #[derive(Default)]
 struct Surface {
     vertices: Vec<Vec3>,
@@ -155,7 +149,6 @@ impl Surface {
     }
 }
 
-/// The mesh of floor, holes, walls and sides of the board.
 fn surface(map: &Map) -> Result<Shape> {
     let mut surface = Surface::default();
     let (rows, columns) = (map.rows as isize, map.columns as isize);

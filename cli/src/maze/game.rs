@@ -19,7 +19,6 @@ const OFF_WALLS: f32 = 2e-5;
 /// Largest distance between the centers of ball and goal at the end of a game that is won (m).
 const ARRIVED: f32 = 0.4 * CELL;
 
-/// The end of a game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
@@ -46,7 +45,6 @@ pub trait Engine {
     fn world(&self) -> &World;
     /// The game writes the velocities of kinematic bodies.
     fn world_mut(&mut self) -> &mut World;
-    /// Makes a step of `dt` seconds.
     fn step(&mut self, dt: f32) -> Result<()>;
 }
 
@@ -77,7 +75,7 @@ pub struct Game {
     pub tilt: [f32; 2],
     steps: u32,
     dt: f32,
-    /// Number of last steps in which the ball touched only the floor.
+    /// Last steps in which the ball touched only the floor.
     rolled: u32,
     slip: Slip,
     /// Sum of the squares of the slip (m²/s²).
@@ -87,7 +85,6 @@ pub struct Game {
 }
 
 impl Game {
-    /// A game before its first step.
     pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         Self::with(map, |scene| Ok(Box::new(Simulation::new(scene.world, config, backend)?)))
     }
@@ -184,7 +181,6 @@ pub struct Sample {
     pub ball: [f32; 3],
 }
 
-/// A game that has ended.
 #[derive(Clone, Debug, Serialize)]
 pub struct Played {
     pub board: String,
@@ -200,9 +196,8 @@ pub struct Played {
     pub track: Vec<Sample>,
 }
 
-/// Steps between two samples of the track.
+// Steps between two samples of the track, and samples per second.
 const SAMPLE: u32 = 6;
-/// Samples of the track per second.
 pub const SAMPLES: f64 = 20.0;
 
 /// Plays `script` until it ends or the game is won or lost. `watch` gets the game at every sample of the track.

@@ -7,7 +7,6 @@ use drystone::{Error, Result};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
-    /// The ball can roll here.
     Floor,
     Wall,
     /// A round hole, wider than the ball.
@@ -17,16 +16,14 @@ pub enum Cell {
 /// A board: rows of cells, start and goal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Map {
-    /// Name of the board, or of its file.
     pub name: String,
     /// Rows from the far side to the near side.
     pub rows: usize,
     /// Cells in a row, from left to right.
     pub columns: usize,
     cells: Vec<Cell>,
-    /// Row and column of the first position of the ball.
+    /// Rows and columns of start and goal.
     pub start: (usize, usize),
-    /// Row and column of the goal.
     pub goal: (usize, usize),
 }
 
@@ -41,7 +38,6 @@ pub const BOARDS: [(&str, &str); 3] = [
 const MOST: usize = 64;
 
 impl Map {
-    /// Finds a board by its name, or reads the file of that name.
     pub fn find(name_or_path: &str) -> Result<Self> {
         if let Some((name, text)) = BOARDS.iter().find(|b| b.0 == name_or_path) {
             return Self::parse(name, text);

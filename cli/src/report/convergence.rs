@@ -73,7 +73,6 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
     Ok(())
 }
 
-/// Writes the errors of runs with plain and accelerated sweeps.
 fn runs(page: &mut String) -> Result<()> {
     page.push_str(include_str!("convergence_runs.md"));
     page.push_str("\n| scene | substeps | sweeps | method | deepest [mm] | rms speed [mm/s] | in place |\n");

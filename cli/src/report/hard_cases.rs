@@ -7,7 +7,6 @@ use drystone::Result;
 use drystone::backend::BackendKind;
 use drystone::preset::Preset;
 
-/// Preset and backend of each column.
 const COLUMNS: [(Preset, BackendKind); 6] = [
     (Preset::Fast, BackendKind::Cpu),
     (Preset::Balanced, BackendKind::Cpu),
@@ -22,7 +21,6 @@ fn is_run(case: &Case, (preset, numbers): (Preset, BackendKind)) -> bool {
     !case.long || numbers == BackendKind::Cpu && preset.config().substeps <= Preset::Balanced.config().substeps
 }
 
-/// Number of runs of the page.
 pub fn count(cases: &[&Case]) -> u64 {
     cases.iter().flat_map(|case| COLUMNS.iter().map(|&column| u64::from(is_run(case, column)))).sum()
 }

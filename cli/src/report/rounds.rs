@@ -32,7 +32,6 @@ impl Clock {
         Self { processor: backend != "gpu" && rayon::current_num_threads() == 1, start: Instant::now() }
     }
 
-    /// `processor` or `wall`.
     pub fn name(&self) -> &'static str {
         if self.processor { "processor" } else { "wall" }
     }

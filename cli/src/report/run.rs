@@ -20,7 +20,6 @@ pub struct RunReport {
     pub backend: String,
     pub adapter: String,
     pub worlds: usize,
-    /// Dynamic bodies of all worlds.
     pub bodies: usize,
     pub steps: u32,
     /// Length of a step (s).
@@ -40,7 +39,6 @@ pub struct RunReport {
     /// Manifolds and points at the end, with those of sleeping bodies.
     pub manifolds: usize,
     pub points: usize,
-    /// Bodies that sleep at the end.
     pub asleep: usize,
     /// The first step after which a body slept.
     pub first_asleep_step: Option<u32>,
@@ -166,7 +164,6 @@ impl RunReport {
         }
     }
 
-    /// Adds a step.
     pub fn add(&mut self, stats: &StepStats) {
         let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
         let step_ms = ms(stats.times.total());

@@ -24,7 +24,6 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    /// Writes all bodies except fixed ones.
     pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
         for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
             let (p, q) = (body.center_of_mass(), body.rotation);

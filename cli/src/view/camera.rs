@@ -18,7 +18,6 @@ impl Bounds {
     /// An empty box; joined with another box it gives the other.
     pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
-    /// A cube around a point with half side `reach`.
     pub fn around(center: Vec3, reach: f32) -> Self {
         Self { low: center - reach, high: center + reach }
     }
@@ -48,16 +47,14 @@ impl Bounds {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
+/// `distance` is that of the eye from `target` (m); `up` is a unit vector.
 pub struct Camera {
-    /// The point in the center of the view (m).
     pub target: Vec3,
-    /// Distance of the eye from the target (m).
     pub distance: f32,
     /// Angle around the upward axis (rad); at 0 the camera looks along -z if up is y.
     pub yaw: f32,
     /// Elevation above the horizon (rad).
     pub pitch: f32,
-    /// Unit vector that is up in the picture.
     pub up: Vec3,
 }
 
@@ -98,7 +95,6 @@ impl Camera {
         [turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z]
     }
 
-    /// Position of the eye (m).
     pub fn eye(&self) -> Vec3 {
         self.target + self.distance * self.axes()[2]
     }

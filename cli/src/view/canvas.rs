@@ -25,7 +25,6 @@ pub struct Canvas {
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Canvas {
-    /// A canvas on the best adapter for pictures of `world`.
     pub fn new(world: &World, (width, height): (u32, u32)) -> Result<Self> {
         let (device, queue, _) = open_device(AdapterChoice::Best)?;
         let most = device.limits().max_texture_dimension_2d;
@@ -44,7 +43,6 @@ impl Canvas {
         Ok(Self { device, queue, renderer, size: (width, height), texture, read_back })
     }
 
-    /// Width over height of the pictures.
     pub fn aspect(&self) -> f32 {
         self.size.0 as f32 / self.size.1 as f32
     }

@@ -29,7 +29,6 @@ pub type Rgba = [u8; 4];
 
 const FIXED: Rgba = [176, 178, 182, 255];
 const KINEMATIC: Rgba = [150, 160, 178, 255];
-/// Bodies without a contact.
 const NOTHING: Rgba = [222, 222, 218, 255];
 const ASLEEP: Rgba = [74, 92, 128, 255];
 const AWAKE: Rgba = [240, 178, 84, 255];
@@ -64,7 +63,6 @@ impl ColorBy {
         self.values_of(&simulation.world, &manifolds, &asleep)
     }
 
-    /// The values for given manifolds and sleeping bodies.
     pub(super) fn values_of(self, world: &World, manifolds: &[SolvedManifold], asleep: &[bool]) -> Vec<f32> {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
@@ -154,7 +152,6 @@ pub fn batch_color(batch: u32) -> Rgba {
     [channel(5.0), channel(3.0), channel(1.0), 255]
 }
 
-/// The color of the scale from 0, dark, to 1, light.
 fn on_scale(x: f32) -> Rgba {
     // The square root separates small values.
     let x = x.clamp(0.0, 1.0).sqrt() * (SCALE.len() - 1) as f32;

@@ -12,13 +12,11 @@ use super::overlay::ropes;
 use super::renderer::Shot;
 use drystone::{BodyKind, Error, Result, Scene, Simulation, World};
 
-/// A world at one time.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Time since the start (s).
     pub time: f64,
     pub poses: Vec<(Vec3, Quat)>,
-    /// Values of [`ColorBy::values`].
     pub values: Vec<f32>,
 }
 
@@ -44,7 +42,6 @@ impl Film {
         Self { scene, color, frames: Vec::new() }
     }
 
-    /// Adds the state after the last step.
     pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
         let values = self.color.values(simulation);
         self.frames.push(Frame { time, poses: poses(&simulation.world), values });
@@ -65,7 +62,6 @@ impl Film {
         self
     }
 
-    /// Reads the motion that `drystone run --out` wrote.
     pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
         if color.needs_run() {
             let refusal = "--from: a recorded motion has neither contacts nor sleep; color by material or speed";
@@ -108,7 +104,6 @@ impl Film {
         Ok(film)
     }
 
-    /// The bounds of everything that moves, over all frames.
     pub fn bounds(&self) -> Bounds {
         self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(bounds_at(&self.scene.world, &frame.poses)))
     }

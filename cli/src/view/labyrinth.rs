@@ -35,7 +35,6 @@ fn camera_for(map: &Map, aspect: f32) -> Camera {
     Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
 }
 
-/// Draws a game from the poses of its bodies.
 pub fn draw_game(
     canvas: &mut Canvas,
     map: &Map,

@@ -32,7 +32,6 @@ pub struct Live {
     pub(super) stats: StepStats,
     /// Times of the stages, means over the last steps (ms).
     pub(super) stage_ms: [f64; 5],
-    /// The reason why a setting was refused.
     pub(super) refused: Option<String>,
     pub(super) owed: f32,
     /// Time of the steps before the last picture.
@@ -49,7 +48,6 @@ pub(super) struct Grabbed {
     pub(super) anchor: Vec3,
     /// Distance of the target from the eye (m).
     pub(super) distance: f32,
-    /// The point under the mouse (m).
     pub(super) target: Vec3,
 }
 
@@ -85,7 +83,6 @@ impl Live {
         self.steps as f32 * self.scene.dt
     }
 
-    /// Restarts the scene with the current settings.
     pub(super) fn restart(&mut self) -> Result<()> {
         let config = self.simulation.config().clone();
         let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;

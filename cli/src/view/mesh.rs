@@ -42,7 +42,6 @@ const OCTANTS: u32 = 2;
 /// Cosine of the largest angle between faces of a smooth surface, 35 degrees.
 const SMOOTH: f32 = 0.82;
 
-/// A collider, and the transform of its mesh.
 struct Part {
     body: usize,
     position: Vec3,
@@ -55,7 +54,6 @@ struct Part {
     screen: Option<Collider>,
 }
 
-/// Colliders that share a mesh.
 struct Group {
     vertices: Range<u32>,
     parts: Vec<Part>,
@@ -105,7 +103,6 @@ impl Meshes {
         meshes
     }
 
-    /// Vertices and instances of each draw.
     pub fn draws(&self) -> impl Iterator<Item = (Range<u32>, Range<u32>)> {
         let mut first = 0;
         self.groups.iter().map(move |g| {

@@ -25,7 +25,6 @@ pub(super) fn no_display() -> Error {
     Error::Adapter(format!("no display to open a window on; {without}"))
 }
 
-/// Effect of a mouse drag.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Drag {
     Nothing,
@@ -124,7 +123,6 @@ impl Open {
         self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
     }
 
-    /// Handles the keys of the window itself.
     pub(super) fn key(&mut self, key: &Key, down: bool, show: &dyn Show) {
         match key.as_ref() {
             Key::Character("f") if down => self.frame_scene(show),

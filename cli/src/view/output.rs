@@ -100,7 +100,6 @@ impl Output {
         }
     }
 
-    /// Completes the file and puts it under its name.
     pub fn finish(self) -> Result<()> {
         let Self { path, draft, kind, .. } = self;
         match kind {

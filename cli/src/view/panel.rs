@@ -111,7 +111,6 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
     }
 }
 
-/// A choice among values, by their names on the command line.
 fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str, all: &[T], value: &mut T) {
     ui.horizontal(|ui| {
         ui.label(what);

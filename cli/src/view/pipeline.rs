@@ -1,6 +1,5 @@
 //! Textures, bindings and pipelines of the renderer.
 
-/// Quality of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quality {
     /// Samples per pixel, 1 or 4.
@@ -18,7 +17,6 @@ impl Quality {
     pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
 }
 
-/// Format of depth, and of the shadow map.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 pub(super) fn texture(
@@ -70,7 +68,6 @@ pub(super) fn layout_of<T>(
     wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
 }
 
-/// The properties in which pipelines differ.
 pub(super) struct Drawing<'a> {
     pub(super) layout: &'a wgpu::BindGroupLayout,
     pub(super) module: &'a wgpu::ShaderModule,

@@ -16,13 +16,11 @@ use drystone::World;
 /// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
-/// The content of a picture.
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
     pub poses: &'a Poses,
     pub colors: &'a [Rgba],
     pub camera: &'a Camera,
-    /// Bounds of the bodies that cast shadows.
     pub bounds: Bounds,
     /// The near walls of this space are hidden.
     pub container: Option<Bounds>,

@@ -13,7 +13,6 @@ use drystone::{Result, World};
 pub struct Pointer {
     /// Position in the picture, -1 to 1 from left to right and from bottom to top.
     pub at: Vec2,
-    /// The eye (m).
     pub origin: Vec3,
     /// Unit vector from the eye to the point under the mouse.
     pub direction: Vec3,
@@ -36,9 +35,7 @@ pub trait Show {
     fn lines(&mut self) -> Vec<LineEnd> {
         Vec::new()
     }
-    /// Advances real time by `seconds`.
     fn advance(&mut self, seconds: f32) -> Result<()>;
-    /// Handles a key that was pressed or released.
     fn key(&mut self, key: &Key, down: bool) -> Result<()>;
     /// Handles a press of the left button; returns whether drags go here instead of to the camera.
     fn grab(&mut self, pointer: &Pointer) -> bool;

@@ -10,7 +10,6 @@ use super::open::{Open, no_display};
 use super::show::Show;
 use drystone::{Error, Result};
 
-/// Shows `show` in a window until the window is closed.
 pub fn run(show: Box<dyn Show>) -> Result<()> {
     let events = EventLoop::new().map_err(|_| no_display())?;
     events.set_control_flow(ControlFlow::Poll);
@@ -83,7 +82,6 @@ impl ApplicationHandler for App {
     }
 }
 
-/// Makes keys independent of shift and caps lock.
 fn in_lower_case(key: Key) -> Key {
     match key {
         Key::Character(text) => Key::Character(text.to_lowercase().into()),
@@ -92,7 +90,6 @@ fn in_lower_case(key: Key) -> Key {
 }
 
 impl App {
-    /// Closes the window after an error.
     fn end(&mut self, events: &ActiveEventLoop, result: Result<()>) {
         if let Err(e) = result {
             self.failed = Some(e);

@@ -28,7 +28,6 @@ pub struct LimitRow {
     pub points: usize,
     /// Contact points swept per second by all threads together.
     pub sweeps: f64,
-    /// Operations on single numbers per point and sweep.
     pub operations: f64,
     /// Multiplications and additions on registers alone (1/s).
     pub peak: f64,
@@ -90,7 +89,6 @@ pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dy
 const FEW: u32 = 4;
 const MANY: u32 = 24;
 
-/// Time of a number of sweeps (s).
 fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
     let config = SolverConfig::default().without_sleep().with(|c| {
         c.substeps = 1;
@@ -104,7 +102,6 @@ fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
     Ok(begin.elapsed().as_secs_f64())
 }
 
-/// Operations per second of all threads together.
 fn peak(pool: &rayon::ThreadPool) -> f64 {
     const ROUNDS: usize = 1_000_000;
     let begin = Instant::now();

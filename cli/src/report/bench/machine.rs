@@ -7,11 +7,9 @@ use serde::{Deserialize, Serialize};
 pub struct Machine {
     /// Model of the processor; empty if unknown.
     pub processor: String,
-    /// Cores available to this process.
     pub cores: usize,
     /// Memory (MiB); 0 if unknown.
     pub memory: u64,
-    /// Operating system and instruction set.
     pub system: String,
     /// Version of drystone, and `debug` or `release`.
     pub build: String,

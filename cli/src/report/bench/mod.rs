@@ -35,10 +35,8 @@ pub const STANDARD: [&str; 9] = [
     "pile:n=100,worlds=256",
 ];
 
-/// The scenes of a quick bench.
 pub const QUICK: [&str; 5] = ["pile:n=1000", "many-pyramids:n=10", "drum", "joint-grid", "pile:n=100,worlds=8"];
 
-/// Steps per turn.
 const TURN: usize = 10;
 /// Steps of one substep in which bodies fall into a container and settle.
 const COARSE: usize = 240;
@@ -49,17 +47,13 @@ const FINE: usize = 60;
 /// are of the last step. [`comparison::Row`](crate::report::comparison::Row) compares engines, which have no stages.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StagesRow {
-    /// The scene with its parameters.
     pub scene: String,
-    /// Hash of the contents of the scene.
     pub hash: String,
     pub backend: String,
     pub adapter: String,
     pub threads: usize,
-    /// Settings that are not at their defaults.
     pub settings: String,
     pub worlds: usize,
-    /// Dynamic bodies.
     pub bodies: usize,
     pub manifolds: usize,
     pub points: usize,
@@ -107,7 +101,6 @@ struct Way {
     turns: Vec<[f64; 6]>,
 }
 
-/// A scene with its simulation.
 struct Case {
     spec: String,
     hash: String,
@@ -176,7 +169,6 @@ impl Case {
         Ok(Self { spec: spec.into(), hash, dt, simulation, ways, last: drystone::StepStats::default() })
     }
 
-    /// Makes the steps of a turn on each backend.
     fn turn(&mut self) -> Result<()> {
         let Self { simulation, ways, dt, last, .. } = self;
         for way in ways {

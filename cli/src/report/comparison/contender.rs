@@ -19,22 +19,19 @@ pub trait Contender {
 /// Makes the contenders of an engine for a scene, one for each setting.
 pub type Team<'a> = dyn Fn(&Scene, Extent) -> Result<Vec<Box<dyn Contender>>> + 'a;
 
-/// Whether a report has the main settings or all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     Quick,
     Full,
 }
 
-/// An engine and its settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     pub engine: String,
     /// `reference`, `cpu` or `gpu`.
     pub backend: String,
-    /// Substeps per step.
+    /// Substeps per step, and sweeps per substep.
     pub substeps: u32,
-    /// Sweeps per substep.
     pub sweeps: u32,
     pub method: String,
     pub friction: String,

@@ -6,7 +6,6 @@ use super::pareto::profile;
 use crate::report::plot::Scale::{Decades, Share};
 use crate::report::plot::{Frame, Series, svg};
 
-/// Appends a table of headings and rows of cells.
 pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoIterator<Item = Vec<String>>) {
     let headings = headings.iter().map(|heading| format!("<th>{heading}</th>")).collect::<String>();
     let _ = writeln!(html, "<div class=\"wide\"><table><tr>{headings}</tr>");
@@ -39,7 +38,6 @@ pub(super) fn profile_picture(
     svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 
-/// A number with three digits.
 pub(super) fn number(x: f64) -> String {
     if !x.is_finite() || x == 0.0 {
         return if x.is_nan() { "-".into() } else { x.to_string() };

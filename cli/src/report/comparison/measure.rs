@@ -17,7 +17,6 @@ const BLOCK: u32 = 10;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub scene: String,
-    /// Hash of the contents of the scene.
     pub hash: String,
     /// Start of the run; only rows of one run have time ratios.
     pub run: String,
@@ -26,7 +25,6 @@ pub struct Row {
     pub commit: String,
     pub machine: String,
     pub threads: usize,
-    /// Dynamic bodies.
     pub bodies: usize,
     /// Steps of the whole run.
     pub steps: u32,
@@ -62,7 +60,6 @@ pub struct Row {
     pub joint_gap: Option<f64>,
     /// Kinetic and potential energy gained over the whole run (J).
     pub energy_gained: f64,
-    /// Whether all numbers stayed finite.
     pub finite: bool,
 }
 
@@ -72,7 +69,6 @@ impl Row {
         Setting { engine, backend, substeps, sweeps, method, friction, more }
     }
 
-    /// Time relative to another row of the run.
     pub fn time_ratio(&self, other: &Self) -> Result<f64> {
         for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
             if own != others {
@@ -139,7 +135,6 @@ pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(2)
 }
 
-/// Steps of each contender on the scene.
 pub(super) fn steps(scene: &Scene) -> u32 {
     blocks(scene.steps) * BLOCK
 }

@@ -16,7 +16,6 @@ pub struct Origin {
     pub commit: String,
     /// Processor, cores, adapter, operating system.
     pub machine: String,
-    /// Threads of the pool.
     pub threads: usize,
 }
 

@@ -66,7 +66,6 @@ fn of_side<'a>(rows: &'a [Row], wanted: &str) -> Vec<&'a Row> {
     rows.iter().filter(|row| side(row) == wanted).collect()
 }
 
-/// The sides with rows, and their rows.
 fn present<'a>(rows: &'a [Row], sides: &'a [String]) -> impl Iterator<Item = (&'a String, Vec<&'a Row>)> {
     sides.iter().map(|name| (name, of_side(rows, name))).filter(|(_, rows)| !rows.is_empty())
 }
@@ -97,7 +96,6 @@ fn head(html: &mut String, results: &[Vec<Row>]) {
     );
 }
 
-/// Time against an error in one scene.
 fn picture(rows: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> String {
     let place = |row: &Row| (row.ms, fault.of(row) * 1e3);
     let series = |(name, rows): (&String, Vec<&Row>)| Series {

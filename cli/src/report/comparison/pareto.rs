@@ -6,7 +6,6 @@ use drystone::Result;
 /// Smallest error (m), (m/s): the resolution of f32 poses some ten meters from the origin.
 pub const FLOOR: f64 = 1e-6;
 
-/// An error of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     Deepest,
@@ -94,7 +93,6 @@ pub struct Duel {
     pub worst: f64,
     /// Smallest relative time at equal error.
     pub best: f64,
-    /// Least error of the own side.
     pub own: f64,
     /// Least error of the other side; infinite if none of its rows holds.
     pub others: f64,

@@ -5,7 +5,6 @@ use crate::settings;
 use drystone::backend::gpu::adapters;
 use drystone::{Result, Scene, SolverConfig};
 
-/// Scenes of the full report.
 const FULL: [&str; 9] = [
     "tower:n=20",
     "tower:n=10,top_ratio=1000",
@@ -27,7 +26,6 @@ const LARGE: usize = 2000;
 /// Steps of a large scene; the pile is at rest after half of them.
 const LARGE_STEPS: u32 = 300;
 
-/// The scenes of the report.
 pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
     let named = |name: &&str| {

@@ -76,7 +76,6 @@ fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)
 }
 
-/// Time against error in one problem.
 fn curves(rows: &[SolveRow], solvers: &[String]) -> String {
     let series = solvers.iter().enumerate().map(|(look, name)| {
         let of = rows.iter().filter(|row| row.solver() == *name && row.e_vel > 0.0);

@@ -15,19 +15,15 @@ use drystone::{Backend, ContactProblem, Cpu, Result};
 const SOLVERS: [(Method, &str); 4] =
     [(Method::Plain, "f64"), (Method::Accelerated, "f64"), (Method::Plain, "cpu"), (Method::Accelerated, "cpu")];
 
-/// Turns of each solver on each problem.
 const TURNS: usize = 3;
 
-/// Largest number of sweeps.
 const MOST: u32 = 2000;
 
 /// Time and error of one solver on one problem after a number of sweeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolveRow {
     pub problem: String,
-    /// Hash of the problem.
     pub hash: String,
-    /// Start of the run.
     pub run: String,
     /// As in [`Origin`].
     pub build: String,
@@ -53,7 +49,6 @@ impl SolveRow {
     }
 }
 
-/// Solves a problem with all solvers, which take turns.
 pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>> {
     let run = Origin::now();
     let mut solvers = SOLVERS.map(|solver| (solver, Vec::new()));

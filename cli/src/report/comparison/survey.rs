@@ -11,13 +11,11 @@ use super::table::Table;
 use crate::files;
 use drystone::{ContactProblem, Error, Result, Scene};
 
-/// Scenes, engines and output of a report.
 pub struct Survey<'a> {
     pub scenes: Vec<Scene>,
     /// Times are relative to the first contender of the first team.
     pub teams: Vec<&'a Team<'a>>,
     pub extent: Extent,
-    /// Contact problems for drystone's solvers.
     pub problems: Vec<ContactProblem>,
     /// Folder of all files; made if needed.
     pub out: PathBuf,

@@ -40,7 +40,6 @@ impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
         Ok(block)
     }
 
-    /// All rows, the oldest first.
     pub fn rows(&self) -> &[R] {
         &self.rows
     }

@@ -5,18 +5,14 @@ use std::ops::Range;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
 
-/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Linear.
     Linear,
-    /// Logarithmic.
     Decades,
     /// From 0 to 1.
     Share,
 }
 
-/// An axis that contains given values.
 pub(super) struct Axis {
     scale: Scale,
     ends: Range<f64>,

@@ -30,13 +30,11 @@ pub struct Series {
     pub line: Vec<(f64, f64)>,
 }
 
-/// Title, axes and size of a plot.
 pub struct Frame<'a> {
     pub title: &'a str,
     /// Quantities of the axes, with units.
     pub x: &'a str,
     pub y: &'a str,
-    /// Scales of x and y.
     pub scales: (Scale, Scale),
     /// Width and height (pixels).
     pub size: (u32, u32),

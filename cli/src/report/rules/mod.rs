@@ -16,7 +16,6 @@ use super::plot::{Frame, Scale, Series, svg};
 
 pub struct RulesReport {
     pub page: String,
-    /// Name and SVG text of each picture.
     pub pictures: Vec<(&'static str, String)>,
 }
 
@@ -81,7 +80,6 @@ fn stand(spec: &str, settings_text: &str) -> Result<Standing> {
     })
 }
 
-/// Number of calls of `after_run`.
 pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
 
 impl RulesReport {
