@@ -68,14 +68,12 @@ impl Drop for Draft {
     }
 }
 
-/// Rows as CSV with a header line.
 pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     rows.iter().try_for_each(|row| writer.serialize(row)).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
     writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))
 }
 
-/// Removes all drafts before the process ends.
 pub fn discard_drafts() {
     drafts().drain(..).for_each(|draft| discard(&draft));
 }

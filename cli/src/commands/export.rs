@@ -32,24 +32,18 @@ impl ExportArgs {
     pub fn run(&self) -> Result<()> {
         let path = Path::new(&self.source);
         let is_scene = CATALOGUE.iter().any(|e| e.name == self.source) || path.extension().is_none_or(|e| e == "json");
-        let problem = if is_scene { self.of_scene()? } else { self.of_file(path)? };
+        let problem = if is_scene {
+            let missing = || Error::input(format!("{}: a scene needs --step N", self.source));
+            let problem = problem_of_step(Scene::find(&self.source, &self.parameter)?, self.step.ok_or_else(missing)?)?;
+            check_touching(&problem)?;
+            problem
+        } else if self.step.is_some() || !self.parameter.is_empty() {
+            return Err(Error::input(format!("{}: a contact problem has no --step and no --parameter", self.source)));
+        } else {
+            ContactProblem::read(path)?
+        };
         replacing(&self.fclib, || files::write(&self.fclib, &problem.to_fclib()?))?;
         let (bodies, contacts) = (problem.bodies.len(), problem.contacts.len());
         print(format_args!("{}: {bodies} bodies, {contacts} contacts", self.fclib.display()))
-    }
-
-    fn of_file(&self, path: &Path) -> Result<ContactProblem> {
-        if self.step.is_some() || !self.parameter.is_empty() {
-            return Err(Error::input(format!("{}: a contact problem has no --step and no --parameter", self.source)));
-        }
-        ContactProblem::read(path)
-    }
-
-    fn of_scene(&self) -> Result<ContactProblem> {
-        let missing = || Error::input(format!("{}: a scene needs --step N", self.source));
-        let step = self.step.ok_or_else(missing)?;
-        let problem = problem_of_step(Scene::find(&self.source, &self.parameter)?, step)?;
-        check_touching(&problem)?;
-        Ok(problem)
     }
 }

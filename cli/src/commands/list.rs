@@ -48,7 +48,6 @@ pub struct SettingsArgs {
 }
 
 impl SettingsArgs {
-    /// Prints the settings as TOML with their descriptions.
     pub fn run(&self) -> Result<()> {
         let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
         let schema = schemars::schema_for!(SolverConfig).to_value();

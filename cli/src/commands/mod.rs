@@ -21,8 +21,6 @@ mod words;
 
 pub use report::SurveyArgs;
 
-#[cfg(not(feature = "view"))]
-use clap::Args;
 use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -30,8 +28,6 @@ use self::output::say;
 use crate::files;
 use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::nearest;
-#[cfg(not(feature = "view"))]
-use drystone::{Error, Result};
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -82,7 +78,7 @@ enum Command {
 
 /// A command that needs the feature `view`.
 #[cfg(not(feature = "view"))]
-#[derive(Args)]
+#[derive(clap::Args)]
 struct NotBuilt {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     rest: Vec<String>,
@@ -90,8 +86,9 @@ struct NotBuilt {
 
 #[cfg(not(feature = "view"))]
 impl NotBuilt {
-    fn run(&self) -> Result<()> {
-        Err(Error::input("pictures and windows need a build with them: `cargo install --path cli --features view`"))
+    fn run(&self) -> drystone::Result<()> {
+        let needed = "pictures and windows need a build with them: `cargo install --path cli --features view`";
+        Err(drystone::Error::input(needed))
     }
 }
 

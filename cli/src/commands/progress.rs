@@ -50,10 +50,6 @@ impl Progress {
         self.line();
     }
 
-    pub fn set_length(&self, count: u64) {
-        self.bar.set_length(count);
-    }
-
     pub fn set_message(&self, what: impl Into<String>) {
         self.bar.set_message(what.into());
     }

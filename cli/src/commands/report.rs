@@ -77,10 +77,10 @@ impl ReportArgs {
                 print(out.join("rules.md").display())
             }
             Some(Page::Convergence { out, problems }) => {
-                let bar = Progress::steps(0, false);
+                let (bar, mut done) = (Progress::steps(0, false), 0);
                 let page = convergence(problems.as_deref(), |problems| {
-                    bar.set_length(problems as u64);
-                    bar.inc();
+                    done += 1;
+                    bar.set(done, problems as u64);
                 })?;
                 bar.finish();
                 std::fs::create_dir_all(out).map_err(Error::file(out))?;
@@ -93,12 +93,10 @@ impl ReportArgs {
 }
 
 impl SurveyArgs {
-    /// Threads of each engine.
     pub fn threads(&self) -> usize {
         self.threads.into()
     }
 
-    /// Runs drystone and the teams of other engines, and writes the page.
     pub fn run(&self, others: &[&Team]) -> Result<()> {
         let report = if self.draw { Report::read(&self.out)? } else { self.measure(others)? };
         print(report.write(&self.out)?.display())

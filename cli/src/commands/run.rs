@@ -1,7 +1,6 @@
 //! `drystone run`.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::Args;
 
@@ -43,47 +42,31 @@ pub struct RunArgs {
     /// Write the contact problem of a step, for `drystone solve`.
     ///
     /// Step 1 is the first.
-    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT)]
-    save_problem: Option<SaveProblem>,
+    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT, value_parser = step_and_file)]
+    save_problem: Option<(u32, PathBuf)>,
 }
 
-#[derive(Clone, Debug)]
-struct SaveProblem {
-    step: u32,
-    file: PathBuf,
+fn step_and_file(text: &str) -> std::result::Result<(u32, PathBuf), &'static str> {
+    let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
+    let step = step.parse().map_err(|_| "STEP must be a whole number")?;
+    if file.is_empty() { Err("FILE is missing") } else { Ok((step, file.into())) }
 }
 
-impl FromStr for SaveProblem {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
-        let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
-        let step = step.parse().map_err(|_| "STEP must be a whole number")?;
-        if file.is_empty() { Err("FILE is missing") } else { Ok(Self { step, file: file.into() }) }
-    }
-}
-
-impl SaveProblem {
-    /// Refuses a step that cannot be saved, before the run.
-    fn check(&self, scene: &Scene) -> Result<()> {
-        let (step, file, steps) = (self.step, self.file.display(), scene.steps);
-        if !(1..=steps).contains(&step) {
-            return Err(Error::input(format!("--save-problem {step}:{file}: the run has steps 1 to {steps}")));
-        }
-        if !scene.world.joints.is_empty() {
-            let (name, joints) = (&scene.name, scene.world.joints.len());
-            return Err(Error::input(format!(
-                "--save-problem {step}:{file}: {name} has {joints} joints, which a contact problem has not"
-            )));
-        }
-        Ok(())
+/// Refuses a step that cannot be saved, before the run.
+fn check_save((step, file): &(u32, PathBuf), scene: &Scene) -> Result<()> {
+    let (file, steps, name, joints) = (file.display(), scene.steps, &scene.name, scene.world.joints.len());
+    let refuse = |why: String| Err(Error::input(format!("--save-problem {step}:{file}: {why}")));
+    match joints {
+        _ if !(1..=steps).contains(step) => refuse(format!("the run has steps 1 to {steps}")),
+        0 => Ok(()),
+        _ => refuse(format!("{name} has {joints} joints, which a contact problem has not")),
     }
 }
 
 impl RunArgs {
     pub fn run(&self) -> Result<()> {
         let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
-        self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
+        self.save_problem.iter().try_for_each(|save| check_save(save, &scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
@@ -96,12 +79,12 @@ impl RunArgs {
         let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
-                let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
-                    Some(save) => {
+                let stats = match self.save_problem.as_ref().filter(|save| save.0 == step) {
+                    Some((_, file)) => {
                         let name = format!("{}, step {step}", scene.name);
                         let (problem, stats) = simulation.step_with_contacts(&name, scene.dt)?;
                         check_touching(&problem)?;
-                        replacing(&save.file, || files::write(&save.file, problem.to_text().as_bytes()))?;
+                        replacing(file, || files::write(file, problem.to_text().as_bytes()))?;
                         stats
                     }
                     None => simulation.step(scene.dt)?,

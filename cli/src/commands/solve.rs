@@ -65,7 +65,7 @@ impl SolveArgs {
         } else {
             print_table(&report)?;
         }
-        if report.is_spoiled() {
+        if report.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan()) {
             let path = self.file.display();
             return Err(Error::input(format!("{path}: impulses left the finite range after {} sweeps", report.sweeps)));
         }

@@ -8,7 +8,6 @@ use drystone::config::Method;
 use drystone::preset::Preset;
 use drystone::solver::Order;
 
-/// A kind whose values have names.
 pub(super) trait Named: FromStr<Err = drystone::Error> + Clone + Send + Sync + 'static {
     /// The name and the help of each value.
     const WORDS: &'static [(&'static str, &'static str)];

@@ -20,7 +20,13 @@ pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
         checks.finite(&format!("{km} km from the origin: "), &far);
     }
     let bad = bad_bodies();
-    let taken = bad.iter().filter(|body| is_taken(setup, body)).count();
+    // A refusal must have the name of the body.
+    let is_taken = |body: &&Body| {
+        let mut world = floor(0.5);
+        world.add((*body).clone().named("culprit"));
+        setup.simulation(world).map_or_else(|e| !e.to_string().contains("culprit"), |_| true)
+    };
+    let taken = bad.iter().filter(is_taken).count();
     checks.at_most(format!("of {} bodies that are no input: taken", bad.len()), taken as f64, 0.0);
     let mut world = floor(0.5);
     let tiny = f32::MIN_POSITIVE / 8.0;
@@ -59,11 +65,4 @@ fn bad_bodies() -> Vec<Body> {
     };
     let not_finite = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().flat_map(|x| set.map(|set| (set, x)));
     not_finite.chain([(set[0], -1.0), (set[1], -0.1)]).map(with).collect()
-}
-
-/// Whether a simulation accepts a body, or refuses it without its name.
-fn is_taken(setup: &Setup, body: &Body) -> bool {
-    let mut world = floor(0.5);
-    world.add(body.clone().named("culprit"));
-    setup.simulation(world).map_or_else(|e| !e.to_string().contains("culprit"), |_| true)
 }

@@ -86,7 +86,6 @@ impl Setup<'_> {
         Simulation::new(world, self.config.clone(), (self.open)()?)
     }
 
-    /// Runs a scene of the catalogue and measures its end.
     fn run(&self, spec: &str, steps: u32) -> Result<Outcome> {
         self.outcome(Scene::find_spec(spec)?.world, steps)
     }

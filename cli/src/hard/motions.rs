@@ -69,9 +69,8 @@ pub(super) fn spinning_rod(setup: &Setup, checks: &mut Checks) -> Result<()> {
 pub struct Tumble {
     /// Times at which the spin about the middle axis changes sign (s).
     pub flips: Vec<f64>,
-    /// Largest relative change of the energy.
+    /// Largest relative changes of energy and angular momentum.
     pub energy: f64,
-    /// Largest relative change of the angular momentum.
     pub momentum: f64,
 }
 

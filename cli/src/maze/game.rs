@@ -186,7 +186,6 @@ pub struct Played {
     pub board: String,
     pub engine: String,
     pub outcome: Outcome,
-    /// Time of the end (s).
     pub time: f32,
     pub steps: u32,
     /// Deepest overlap (m).

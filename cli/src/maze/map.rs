@@ -27,7 +27,6 @@ pub struct Map {
     pub goal: (usize, usize),
 }
 
-/// The boards of the crate, ordered by difficulty.
 pub const BOARDS: [(&str, &str); 3] = [
     ("easy", include_str!("../../mazes/easy.txt")),
     ("medium", include_str!("../../mazes/medium.txt")),

@@ -18,7 +18,6 @@ const STEPS: [(&str, u32); 5] =
 const KINDS: [(Method, u8); 4] =
     [(Method::Plain, 1), (Method::Plain, 2), (Method::Accelerated, 1), (Method::Accelerated, 2)];
 
-/// Largest number of sweeps of a solve.
 const MOST: u32 = 40_000;
 
 /// Scenes that run with equal numbers of sweeps, and their steps.

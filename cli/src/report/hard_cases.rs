@@ -44,9 +44,16 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         writeln!(rows, "| **{}** | {} ||||||||", case.name, case.summary).expect("text takes all");
         let asked = columns.iter().flatten().next().map_or(&[][..], |checks| checks);
         for (i, check) in asked.iter().enumerate() {
+            let cell = |check: &Check| match (number(check.value), check.passed) {
+                (value, true) => value,
+                (value, false) => format!("**{value}**"),
+            };
             let cells: Vec<_> = columns.iter().map(|c| c.as_ref().map_or("not run".into(), |c| cell(&c[i]))).collect();
-            writeln!(rows, "| | {} | {} | {} |", check.what, limit(check.limit), cells.join(" | "))
-                .expect("text takes all");
+            let limit = match check.limit {
+                Limit::AtMost(x) => format!("≤ {x}"),
+                Limit::AtLeast(x) => format!("≥ {x}"),
+            };
+            writeln!(rows, "| | {} | {limit} | {} |", check.what, cells.join(" | ")).expect("text takes all");
         }
     }
     let of = |k: usize| cases.iter().filter(|c| is_run(c, COLUMNS[k])).count();
@@ -66,18 +73,6 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         totals.join(" | "),
         include_str!("hard_cases_tail.md")
     ))
-}
-
-fn limit(limit: Limit) -> String {
-    match limit {
-        Limit::AtMost(x) => format!("≤ {x}"),
-        Limit::AtLeast(x) => format!("≥ {x}"),
-    }
-}
-
-fn cell(check: &Check) -> String {
-    let value = number(check.value);
-    if check.passed { value } else { format!("**{value}**") }
 }
 
 /// A number with three or four significant digits, or a whole number.

@@ -57,7 +57,6 @@ pub struct RunReport {
     /// Share of the pairs that reused their manifolds.
     pub reused: f64,
     pub dispatches: usize,
-    /// Bytes that the kernels read and wrote.
     pub bytes_moved: u64,
     /// Bytes to the device and back.
     pub bytes_up: u64,

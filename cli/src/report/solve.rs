@@ -30,7 +30,6 @@ pub struct SolveSettings {
 #[derive(Clone, Debug, Serialize)]
 pub struct SolveReport {
     pub problem: String,
-    /// Bodies that can move.
     pub bodies: usize,
     pub contacts: usize,
     pub method: Method,
@@ -76,11 +75,6 @@ impl SolveSettings {
 }
 
 impl SolveReport {
-    /// Whether the last error is not a number.
-    pub fn is_spoiled(&self) -> bool {
-        self.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan())
-    }
-
     /// Solves a problem in f64, or in f32 on a backend.
     pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
         let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;

@@ -2,7 +2,6 @@
 
 use drystone::{BodyKind, Simulation, SolvedManifold, World};
 
-/// The quantity that the color of a body shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ColorBy {
     /// Density, friction and restitution: equal materials have equal colors.
@@ -33,7 +32,6 @@ const NOTHING: Rgba = [222, 222, 218, 255];
 const ASLEEP: Rgba = [74, 92, 128, 255];
 const AWAKE: Rgba = [240, 178, 84, 255];
 
-/// Stones, bricks, slates.
 const MATERIALS: [Rgba; 8] = [
     [196, 162, 118, 255],
     [168, 90, 66, 255],
@@ -50,11 +48,6 @@ const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
 impl ColorBy {
-    /// Whether the quantity needs contacts or sleep, which a recorded motion does not have.
-    pub fn needs_run(self) -> bool {
-        matches!(self, Self::Batch | Self::Impulse | Self::Sleeping)
-    }
-
     /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), or 1 for sleep; NaN without a
     /// contact.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {

@@ -64,7 +64,6 @@ pub struct Labyrinth {
 }
 
 impl Labyrinth {
-    /// A game whose clock starts with the first tilt.
     pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
         let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
         let held = [false; 4];

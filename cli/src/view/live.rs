@@ -95,7 +95,6 @@ impl Live {
         self.refused = self.simulation.set_config(config).err().map(|e| e.to_string());
     }
 
-    /// Changes the backend, unless the new one cannot be opened.
     pub(super) fn set_backend(&mut self, choice: BackendChoice) {
         match choose(choice, self.scene.world.dynamic_count(), self.exact) {
             Ok((backend, _)) => {

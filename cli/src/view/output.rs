@@ -14,7 +14,6 @@ pub struct Output {
     path: PathBuf,
     /// Dropped before the draft: the writer ends first.
     kind: Kind,
-    /// The file or folder until then.
     draft: Draft,
     size: (u32, u32),
     /// Duration of a GIF frame (1/100 s).

@@ -21,7 +21,6 @@ pub struct Overlay {
     pub contacts: bool,
     /// Lines from the center of each body to its joints, and between the anchors.
     pub joints: bool,
-    /// The axis-aligned box of every collider.
     pub boxes: bool,
 }
 

@@ -94,11 +94,7 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
             ui.selectable_value(&mut config.friction, rule, name);
         }
     });
-    let changed = config.substeps != before.substeps
-        || config.iterations != before.iterations
-        || config.relax != before.relax
-        || config.friction != before.friction;
-    if changed {
+    if config != before {
         live.set_config(config);
     }
     let mut backend = live.choice;
@@ -121,7 +117,6 @@ fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str
 }
 
 impl ColorBy {
-    /// The next quantity, cyclically.
     pub fn next(self) -> Self {
         let all = Self::value_variants();
         let at = all.iter().position(|&c| c == self).map_or(0, |i| i + 1);

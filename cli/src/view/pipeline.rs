@@ -4,7 +4,6 @@
 pub struct Quality {
     /// Samples per pixel, 1 or 4.
     pub(super) samples: u32,
-    /// Side of the shadow map (texels).
     pub(super) shadow_size: u32,
     /// Texels of the shadow map that are compared on each side of a point.
     pub(super) shadow_reach: u32,

@@ -13,7 +13,6 @@ use super::overlay::LineEnd;
 use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
 use drystone::World;
 
-/// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
 #[derive(Clone, Copy)]
@@ -112,10 +111,13 @@ impl Renderer {
         let module = |label: &str, source: &str| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
-                source: wgpu::ShaderSource::Wgsl([VIEW_WGSL, source].concat().into()),
+                source: wgpu::ShaderSource::Wgsl(
+                    [include_str!("../../shaders/view/view.wgsl"), source].concat().into(),
+                ),
             })
         };
-        let (mesh, line) = (module("mesh", MESH_WGSL), module("line", LINE_WGSL));
+        let mesh = module("mesh", include_str!("../../shaders/view/mesh.wgsl"));
+        let line = module("line", include_str!("../../shaders/view/line.wgsl"));
         let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
         let row = wgpu::vertex_attr_array![2 => Float32x3, 3 => Unorm8x4, 4 => Float32x4, 5 => Float32x3, 6 => Uint32];
         let end = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
@@ -226,20 +228,12 @@ impl Renderer {
             light_projection: (around * from).to_cols_array_2d(),
             eye: camera.eye().extend(camera.distance + 2.0 * radius).to_array(),
             light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
-            up: camera.up.extend(pattern_edge(radius)).to_array(),
+            // The side of the squares on the ground is a power of ten (m).
+            up: camera.up.extend(10.0_f32.powf((radius.log10() - 0.5).round())).to_array(),
             background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
         };
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
     }
-}
-
-const VIEW_WGSL: &str = include_str!("../../shaders/view/view.wgsl");
-const MESH_WGSL: &str = include_str!("../../shaders/view/mesh.wgsl");
-const LINE_WGSL: &str = include_str!("../../shaders/view/line.wgsl");
-
-/// Side of the squares on the ground for a scene of this radius: a power of ten (m).
-fn pattern_edge(radius: f32) -> f32 {
-    10.0_f32.powf((radius.log10() - 0.5).round())
 }
 
 /// Whether a body is a near wall of `container`: it lies outside on the side of the eye and covers more than half of both lengths of

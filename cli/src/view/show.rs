@@ -8,7 +8,6 @@ use super::colors::Rgba;
 use super::overlay::LineEnd;
 use drystone::{Result, World};
 
-/// The position of the mouse and its ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Pointer {
     /// Position in the picture, -1 to 1 from left to right and from bottom to top.
@@ -18,7 +17,6 @@ pub struct Pointer {
     pub direction: Vec3,
 }
 
-/// The content of a window, and its reactions to keys and mouse.
 pub trait Show {
     fn title(&self) -> String;
     /// The world, whose bodies and shapes must not change.

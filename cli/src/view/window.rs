@@ -48,7 +48,11 @@ impl ApplicationHandler for App {
             },
             WindowEvent::KeyboardInput { event: KeyEvent { logical_key, state, repeat, .. }, .. } if !taken => {
                 let down = state == ElementState::Pressed;
-                let logical_key = in_lower_case(logical_key);
+                // Keys are independent of shift and caps lock.
+                let logical_key = match logical_key {
+                    Key::Character(text) => Key::Character(text.to_lowercase().into()),
+                    other => other,
+                };
                 if logical_key == Key::Named(NamedKey::Escape) {
                     return events.exit();
                 }
@@ -79,13 +83,6 @@ impl ApplicationHandler for App {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // The window must be dropped before the event loop.
         self.open = None;
-    }
-}
-
-fn in_lower_case(key: Key) -> Key {
-    match key {
-        Key::Character(text) => Key::Character(text.to_lowercase().into()),
-        other => other,
     }
 }
 

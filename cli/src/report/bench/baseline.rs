@@ -3,7 +3,6 @@
 use super::{Bench, StagesRow};
 use drystone::{Error, Result};
 
-/// Change of a row since the earlier bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
     /// The earlier bench has no such row.

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The properties of machine and build on which times depend.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Model of the processor; empty if unknown.

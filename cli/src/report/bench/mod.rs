@@ -90,7 +90,6 @@ impl StagesRow {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bench {
     pub machine: Machine,
-    /// In the order of scenes, then threads, then backends.
     pub rows: Vec<StagesRow>,
 }
 
@@ -122,7 +121,14 @@ pub fn bench(
 ) -> Result<Bench> {
     let mut cases = Vec::new();
     for spec in specs {
-        cases.push(Case::new(spec, config, threads, open)?);
+        let mut ways = Vec::new();
+        for &threads in threads {
+            for backend in open()? {
+                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
+            }
+        }
+        let (simulation, hash, dt) = settled(spec, config)?;
+        cases.push(Case { spec: spec.clone(), hash, dt, simulation, ways, last: drystone::StepStats::default() });
         after_turn();
     }
     interleave(turns, &mut cases, |_, case| {
@@ -153,22 +159,6 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 }
 
 impl Case {
-    fn new(
-        spec: &str,
-        config: &SolverConfig,
-        threads: &[usize],
-        open: &dyn Fn() -> Result<Vec<Box<dyn Backend>>>,
-    ) -> Result<Self> {
-        let mut ways = Vec::new();
-        for &threads in threads {
-            for backend in open()? {
-                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
-            }
-        }
-        let (simulation, hash, dt) = settled(spec, config)?;
-        Ok(Self { spec: spec.into(), hash, dt, simulation, ways, last: drystone::StepStats::default() })
-    }
-
     fn turn(&mut self) -> Result<()> {
         let Self { simulation, ways, dt, last, .. } = self;
         for way in ways {

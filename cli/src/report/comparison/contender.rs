@@ -41,6 +41,10 @@ pub struct Setting {
 
 impl Setting {
     pub fn drystone(backend: &str, config: &SolverConfig) -> Self {
+        let mut more =
+            settings::unusual(config, &["substeps", "iterations", "method", "friction", "sleep_after", "relax"]);
+        // The usual number of relax sweeps is that of the biased ones.
+        more.extend((config.relax != config.iterations).then(|| format!("relax={}", config.relax)));
         Self {
             engine: "drystone".into(),
             backend: backend.into(),
@@ -48,7 +52,7 @@ impl Setting {
             sweeps: config.iterations,
             method: if config.method == Method::Plain { "plain" } else { "accelerated" }.into(),
             friction: if config.friction == Friction::Box { "box" } else { "disc" }.into(),
-            more: unusual(config).join(" "),
+            more: more.join(" "),
         }
     }
 
@@ -59,17 +63,6 @@ impl Setting {
         let words: String = words.map(|(word, _)| format!(" {word}")).collect();
         format!("{engine} {backend} {substeps}x{sweeps}{words}")
     }
-}
-
-/// Settings without a field in [`Setting`]. The usual number of relax sweeps is that of the biased ones.
-fn unusual(config: &SolverConfig) -> Vec<String> {
-    let said = ["substeps", "iterations", "method", "friction", "sleep_after"];
-    let mut more = settings::unusual(config, &said);
-    more.retain(|text| !text.starts_with("relax="));
-    if config.relax != config.iterations {
-        more.push(format!("relax={}", config.relax));
-    }
-    more
 }
 
 pub struct Drystone {

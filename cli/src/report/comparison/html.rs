@@ -15,7 +15,6 @@ pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoItera
     html.push_str("</table></div>\n");
 }
 
-/// A cell, with a class unless that is empty.
 pub(super) fn cell(class: &str, text: impl Display) -> String {
     if class.is_empty() { format!("<td>{text}</td>") } else { format!("<td class=\"{class}\">{text}</td>") }
 }

@@ -18,7 +18,6 @@ pub struct Page {
     pub main: String,
 }
 
-/// The engine that the others are compared with.
 const OWN: &str = "drystone";
 
 /// Errors of the profiles over the scenes (m).

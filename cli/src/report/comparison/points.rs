@@ -93,9 +93,8 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
         Some(_) if !is_large(scene) => points.push(("gpu", String::new())),
         _ => {}
     }
-    points.into_iter().map(|(backend, settings)| contender(scene, backend, &settings)).collect()
-}
-
-fn contender(scene: &Scene, backend: &str, settings: &str) -> Result<Box<dyn Contender>> {
-    Ok(Box::new(Drystone::new(scene, backend, &settings::awake(settings.split_whitespace())?)?))
+    let contender = |(backend, settings): (&str, String)| -> Result<Box<dyn Contender>> {
+        Ok(Box::new(Drystone::new(scene, backend, &settings::awake(settings.split_whitespace())?)?))
+    };
+    points.into_iter().map(contender).collect()
 }

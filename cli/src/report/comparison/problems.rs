@@ -7,7 +7,6 @@ use super::solves::SolveRow;
 use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Series, svg};
 
-/// Errors of the profiles over contact problems.
 const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {

@@ -33,7 +33,6 @@ pub struct SolveRow {
     pub method: String,
     /// `f64`, or `cpu`, which is in f32.
     pub backend: String,
-    /// Sweeps from zero impulses.
     pub sweeps: u32,
     /// Time of the sweeps: median, least and largest over the turns (ms).
     pub ms: f64,

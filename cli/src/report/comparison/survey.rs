@@ -2,14 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use super::contender::{Extent, Setting, Team};
 use super::measure::{Row, blocks, measure};
 use super::origin::Origin;
 use super::page;
 use super::solves::{self, SolveRow, solves};
-use super::table::Table;
 use crate::files;
 use drystone::{ContactProblem, Error, Result, Scene};
+
+// Files of rows in the folder of a report.
+const SCENES: &str = "scenes.csv";
+const PROBLEMS: &str = "problems.csv";
 
 pub struct Survey<'a> {
     pub scenes: Vec<Scene>,
@@ -33,7 +39,7 @@ impl Survey<'_> {
     /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and threads.
     pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
-        let mut table = Table::<Row>::open(scenes_path(&self.out))?;
+        let mut table = Table::<Row>::open(self.out.join(SCENES))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
         let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
         let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
@@ -54,7 +60,7 @@ impl Survey<'_> {
             })?);
             before += weight(scene);
         }
-        let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
+        let mut table = Table::<SolveRow>::open(self.out.join(PROBLEMS))?;
         let mut all = Vec::new();
         for problem in &self.problems {
             progress(&problem.name, before, total);
@@ -88,21 +94,51 @@ fn solved(rows: &[SolveRow], hash: &str, origin: &Origin) -> Option<Vec<SolveRow
     Some(rows.iter().filter(|row| row.run == last.run && row.hash == hash).cloned().collect())
 }
 
-fn problems_path(folder: &Path) -> PathBuf {
-    folder.join("problems.csv")
+/// Rows in a CSV file that grows by blocks.
+struct Table<R> {
+    path: PathBuf,
+    rows: Vec<R>,
 }
 
-fn scenes_path(folder: &Path) -> PathBuf {
-    folder.join("scenes.csv")
+impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
+    /// Reads the rows of a file; a missing file has none.
+    fn open(path: PathBuf) -> Result<Self> {
+        if !path.exists() {
+            return Ok(Self { path, rows: Vec::new() });
+        }
+        let bytes = std::fs::read(&path).map_err(Error::file(&path))?;
+        let parsed: std::result::Result<Vec<R>, _> = csv::Reader::from_reader(&bytes[..]).deserialize().collect();
+        let rows = parsed.map_err(|e| {
+            let line = e.position().map_or(1, csv::Position::line);
+            let path = path.display();
+            Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
+        })?;
+        Ok(Self { path, rows })
+    }
+
+    /// Returns the block `known`, or makes a block and adds it to the rows and to the file.
+    fn add_unless(&mut self, known: Option<Vec<R>>, make: impl FnOnce() -> Result<Vec<R>>) -> Result<Vec<R>> {
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let block = make()?;
+        self.rows.extend_from_slice(&block);
+        files::write(&self.path, &files::csv(&self.rows)?)?;
+        Ok(block)
+    }
+
+    fn rows(&self) -> &[R] {
+        &self.rows
+    }
 }
 
 impl Report {
     /// The rows of the last run of each scene in the folder.
     pub fn read(folder: &Path) -> Result<Self> {
         let (rows, solved) =
-            (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
+            (Table::<Row>::open(folder.join(SCENES))?, Table::<SolveRow>::open(folder.join(PROBLEMS))?);
         if rows.rows().is_empty() && solved.rows().is_empty() {
-            return Err(Error::input(format!("{}: no rows to draw", scenes_path(folder).display())));
+            return Err(Error::input(format!("{}: no rows to draw", folder.join(SCENES).display())));
         }
         let results = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
         let solves = last_of_each(solved.rows(), |row| (&row.problem, &row.run));

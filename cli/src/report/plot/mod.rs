@@ -19,12 +19,10 @@ const COLORS: [RGBColor; 6] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Points of one kind, and a line.
 pub struct Series {
     pub name: String,
     /// Number of color and marker.
     pub look: usize,
-    /// Points with their labels.
     pub points: Vec<(f64, f64, String)>,
     /// Corners of the line: straight from one to the next if x is linear, else in stairs.
     pub line: Vec<(f64, f64)>,

@@ -19,7 +19,6 @@ fn largest(most: u32, mut stands: impl FnMut(u32) -> Result<bool>) -> Result<u32
     Ok(good)
 }
 
-/// Tallest tower that is tried.
 const MOST_BOXES: u32 = 128;
 
 pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
