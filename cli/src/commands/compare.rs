@@ -18,7 +18,7 @@ pub struct CompareArgs {
     /// The two backends; the first is the reference.
     #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
-    /// Require exact shaders; without this they run where the adapter supports them.
+    /// Require exact shaders, which otherwise run only where the adapter supports them.
     #[arg(long, conflicts_with = "plain")]
     exact: bool,
     /// Use plain WGSL, as in a browser.

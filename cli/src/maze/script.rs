@@ -60,7 +60,6 @@ impl Script {
         self.points.push((time, tilt));
     }
 
-    /// Time of the last point (s).
     pub fn end(&self) -> f32 {
         self.points.last().map_or(0.0, |p| p.0)
     }

@@ -51,9 +51,8 @@ impl Bounds {
 pub struct Camera {
     pub target: Vec3,
     pub distance: f32,
-    /// Angle around the upward axis (rad); at 0 the camera looks along -z if up is y.
+    /// Angle around the upward axis and elevation (rad); at 0 the camera looks along -z if up is y.
     pub yaw: f32,
-    /// Elevation above the horizon (rad).
     pub pitch: f32,
     pub up: Vec3,
 }

@@ -38,7 +38,7 @@ pub const STANDARD: [&str; 9] = [
 pub const QUICK: [&str; 5] = ["pile:n=1000", "many-pyramids:n=10", "drum", "joint-grid", "pile:n=100,worlds=8"];
 
 const TURN: usize = 10;
-/// Steps of one substep in which bodies fall into a container and settle.
+/// Steps of one substep in which bodies fall into a container.
 const COARSE: usize = 240;
 /// Steps with the measured settings before the measurement.
 const FINE: usize = 60;

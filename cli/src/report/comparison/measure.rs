@@ -26,7 +26,6 @@ pub struct Row {
     pub machine: String,
     pub threads: usize,
     pub bodies: usize,
-    /// Steps of the whole run.
     pub steps: u32,
     /// As in [`Setting`]; CSV has no nested fields.
     pub engine: String,

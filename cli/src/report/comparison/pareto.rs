@@ -91,7 +91,6 @@ pub fn front<'a>(rows: &[&'a Row], fault: Fault) -> Vec<&'a Row> {
 pub struct Duel {
     /// Largest relative time at equal error; infinite if no own row reaches an error.
     pub worst: f64,
-    /// Smallest relative time at equal error.
     pub best: f64,
     pub own: f64,
     /// Least error of the other side; infinite if none of its rows holds.

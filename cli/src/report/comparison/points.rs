@@ -17,7 +17,6 @@ const FULL: [&str; 9] = [
     "pile:n=5000",
 ];
 
-/// Scenes of the quick report, which takes two minutes.
 const QUICK: [&str; 5] = ["tower:n=20", "tower:n=10,top_ratio=1000", "mass-ratio", "chain", "wall:rows=10,columns=10"];
 
 /// A scene with this many bodies has fewer steps and settings, and does not run on a software adapter.

@@ -79,20 +79,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     let mut lines = Vec::new();
     let cases = [("slip", ""), ("box", ""), ("disc", ""), ("disc", "friction_at=manifold")];
     for (rule, more) in cases {
-        let text = format!("{} {more}", friction_settings(rule));
-        let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
-        let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
-        let mut points = Vec::new();
-        for step in 1..=60_u32 {
-            simulation.step(DT)?;
-            let time = f64::from(step) * f64::from(DT);
-            let body = &simulation.world.bodies[1];
-            let (v, w) = (f64::from(body.linear_velocity.length()), f64::from(body.angular_velocity.length()));
-            slides = if v > 0.02 { time } else { slides };
-            spins = if w > 0.05 { time } else { spins };
-            aside = aside.max(f64::from(body.position.z.abs()));
-            points.push((time, v));
-        }
+        let (slides, spins, aside, points) = sliding_spin(rule, more)?;
         let name = if more.is_empty() { rule.to_owned() } else { format!("{rule}, per manifold") };
         let end = |t: f64| if t > 0.99 { "1 s and more".into() } else { format!("{t:.3} s") };
         let _ = writeln!(report.page, "| {name} | {} | {} | {:.1} mm |", end(slides), end(spins), aside * 1e3);
@@ -101,6 +88,26 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     }
     report.picture("spinning-block.svg", "Speed of a block that slides and spins", ("speed m/s", Scale::Linear), lines);
     Ok(())
+}
+
+/// Times (s) for which a block slides and spins that starts at 2 m/s and 5 rad/s, its largest distance from the straight line (m), and its
+/// speed over time.
+fn sliding_spin(rule: &str, more: &str) -> Result<(f64, f64, f64, Vec<(f64, f64)>)> {
+    let text = format!("{} {more}", friction_settings(rule));
+    let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
+    let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
+    let mut points = Vec::new();
+    for step in 1..=60_u32 {
+        simulation.step(DT)?;
+        let time = f64::from(step) * f64::from(DT);
+        let body = &simulation.world.bodies[1];
+        let (v, w) = (f64::from(body.linear_velocity.length()), f64::from(body.angular_velocity.length()));
+        slides = if v > 0.02 { time } else { slides };
+        spins = if w > 0.05 { time } else { spins };
+        aside = aside.max(f64::from(body.position.z.abs()));
+        points.push((time, v));
+    }
+    Ok((slides, spins, aside, points))
 }
 
 fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
@@ -151,6 +158,15 @@ mod tests {
             );
         }
         assert!((slid("box", 0.0) - 1.0).abs() < 0.01 && slid("box", 45.0) < 0.75);
+    }
+
+    #[test]
+    fn sliding_and_spinning_end_together_under_the_disc_at_points_only() {
+        let ends = |rule, more| sliding_spin(rule, more).map(|(slides, spins, aside, _)| (slides - spins, aside));
+        let (disc, boxed) = (ends("disc", "").expect("a run"), ends("box", "").expect("a run"));
+        let manifold = ends("disc", "friction_at=manifold").expect("a run");
+        assert!(disc.0 < 0.06 && boxed.0 > 0.15 && manifold.0 > 0.2, "{disc:?} {boxed:?} {manifold:?}");
+        assert!(disc.1 > 0.02 && manifold.1 < 1e-4, "{disc:?} {manifold:?}");
     }
 
     #[test]
