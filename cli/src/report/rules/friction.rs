@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{DT, RulesReport, simulate};
+use super::{DT, Line, RulesReport, simulate};
 use crate::report::plot::Scale;
 use drystone::metrics::{fastest, in_place, in_place_count};
 use drystone::{Body, Result, Scene, Shape, World};
@@ -79,7 +79,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     let mut lines = Vec::new();
     let cases = [("slip", ""), ("box", ""), ("disc", ""), ("disc", "friction_at=manifold")];
     for (rule, more) in cases {
-        let (slides, spins, aside, points) = sliding_spin(rule, more)?;
+        let ([slides, spins, aside], points) = sliding_spin(rule, more)?;
         let name = if more.is_empty() { rule.to_owned() } else { format!("{rule}, per manifold") };
         let end = |t: f64| if t > 0.99 { "1 s and more".into() } else { format!("{t:.3} s") };
         let _ = writeln!(report.page, "| {name} | {} | {} | {:.1} mm |", end(slides), end(spins), aside * 1e3);
@@ -92,7 +92,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
 
 /// Times (s) for which a block slides and spins that starts at 2 m/s and 5 rad/s, its largest distance from the straight line (m), and its
 /// speed over time.
-fn sliding_spin(rule: &str, more: &str) -> Result<(f64, f64, f64, Vec<(f64, f64)>)> {
+fn sliding_spin(rule: &str, more: &str) -> Result<([f64; 3], Line)> {
     let text = format!("{} {more}", friction_settings(rule));
     let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
     let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
@@ -107,7 +107,7 @@ fn sliding_spin(rule: &str, more: &str) -> Result<(f64, f64, f64, Vec<(f64, f64)
         aside = aside.max(f64::from(body.position.z.abs()));
         points.push((time, v));
     }
-    Ok((slides, spins, aside, points))
+    Ok(([slides, spins, aside], points))
 }
 
 fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn sliding_and_spinning_end_together_under_the_disc_at_points_only() {
-        let ends = |rule, more| sliding_spin(rule, more).map(|(slides, spins, aside, _)| (slides - spins, aside));
+        let ends = |rule, more| sliding_spin(rule, more).map(|([slides, spins, aside], _)| (slides - spins, aside));
         let (disc, boxed) = (ends("disc", "").expect("a run"), ends("box", "").expect("a run"));
         let manifold = ends("disc", "friction_at=manifold").expect("a run");
         assert!(disc.0 < 0.06 && boxed.0 > 0.15 && manifold.0 > 0.2, "{disc:?} {boxed:?} {manifold:?}");

@@ -33,6 +33,8 @@ impl RulesReport {
 
 /// Length of a step (s).
 const DT: f32 = 1.0 / 60.0;
+/// Times (s) and values of a line in a plot.
+type Line = Vec<(f64, f64)>;
 
 /// Runs everything and makes the page; calls `after_run` [`RUNS`] times.
 pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
@@ -50,7 +52,6 @@ fn simulate(world: World, settings_text: &str) -> Result<Simulation> {
     Simulation::new(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
 }
 
-/// The end of a run of a standing scene.
 struct Standing {
     /// Time until a body left its place; none if all bodies stood for 20 s (s).
     fell: Option<f64>,
@@ -84,13 +85,7 @@ pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
 
 impl RulesReport {
     /// Adds a plot of named lines over time. A logarithmic scale leaves out values that are not above 0.
-    fn picture(
-        &mut self,
-        file: &'static str,
-        title: &str,
-        (y, scale): (&str, Scale),
-        lines: Vec<(String, Vec<(f64, f64)>)>,
-    ) {
+    fn picture(&mut self, file: &'static str, title: &str, (y, scale): (&str, Scale), lines: Vec<(String, Line)>) {
         let _ = writeln!(self.page, "\n![{file}](rules/{file})");
         let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {
             line.retain(|p| scale != Scale::Decades || p.1 > 0.0);
