@@ -1,27 +1,27 @@
-//! Files that are there whole or not at all.
+//! Files that appear under their names only when they are complete.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use drystone::{Error, Result};
 
-/// Hidden places of all drafts that there are.
+/// Hidden paths of all open drafts.
 static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A file or folder that is written under a hidden name beside its own. It gets its own when it is kept; else it goes away.
+/// A file or folder under a hidden name beside the final one. `keep` renames it; a draft that is dropped is removed.
 pub struct Draft {
-    /// As the caller named it.
+    /// The path that the caller gave, for messages.
     path: PathBuf,
-    /// Where it goes: what a link points to.
+    /// The final path, with links resolved.
     target: PathBuf,
-    /// Where it is until then; none if the target is no file, such as /dev/null or a pipe, and is written at once.
+    /// The hidden path; none if the target is a device or a pipe, which is written directly.
     hidden: Option<PathBuf>,
 }
 
 impl Draft {
-    /// Nothing is made yet.
+    /// Chooses the hidden path and creates nothing.
     pub fn of(path: &Path) -> Result<Self> {
         let there = std::fs::metadata(path);
         if there.as_ref().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
@@ -35,18 +35,16 @@ impl Draft {
         Ok(Self { path: path.into(), target, hidden: Some(hidden) })
     }
 
-    /// Where to write.
     pub fn place(&self) -> &Path {
         self.hidden.as_deref().unwrap_or(&self.target)
     }
 
-    /// Begins a file.
     pub fn create(&self) -> Result<File> {
         let made = if self.target.is_dir() { Err(ErrorKind::IsADirectory.into()) } else { File::create(self.place()) };
         made.map_err(Error::file(&self.path))
     }
 
-    /// Gives it its name: what had that name is gone.
+    /// Renames the draft; an existing file of that name is replaced.
     pub fn keep(mut self) -> Result<()> {
         let Some(hidden) = &self.hidden else { return Ok(()) };
         std::fs::rename(hidden, &self.target).map_err(Error::file(&self.path))?;
@@ -70,14 +68,12 @@ impl Drop for Draft {
     }
 }
 
-/// Rows with a line of headings, as CSV.
 pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     rows.iter().try_for_each(|row| writer.serialize(row)).map_err(|e| Error::input(format!("a row as CSV: {e}")))?;
     writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))
 }
 
-/// Removes all drafts, right before the process ends.
 pub fn discard_drafts() {
     drafts().drain(..).for_each(|draft| discard(&draft));
 }
@@ -87,44 +83,15 @@ fn drafts() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
 }
 
 fn discard(draft: &Path) {
-    // It may not even be there.
+    // The draft may not exist yet.
     let _ = if draft.is_dir() { std::fs::remove_dir_all(draft) } else { std::fs::remove_file(draft) };
 }
 
-/// A file that is written piece by piece and is there when it is finished.
-pub struct Writer {
-    file: File,
-    draft: Draft,
-}
-
-impl Writer {
-    /// Begins a file.
-    pub fn create(path: &Path) -> Result<Self> {
-        let draft = Draft::of(path)?;
-        Ok(Self { file: draft.create()?, draft })
-    }
-
-    /// Ends the file.
-    pub fn finish(self) -> Result<()> {
-        self.draft.keep()
-    }
-}
-
-impl Write for Writer {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
-/// Writes a file: a reader finds all of it, or what was there before.
+/// Writes a file at once: a reader finds the old contents or all of the new.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut writer = Writer::create(path)?;
-    writer.write_all(bytes).map_err(Error::file(path))?;
-    writer.finish()
+    let draft = Draft::of(path)?;
+    draft.create()?.write_all(bytes).map_err(Error::file(path))?;
+    draft.keep()
 }
 
 #[cfg(test)]
@@ -139,14 +106,14 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_finished_leaves_what_was_there() {
+    fn an_unfinished_file_leaves_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         write(&path, b"old").unwrap();
-        let mut writer = Writer::create(&path).unwrap();
-        writer.write_all(b"half of a r").unwrap();
+        let draft = Draft::of(&path).unwrap();
+        draft.create().unwrap().write_all(b"half of a r").unwrap();
         assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (2, b"old".to_vec()));
-        drop(writer);
+        drop(draft);
         assert_eq!(names(folder.path()), ["a.csv"]);
         write(&path, b"new").unwrap();
         assert_eq!((names(folder.path()).len(), std::fs::read(&path).unwrap()), (1, b"new".to_vec()));
@@ -156,7 +123,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_devices_stay_what_they_are() {
+    fn links_and_devices_remain() {
         let folder = tempfile::tempdir().unwrap();
         let [file, link] = ["file", "link"].map(|name| folder.path().join(name));
         std::fs::write(&file, "old").unwrap();

@@ -1,7 +1,6 @@
 //! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and a game.
 
 #![deny(unsafe_code)]
-#![warn(missing_docs)]
 
 pub mod commands;
 pub mod files;

@@ -1,10 +1,10 @@
 //! The `drystone` command.
 
 fn main() -> std::process::ExitCode {
-    // Where there is no desktop, a layer of Mesa's Vulkan looks for a Wayland socket in no folder, and libwayland complains on
-    // standard error whenever adapters are listed. In any folder it finds no socket without a word.
+    // Without a desktop, Mesa's Vulkan layer looks for a Wayland socket. libwayland prints an error if the variable is unset,
+    // and is silent if the variable names a folder without a socket.
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // SAFETY: no other thread runs yet: this is the first thing that the process does.
+        // SAFETY: no other thread runs yet; `main` has just begun.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir()) };
     }
     drystone_cli::commands::main()

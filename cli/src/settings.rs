@@ -1,13 +1,12 @@
-//! Settings as text: TOML files, `key=value`, and what is not at its default.
+//! Settings as text: TOML files and `key=value`.
 
 use std::path::Path;
 
-use drystone::config::SolverConfig;
 use drystone::stages::suggest::shorten;
-use drystone::{Error, Result};
+use drystone::{Error, Result, SolverConfig};
 use toml::{Table, Value};
 
-/// Reads settings from a TOML file; what it leaves out takes its default.
+/// Reads settings from a TOML file; missing settings take their defaults.
 pub fn read(path: &Path) -> Result<SolverConfig> {
     let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
     let config: SolverConfig = toml::from_str(&text).map_err(|e| {
@@ -18,7 +17,7 @@ pub fn read(path: &Path) -> Result<SolverConfig> {
     Ok(config)
 }
 
-/// The default settings without sleep, and with each of `assignments` ([`set`]).
+/// The default settings without sleep, changed by `assignments` ([`set`]).
 pub fn awake<'a>(assignments: impl IntoIterator<Item = &'a str>) -> Result<SolverConfig> {
     let mut config = SolverConfig::default().without_sleep();
     assignments.into_iter().try_for_each(|assignment| set(&mut config, assignment))?;
@@ -26,7 +25,7 @@ pub fn awake<'a>(assignments: impl IntoIterator<Item = &'a str>) -> Result<Solve
     Ok(config)
 }
 
-/// The settings that are not at their defaults, as `key=value`, but for those that are `said` otherwise.
+/// The settings that differ from their defaults, as `key=value`, without those named in `said`.
 pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
     let usual = list(&SolverConfig::default());
     let differs = |(key, value): &(String, Value)| {
@@ -34,14 +33,14 @@ pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
     };
     let text = |(key, value): (String, Value)| match value {
         Value::String(word) => format!("{key}={word}"),
-        // As it was written, without what f64 sees of its rounding.
+        // The shortest text of the f32; the f64 has digits of its rounding.
         Value::Float(x) => format!("{key}={}", x as f32),
         value => format!("{key}={value}"),
     };
     list(config).into_iter().filter(differs).map(text).collect()
 }
 
-/// All settings by name; those of a table as `table.name`.
+/// All settings by name; a nested setting is `table.name`.
 fn list(config: &SolverConfig) -> Vec<(String, Value)> {
     let settings = table(config).into_iter().flat_map(|(key, value)| match value {
         Value::Table(inner) => inner.into_iter().map(|(name, value)| (format!("{key}.{name}"), value)).collect(),
@@ -54,7 +53,7 @@ fn table(config: &SolverConfig) -> Table {
     Table::try_from(config).expect("a config is a table")
 }
 
-/// Changes one setting, written `key=value` as in TOML; bare words need no quotes.
+/// Changes one setting by `key=value` in TOML; a bare word needs no quotes.
 pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
     let (key, value) =
         assignment.split_once('=').ok_or_else(|| Error::input(format!("--set {assignment}: write it as key=value")))?;
@@ -67,7 +66,7 @@ pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
         Some((Some(Value::Table(group)), name)) => (group, name),
         _ => (&mut all, key),
     };
-    // A whole number is a fine value for a real setting.
+    // A real setting accepts a whole number.
     if let (Some(Value::Float(_)), Value::Integer(i)) = (place.get(name), &parsed) {
         parsed = Value::Float(*i as f64);
     }
@@ -79,7 +78,7 @@ pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
     Ok(())
 }
 
-/// The message of a TOML error without its drawing of the text, and without the list of all settings.
+/// The message of a TOML error on one line, without the list of all settings.
 fn first_line(e: &toml::de::Error) -> String {
     let message = e.message().lines().collect::<Vec<_>>().join(" ");
     let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`')).map(|(name, _)| name);

@@ -1,4 +1,4 @@
-//! The command line on a machine without the adapter that is asked for, and what then becomes of tests.
+//! The command line and the tests on a machine without the requested adapter.
 
 #[macro_use]
 #[path = "../../tests/common/mod.rs"]
@@ -12,28 +12,28 @@ use drystone::backend::gpu::AdapterSummary;
 
 tests! {
     no_gpu {
-        a_gpu_that_is_not_there_is_refused_with_what_was_looked_for_and_what_to_install,
-        auto_goes_on_with_the_cpu_whether_the_scene_is_small_or_large,
+        a_gpu_that_is_not_there_is_refused_with_the_request_and_the_package_to_install,
+        auto_takes_the_cpu_for_small_and_large_scenes,
         the_list_of_adapters_says_that_there_is_none,
-        a_test_fails_on_an_adapter_without_what_the_test_needs,
-        a_test_is_ignored_only_where_a_person_says_so,
-        where_vulkan_is_hidden_tests_of_exact_mode_fail_and_say_what_was_found,
+        a_test_fails_on_an_adapter_that_lacks_an_ability,
+        a_test_is_ignored_only_by_request,
+        without_vulkan_tests_of_exact_mode_fail_and_name_the_adapter,
         without_an_adapter_the_tests_that_need_one_are_ignored_and_counted,
         tests_of_a_gpu_stand_in_binaries_that_can_ignore_them_and_every_test_there_is_run,
     }
     any_gpu {
-        adapters_are_listed_with_what_they_can_do,
+        adapters_are_listed_with_their_abilities,
     }
     exact_gpu {
         exact_mode_opens_where_the_adapter_has_it,
     }
 }
 
-/// Runs the command with an adapter asked for that does not exist.
+/// Runs the command with a requested adapter that does not exist.
 fn without_adapter(arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
     command.args(arguments.split(' ')).env("DRYSTONE_ADAPTER", "no-such-adapter");
-    // Display libraries grumble on standard error without a place for sockets.
+    // Without a folder for sockets, display libraries print errors.
     command.env("XDG_RUNTIME_DIR", std::env::temp_dir());
     command.output().expect("the command starts")
 }
@@ -42,7 +42,7 @@ fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-fn a_gpu_that_is_not_there_is_refused_with_what_was_looked_for_and_what_to_install() {
+fn a_gpu_that_is_not_there_is_refused_with_the_request_and_the_package_to_install() {
     for arguments in ["run drop --steps 1 --backend gpu", "compare drop --steps 1"] {
         let output = without_adapter(arguments);
         let line = errors(&output);
@@ -55,7 +55,7 @@ fn a_gpu_that_is_not_there_is_refused_with_what_was_looked_for_and_what_to_insta
     }
 }
 
-fn auto_goes_on_with_the_cpu_whether_the_scene_is_small_or_large() {
+fn auto_takes_the_cpu_for_small_and_large_scenes() {
     for (scene, why) in [("drop", "cpu: "), ("pile -p n=5000", "cpu: no hardware GPU found")] {
         let output = without_adapter(&format!("run {scene} --steps 1 --backend auto"));
         let line = errors(&output);
@@ -71,7 +71,7 @@ fn the_list_of_adapters_says_that_there_is_none() {
     assert_eq!(String::from_utf8_lossy(&output.stdout), "none; everything runs on the CPU\n");
 }
 
-fn adapters_are_listed_with_what_they_can_do() {
+fn adapters_are_listed_with_their_abilities() {
     let found = gpu::plain().summary().clone();
     let output = Command::new(env!("CARGO_BIN_EXE_drystone")).args(["adapters", "--json"]).output().expect("it starts");
     let listed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
@@ -98,7 +98,7 @@ fn opengl() -> AdapterSummary {
     }
 }
 
-fn a_test_fails_on_an_adapter_without_what_the_test_needs() {
+fn a_test_fails_on_an_adapter_that_lacks_an_ability() {
     let vulkan = AdapterSummary { api: "Vulkan".into(), exact: true, clock: true, ..opengl() };
     for need in [Need::Adapter, Need::Exact, Need::Clock] {
         let line = need.refusal(None).expect("there is no adapter");
@@ -113,7 +113,7 @@ fn a_test_fails_on_an_adapter_without_what_the_test_needs() {
     }
 }
 
-fn a_test_is_ignored_only_where_a_person_says_so() {
+fn a_test_is_ignored_only_by_request() {
     let ignored = |adapter, without| {
         [Need::Adapter, Need::Exact, Need::Clock]
             .map(|need| need.left_out(adapter, without).expect("known words").is_some())
@@ -128,7 +128,7 @@ fn a_test_is_ignored_only_where_a_person_says_so() {
     assert!(line.contains("\"exakt\" is unknown"), "{line}");
 }
 
-/// Runs tests of this binary whose names contain `filter` in an environment that has these variables and no others of ours.
+/// Runs the tests of this binary whose names contain `filter`, with these environment variables and no others of drystone.
 fn tests_run(filter: &str, environment: &[(&str, &str)]) -> (bool, String) {
     let mut command = Command::new(std::env::current_exe().expect("this binary"));
     command.args([filter, "--test-threads=1"]).env("XDG_RUNTIME_DIR", std::env::temp_dir());
@@ -137,15 +137,15 @@ fn tests_run(filter: &str, environment: &[(&str, &str)]) -> (bool, String) {
     (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned() + &errors(&output))
 }
 
-/// Both names that Vulkan's loader knows for the list of drivers.
+/// The two names of the list of drivers in Vulkan's loader.
 const WITHOUT_VULKAN: [(&str, &str); 2] = [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
 /// A test of this binary that needs exact mode.
 const OF_EXACT_MODE: &str = "exact_mode_opens_where";
 
-fn where_vulkan_is_hidden_tests_of_exact_mode_fail_and_say_what_was_found() {
+fn without_vulkan_tests_of_exact_mode_fail_and_name_the_adapter() {
     let (passed, text) = tests_run(OF_EXACT_MODE, &WITHOUT_VULKAN);
     assert!(!passed && text.contains("0 passed; 1 failed; 0 ignored"), "{text}");
-    // OpenGL where there is such a driver, else nothing.
+    // The adapter is an OpenGL driver if there is one.
     assert!(
         text.contains("this test needs exact mode, which") || text.contains("an adapter, and there is none"),
         "{text}"
@@ -157,7 +157,7 @@ fn where_vulkan_is_hidden_tests_of_exact_mode_fail_and_say_what_was_found() {
 }
 
 fn without_an_adapter_the_tests_that_need_one_are_ignored_and_counted() {
-    let names = "adapters_are_listed_with_what_they_can_do";
+    let names = "adapters_are_listed_with_their_abilities";
     let (passed, text) = tests_run(names, &[("DRYSTONE_ADAPTER", "none")]);
     assert!(passed && text.contains("0 passed; 0 failed; 1 ignored"), "{text}");
     let (passed, text) = tests_run(names, &[("DRYSTONE_ADAPTER", "no-such-adapter")]);
@@ -165,13 +165,13 @@ fn without_an_adapter_the_tests_that_need_one_are_ignored_and_counted() {
     assert!(text.contains("this test needs an adapter, and there is none"), "{text}");
 }
 
-/// Binaries with `harness = false` run only what their lists name: cargo's attribute would leave a test out without a word.
+/// Binaries with `harness = false` run only the tests in their lists; a test with cargo's attribute would not run.
 fn tests_of_a_gpu_stand_in_binaries_that_can_ignore_them_and_every_test_there_is_run() {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     [own, own.parent().expect("a workspace")].into_iter().for_each(every_test_is_run);
 }
 
-/// Looks at the tests of the package in `root`.
+/// Checks the tests of the package in `root`.
 fn every_test_is_run(root: &Path) {
     let manifest: toml::Table =
         std::fs::read_to_string(root.join("Cargo.toml")).expect("it is there").parse().expect("TOML");

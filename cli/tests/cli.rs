@@ -1,4 +1,4 @@
-//! The command line: what it prints, and how it refuses bad input.
+//! The command line: output, and messages for bad input.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -47,7 +47,7 @@ impl Folder {
         serde_json::from_str(&printed).expect("JSON")
     }
 
-    /// The files in it, sorted.
+    /// The sorted names of the files.
     fn files(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.path()).expect("a folder");
         let mut names: Vec<_> =
@@ -96,7 +96,7 @@ fn a_run_reports_on_itself_as_rows() {
 }
 
 #[test]
-fn every_kth_step_of_every_body_that_can_move_is_written_as_csv() {
+fn every_kth_step_of_every_body_that_is_not_fixed_is_written_as_csv() {
     let folder = Folder::new();
     folder.output("run tower -p n=3 --steps 10 --every 4 --out motion.csv --dt 0.01");
     let written = std::fs::read_to_string(folder.path().join("motion.csv")).expect("the file");
@@ -112,7 +112,7 @@ fn every_kth_step_of_every_body_that_can_move_is_written_as_csv() {
     assert!((rows[0][4] - 0.5).abs() < 1e-6 && (rows[8][4] - 2.5).abs() < 0.01, "heights are in column py");
 }
 
-/// What is typed, and what the one line that refuses it must name.
+/// Bad arguments, and texts that the line of the error must contain.
 const REFUSED: &[(&[&str], &[&str])] = &[
     (&["run", "nowhere"], &["nowhere", "drystone scenes"]),
     (&["run", "pyle"], &["\"pyle\"", "did you mean \"pile\"?"]),
@@ -183,7 +183,7 @@ fn bad_input_ends_in_one_line_that_names_it_and_leaves_no_file_behind() {
     let folder = folder_of_bad_files();
     let before = folder.files();
     for &(arguments, named) in REFUSED {
-        // With a file to write, unless the file is what is wrong.
+        // With an output file, unless this file is the error.
         let out: &[&str] =
             if arguments[0] == "compare" || arguments.contains(&"--out") { &[] } else { &["--out", "x.csv"] };
         let output = folder.run(&[arguments, out].concat());
@@ -200,7 +200,7 @@ fn bad_input_ends_in_one_line_that_names_it_and_leaves_no_file_behind() {
     }
 }
 
-/// The good neighbors of the bad input above: the test could not fail if these were refused too.
+/// Good input close to the bad input above, so that the test above can fail.
 #[test]
 fn good_input_is_not_refused() {
     let folder = folder_of_bad_files().with("good.toml", "relax = 2\nsubsteps = 2\n");
@@ -216,7 +216,7 @@ fn good_input_is_not_refused() {
     }
 }
 
-/// Usage that clap refuses: it ends with 2 as well, and never in a panic.
+/// Errors of clap end with code 2 too, and never with a panic.
 #[test]
 fn usage_errors_end_with_the_same_code() {
     for arguments in [
@@ -238,9 +238,9 @@ fn usage_errors_end_with_the_same_code() {
     }
 }
 
-/// What clap refuses, with what it should say.
+/// Errors of clap, and texts that their messages must contain.
 #[test]
-fn a_slip_in_a_name_and_a_number_out_of_range_are_answered() {
+fn a_misspelled_name_and_a_number_out_of_range_have_helpful_messages() {
     let cases: &[(&str, &[&str])] = &[
         ("rnu drop", &["'rnu'", "'run'"]),
         ("report ruels", &["'ruels'", "'rules'"]),
@@ -293,7 +293,7 @@ fn help_fits_a_hundred_columns_and_short_help_a_page() {
         let lines = pages.each_ref().map(|p| p.lines().count());
         assert!(lines[0] <= 45 && lines[0] <= lines[1], "{name}: {lines:?}");
         if name == "run" {
-            let headings = ["Arguments:", "Scene:", "Settings of the solver:", "What it runs on:", "Output:"];
+            let headings = ["Arguments:", "Scene:", "Settings of the solver:", "Machine:", "Output:"];
             assert!(headings.iter().all(|h| pages[0].lines().any(|l| l == *h)), "{}", pages[0]);
             assert!(lines[1] > lines[0] + 20, "{lines:?}");
         }
@@ -323,9 +323,9 @@ fn the_settings_are_listed_as_a_file_that_gives_them() {
     assert!(folder.output("settings --preset fast").contains("\nsubsteps = 4\n"));
 }
 
-/// A world that fell asleep: what its steps cost while it was awake, since when it sleeps and what it lies on.
+/// The report of a sleeping world: time of the awake steps, step of falling asleep, and contacts.
 #[test]
-fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
+fn a_run_that_fell_asleep_reports_the_step_and_the_time_before() {
     let folder = Folder::new();
     let report = folder.json("run tower -p n=3 --steps 200 --json");
     let number = |key: &str| report[key].as_u64().unwrap_or_else(|| panic!("{key} in {report}"));
@@ -334,7 +334,7 @@ fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
     assert_eq!((number("asleep"), number("manifolds"), number("points")), (3, 3, 12));
     assert_eq!((array(&report, "step_ms").len(), &report["fastest"]), (200, &Value::Null));
     let ms = |value: &Value| value.as_f64().expect("a time");
-    // Of the steps in which the tower slept none counts.
+    // Steps of a sleeping tower do not count.
     let steps: Vec<f64> = array(&report, "step_ms").iter().map(ms).collect();
     let least = steps[..awake as usize].iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(ms(&report["awake_ms"]["min"]), least);
@@ -347,7 +347,7 @@ fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
     }
     assert!(!printed.contains("fastest"), "{printed}");
 
-    // One body after another: the ball that was thrown rolls on when the stack sleeps.
+    // The bodies sleep one after another: the thrown ball still rolls when the stack sleeps.
     let some = folder.output("run throw --steps 350");
     assert!(some.contains("10 of 11 bodies, the first after ") && some.contains("(body 11 \"ball\")"), "{some}");
     let all = folder.output("run drop");
@@ -359,9 +359,9 @@ fn a_run_that_fell_asleep_says_when_and_what_it_cost_before() {
     assert!(folder.output("run tower -p n=3 --steps 60 --no-sleep").contains("fastest (body "));
 }
 
-/// Vulkan's loader brings libwayland, which complains where there is no desktop.
+/// Vulkan's loader loads libwayland, which prints an error without a desktop.
 #[test]
-fn adapters_are_listed_without_a_word_where_there_is_no_desktop() {
+fn adapters_are_listed_without_an_error_on_a_machine_without_a_desktop() {
     if std::env::var("DRYSTONE_ADAPTER").is_ok_and(|name| name == "none") {
         return eprintln!("not run: DRYSTONE_ADAPTER=none says that no GPU is wanted");
     }
@@ -372,7 +372,7 @@ fn adapters_are_listed_without_a_word_where_there_is_no_desktop() {
 }
 
 #[test]
-fn what_was_there_is_replaced_with_a_word() {
+fn an_existing_file_is_replaced_with_a_note() {
     let folder = Folder::new();
     let said = |arguments: &str| {
         let output = folder.run(&arguments.split(' ').collect::<Vec<_>>());
@@ -387,7 +387,7 @@ fn what_was_there_is_replaced_with_a_word() {
         assert!(second.lines().any(|l| l.starts_with(name)), "{name} is not in: {second}");
     }
     assert_eq!(std::fs::read(folder.path().join("motion.csv")).expect("the motion"), first);
-    // A run that is refused leaves what was there.
+    // A refused run leaves the existing file.
     let refused =
         folder.run(&["run", "tower", "--steps", "3", "--out", "motion.csv", "--save-problem", "9:x.contacts"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -395,7 +395,7 @@ fn what_was_there_is_replaced_with_a_word() {
     assert_eq!(folder.files(), ["motion.csv", "two.contacts"]);
 }
 
-/// Ended by its user in the middle of a run: the file of before is there, whole, and nothing else.
+/// A run that ends by a signal leaves the old file and no other.
 #[cfg(unix)]
 #[test]
 fn a_run_that_is_interrupted_leaves_no_half_of_a_file() {
@@ -421,7 +421,7 @@ fn a_run_that_is_interrupted_leaves_no_half_of_a_file() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_does_not_fit_into_memory_is_refused_before_it_is_built() {
+fn a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built() {
     let limited = |arguments: &str| {
         let line = format!("ulimit -v 4000000; exec {} {arguments}", env!("CARGO_BIN_EXE_drystone"));
         Command::new("sh").args(["-c", &line]).env("DRYSTONE_ADAPTER", "none").output().expect("sh")
@@ -448,7 +448,7 @@ fn a_long_build_is_announced() {
     assert!(output.status.success() && !text(&output.stderr).contains("building"));
 }
 
-/// A force that no number can follow: said by name, with a code of failure, after the report.
+/// A force that overflows: after the report an error names the body.
 #[test]
 fn numbers_that_cannot_be_used_are_an_error() {
     let fast = GOOD.replace(r#"{"shapes""#, r#"{"name": "comet", "force": [3e38, 0, 0], "mass": 1e-3, "shapes""#);
@@ -473,9 +473,9 @@ fn the_reader_of_a_pipe_may_stop_reading() {
     }
 }
 
-/// Nobody reads standard error any more, as after `2>&1 | head -0`: the command does its work all the same.
+/// A closed standard error, as after `2>&1 | head -0`, does not stop the command.
 #[test]
-fn nobody_needs_to_read_standard_error() {
+fn a_closed_standard_error_is_no_failure() {
     for (arguments, code) in [
         ("run drop --steps 1", 0),
         ("run tower --steps 1 --max-penetration 1mm", 0),
@@ -501,7 +501,7 @@ fn the_catalogue_is_listed_with_its_parameters() {
     for scene in array(&listed, "scenes") {
         let name = scene["name"].as_str().expect("a name");
         assert!(printed.lines().any(|l| l == name), "{name} is not in: {printed}");
-        // Every parameter can be given its own default.
+        // Every parameter accepts its default.
         let assignments = array(scene, "parameters").iter();
         let assignments = assignments.map(|p| format!("{}={}", p["name"].as_str().expect("a name"), p["default"]));
         Scene::find(name, &assignments.collect::<Vec<_>>()).expect(name);
@@ -533,7 +533,7 @@ fn a_comparison_of_the_reference_and_the_cpu_finds_no_difference() {
 }
 
 #[test]
-fn a_bench_is_printed_in_three_forms_and_marks_what_a_baseline_was_faster_at() {
+fn a_bench_is_printed_in_three_forms_and_marks_rows_that_are_slower_than_the_baseline() {
     let folder = Folder::new();
     let bench = "bench tower:n=2 pile:n=4,worlds=2 --turns 2 --threads 1 --backend reference,cpu";
     let measured = folder.json(&format!("{bench} --json"));
@@ -557,14 +557,14 @@ fn a_bench_is_printed_in_three_forms_and_marks_what_a_baseline_was_faster_at() {
     assert!(text(&refused.stderr).contains("not what `drystone bench --json` prints"), "{}", text(&refused.stderr));
 }
 
-/// Threads that a run had.
+/// The number of threads of a run.
 #[cfg(target_os = "linux")]
 fn threads_of(arguments: &[&str]) -> usize {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
     command.args(arguments).stdout(Stdio::null()).env("DRYSTONE_ADAPTER", "none");
     let mut run = command.spawn().expect("the command starts");
     let tasks = format!("/proc/{}/task", run.id());
-    // The name that each had last: a thread begins with that of the process.
+    // The last name of each thread: a new thread has the name of the process.
     let mut names = std::collections::HashMap::new();
     while run.try_wait().expect("the command runs").is_none() {
         for task in std::fs::read_dir(&tasks).into_iter().flatten().flatten() {
@@ -574,7 +574,7 @@ fn threads_of(arguments: &[&str]) -> usize {
         }
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    // One thread waits for Ctrl-C all the time.
+    // One thread waits for Ctrl-C.
     names.values().filter(|name| name.trim() != "ctrl-c").count()
 }
 

@@ -1,4 +1,4 @@
-//! `drystone export --fclib` and `drystone solve` on what it wrote.
+//! `drystone export --fclib`, and `drystone solve` of the exported files.
 #![cfg(feature = "fclib")]
 
 #[path = "../../tests/common/contacts.rs"]
@@ -28,7 +28,7 @@ fn an_exported_problem_is_the_same_problem() {
     std::fs::write(folder.path().join("tower.contacts"), problem.to_text()).expect("written");
     let output = run(folder.path(), "export tower.contacts --fclib tower.hdf5");
     assert_eq!(text(&output.stdout), "tower.hdf5: 4 bodies, 16 contacts\n", "{}", text(&output.stderr));
-    // Only whole files, under their names.
+    // There are no unfinished files.
     let names = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("an entry").file_name());
     assert_eq!(names.count(), 2);
 

@@ -19,7 +19,7 @@ tests! {
     }
     no_gpu {
         every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping,
-        a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing,
+        a_script_that_rolls_into_a_hole_loses_and_a_script_that_ends_decides_nothing,
         lanes_play_the_same_game_to_the_last_bit,
         the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes,
         the_command_prints_outcome_and_track,
@@ -38,7 +38,7 @@ fn game(map: Map, backend: Box<dyn Backend>) -> Game {
     Game::new(map, SolverConfig::default().without_sleep(), backend).expect("a game")
 }
 
-/// The script in tests/maze of that name. `drystone play maze easy --pilot tests/maze/easy.txt` makes the one that wins anew.
+/// A script in tests/maze. `drystone play maze easy --pilot tests/maze/easy.txt` makes the winning one again.
 fn script(name: &str) -> Script {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/maze").join(format!("{name}.txt"));
     Script::parse(name, &std::fs::read_to_string(path).expect("a script")).expect("a script")
@@ -62,7 +62,7 @@ fn every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping() {
     }
 }
 
-fn a_script_that_rolls_into_a_hole_loses_and_one_that_ends_decides_nothing() {
+fn a_script_that_rolls_into_a_hole_loses_and_a_script_that_ends_decides_nothing() {
     assert_eq!(played("easy", &script("lose"), reference()).outcome, Outcome::Hole);
     let nothing = Script::parse("s", "1 0 0\n").expect("a script");
     let game = game(Map::find("easy").expect("a board"), reference());
@@ -81,8 +81,8 @@ fn the_gpu_plays_the_same_game_to_the_last_bit() {
     assert_eq!((a.outcome, a.steps, a.track), (b.outcome, b.steps, b.track));
 }
 
-/// Rolls the ball over a floor of 40 x 40 squares of 0.06 m that falls by 2 degrees one way and 1 degree the other; the largest hop
-/// and slip in the second second [m, m/s].
+/// Rolls the ball over a floor of 40 x 40 squares of 0.06 m that is inclined by 2 degrees along x and 1 degree along z. Returns the
+/// largest hop (m) and slip (m/s) between 1 s and 2 s.
 fn roll_over(floor: Body) -> (f32, f32) {
     let mut world = World::new();
     let tilt = Quat::from_rotation_x(1.0_f32.to_radians()) * Quat::from_rotation_z(-2.0_f32.to_radians());
@@ -153,7 +153,7 @@ fn a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before() {
     assert!(before >= 0.4 * CELL && far(&game) < 0.4 * CELL, "{before} m, then {} m", far(&game));
 }
 
-/// What the command prints, or the one line that refuses it.
+/// The output of the command, or its error.
 fn command(arguments: &str) -> Result<String, String> {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("bad.txt"), "S..\n.x.\n..G\n").expect("a file");

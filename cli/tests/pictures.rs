@@ -1,4 +1,4 @@
-//! Pictures without a display: what is in them, what they are compared with, and how bad requests are refused.
+//! Pictures without a display: contents, comparison with stored pictures, and messages for bad requests.
 
 #[macro_use]
 #[path = "../../tests/common/mod.rs"]
@@ -13,11 +13,11 @@ use drystone_cli::view::{Canvas, ColorBy, Film, Look, Picture};
 
 tests! {
     any_gpu {
-        the_scene_with_every_shape_looks_as_it_did,
-        a_picture_in_which_one_body_is_elsewhere_is_rejected,
+        the_scene_with_every_shape_has_its_stored_picture,
+        a_picture_with_one_moved_body_is_rejected,
         the_same_scene_gives_the_same_picture_to_the_last_bit,
-        what_a_body_is_colored_by_shows,
-        a_body_casts_a_shadow_on_what_is_below,
+        the_colors_of_bodies_show_the_chosen_quantity,
+        a_body_casts_a_shadow_on_the_ground,
         bad_requests_are_refused_in_one_line_before_the_run,
         a_recorded_motion_gives_the_picture_of_the_run,
     }
@@ -27,15 +27,15 @@ tests! {
 }
 
 const SIZE: (u32, u32) = (192, 128);
-/// As `drystone render` looks unless told.
+/// The default angles of `drystone render`.
 const LOOK: Look = Look { yaw: 30.0_f32.to_radians(), pitch: 25.0_f32.to_radians() };
 
-/// A pixel differs if one of its channels does by more than this: an edge that another driver rounds the other way does.
+/// Pixels differ if a channel differs by more than this, as at an edge that another driver rounds differently.
 const CHANNEL: u8 = 24;
-/// Most pixels that may differ, of a hundred: 50 of 24,576. One software adapter gives 0 every time.
+/// Largest percentage of pixels that may differ: 50 of 24,576. The same software adapter gives 0.
 const PERCENT: f64 = 0.2;
 
-/// `scene` after `steps`, drawn.
+/// A picture of `scene` after `steps`.
 fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Picture {
     let reference = Box::new(drystone::Reference::<f32>::new());
     let mut simulation =
@@ -55,7 +55,7 @@ fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Picture {
     pictures.pop().expect("one picture")
 }
 
-/// Pixels that differ, of a hundred.
+/// Percentage of pixels that differ.
 fn difference(a: &Picture, b: &Picture) -> f64 {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let pairs = a.rgba.chunks_exact(4).zip(b.rgba.chunks_exact(4));
@@ -76,15 +76,15 @@ fn scene(name: &str, parameters: &[&str]) -> Scene {
     Scene::find(name, &parameters.iter().map(|&p| p.to_owned()).collect::<Vec<_>>()).expect("a scene")
 }
 
-/// `drystone render drop --steps 60 --size 192x128 --out tests/pictures/drop.png` makes the picture anew.
-fn the_scene_with_every_shape_looks_as_it_did() {
+/// `drystone render drop --steps 60 --size 192x128 --out tests/pictures/drop.png` makes the picture again.
+fn the_scene_with_every_shape_has_its_stored_picture() {
     let drawn = picture(&scene("drop", &[]), 60, ColorBy::Material);
     let kept = read_png(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures/drop.png"));
     let percent = difference(&drawn, &kept);
     assert!(percent <= PERCENT, "{percent:.2} % of the pixels differ");
 }
 
-fn a_picture_in_which_one_body_is_elsewhere_is_rejected() {
+fn a_picture_with_one_moved_body_is_rejected() {
     let before = scene("drop", &[]);
     let mut after = before.clone();
     let moved = after.world.bodies.iter().position(|b| b.name == "cuboid").expect("a cuboid");
@@ -99,7 +99,7 @@ fn the_same_scene_gives_the_same_picture_to_the_last_bit() {
     assert_eq!(draw(), draw());
 }
 
-fn what_a_body_is_colored_by_shows() {
+fn the_colors_of_bodies_show_the_chosen_quantity() {
     let tower = scene("tower", &[]);
     let all = [ColorBy::Material, ColorBy::Batch, ColorBy::Speed, ColorBy::Impulse];
     let drawn: Vec<_> = all.into_iter().map(|color| picture(&tower, 20, color)).collect();
@@ -110,7 +110,7 @@ fn what_a_body_is_colored_by_shows() {
     }
 }
 
-fn a_body_casts_a_shadow_on_what_is_below() {
+fn a_body_casts_a_shadow_on_the_ground() {
     // Grays darker than both squares of the ground.
     let shaded = |scene: &Scene| {
         let drawn = picture(scene, 0, ColorBy::Material);

@@ -1,4 +1,4 @@
-//! `drystone report`: what is run, kept, gone on with and drawn.
+//! `drystone report`: runs, stored rows, continued reports and pages.
 
 use std::cell::Cell;
 use std::path::Path;
@@ -42,13 +42,13 @@ fn rows(out: &Path) -> (Vec<String>, Vec<String>) {
 }
 
 #[test]
-fn a_report_that_was_stopped_goes_on_where_it_stopped() {
+fn a_stopped_report_continues() {
     let whole = tempfile::tempdir().unwrap();
     survey(&three, whole.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     let (wanted, runs) = rows(whole.path());
     assert_eq!((wanted.len(), runs.len()), (9, 3));
 
-    // Gives up in the third scene.
+    // The third scene fails.
     let folder = tempfile::tempdir().unwrap();
     let asked = Cell::new(0);
     let stops = |scene: &Scene, extent: Extent| {
@@ -66,7 +66,7 @@ fn a_report_that_was_stopped_goes_on_where_it_stopped() {
     let html = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
     assert!(after.iter().all(|run| html.contains(run)));
 
-    // Nothing is left to run, and drawing what is there gives the same page.
+    // No scene is left, and the stored rows give the same page.
     survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
     assert_eq!(rows(folder.path()).1, after);
     Report::read(folder.path()).unwrap().write(folder.path()).unwrap();
@@ -74,7 +74,7 @@ fn a_report_that_was_stopped_goes_on_where_it_stopped() {
 }
 
 #[test]
-fn rows_of_another_scene_program_or_setting_are_not_gone_on_with() {
+fn rows_of_another_scene_program_or_setting_are_not_reused() {
     let folder = tempfile::tempdir().unwrap();
     let run = |scenes: Vec<Scene>, team: &Team, build: &str| {
         let survey = Survey { scenes, ..survey(team, folder.path()) };
@@ -114,7 +114,7 @@ fn a_folder_with_other_rows_is_refused_and_left_alone() {
     assert!(message.contains("no rows to draw"), "{message}");
 }
 
-/// Numbers that no run gives, but a file may hold: each in each column that is a number, the page is drawn within seconds.
+/// Extreme numbers in each numeric column of a file: the page is drawn within seconds.
 #[test]
 fn a_page_is_drawn_of_any_numbers() {
     let folder = tempfile::tempdir().unwrap();

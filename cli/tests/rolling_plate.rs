@@ -1,5 +1,5 @@
-//! SimBenchmark's rolling test: 25 balls on a plate that is pushed. All move along the push with accelerations known on
-//! paper; published errors are the mean over 4 s of the squared velocity errors of the plate and the first ball [m²/s²].
+//! SimBenchmark's rolling test: a force pushes a plate with 25 balls. The accelerations have a closed form; published errors are the
+//! mean over 4 s of the squared velocity errors of the plate and the first ball (m²/s²).
 
 use drystone::config::Friction;
 use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};

@@ -1,4 +1,4 @@
-//! What the report of a run says about groups, joints and sweeps.
+//! The report of a run: groups, joints and sweeps.
 
 use drystone::glam::Vec3;
 use drystone::{Reference, Scene, Simulation, SolverConfig};
@@ -12,7 +12,7 @@ fn the_report_names_the_largest_tower_that_stands() {
     for _ in 0..10 {
         simulation.step(scene.dt).expect("a step");
     }
-    // The tallest one is knocked over on paper.
+    // The measurement begins with a moved body of the tallest tower.
     scene.world.bodies[12].position += Vec3::X;
     let mut report = RunReport::new(&scene, &config, simulation.backend());
     report.measure(&scene, simulation);

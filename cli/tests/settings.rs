@@ -1,4 +1,4 @@
-//! Settings as `--set` takes them.
+//! Settings of `--set`.
 
 use drystone::SolverConfig;
 use drystone::config::FrictionRule;
@@ -40,9 +40,9 @@ fn settings_out_of_their_range_are_refused_by_name() {
     }
 }
 
-/// Settings that moved into a table, under the names that they had before.
+/// The former names of settings that are now in a table.
 #[test]
-fn an_old_name_is_met_with_the_place_of_the_setting() {
+fn the_message_for_a_former_name_names_the_new_one() {
     let folder = tempfile::tempdir().expect("a folder");
     for (key, value, place) in [
         ("friction_order", "friction-first", "rules.friction_order"),
@@ -60,7 +60,7 @@ fn an_old_name_is_met_with_the_place_of_the_setting() {
 }
 
 #[test]
-fn a_rule_for_comparison_is_set_and_told_by_its_place() {
+fn a_rule_for_comparison_is_set_and_printed_by_its_path() {
     let mut config = SolverConfig::default();
     set(&mut config, "rules.slip_friction=true").expect("a setting");
     set(&mut config, "rules.manifold_passes = 3").expect("a setting");

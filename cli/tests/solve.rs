@@ -1,4 +1,4 @@
-//! `drystone solve`: what it prints, and how it refuses bad input.
+//! `drystone solve`: output, and messages for bad input.
 
 #[path = "../../tests/common/contacts.rs"]
 mod contacts;
@@ -9,7 +9,7 @@ use contacts::tower;
 use glam::DVec3;
 use serde_json::Value;
 
-/// Runs in a folder with a tower of ten, a problem whose numbers overflow, and a file that is none.
+/// Runs the command in a folder with a tower of ten, a problem whose numbers overflow, and an incomplete file.
 fn run(arguments: &str) -> Output {
     let folder = tempfile::tempdir().expect("a folder");
     let file = |name: &str| folder.path().join(name);

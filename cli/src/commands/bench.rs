@@ -9,39 +9,36 @@ use super::output::{plain_table, print, print_json};
 use super::progress::Progress;
 use super::words;
 use crate::files;
-use crate::report::bench::{Bench, BenchRow, Change, Machine, QUICK, STANDARD, bench, compare_with, limits};
+use crate::report::bench::{Bench, Change, Machine, QUICK, STANDARD, StagesRow, bench, compare_with, limits};
 use crate::settings;
-use drystone::Result;
-use drystone::backend::{Backend, BackendChoice, choose};
+use drystone::backend::{BackendChoice, choose};
+use drystone::{Backend, Result};
 
-/// Arguments of `drystone bench`.
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Scenes, as name:key=value,worlds=N; the standard ones if none is named.
+    /// Scenes, as name:key=value,worlds=N; without any, the standard scenes.
     scenes: Vec<String>,
-    /// Smaller scenes and fewer turns, if none is named and --turns is not given.
+    /// Use smaller standard scenes and fewer turns.
     #[arg(long)]
     quick: bool,
-    /// Measure how far sweeps are from what the machine can do, instead.
-    ///
-    /// Of a pile of 15,000 boxes, against what memory and arithmetic can do.
+    /// Compare sweeps of a pile with the limits of memory and arithmetic.
     #[arg(long, conflicts_with_all = ["scenes", "quick", "set", "baseline", "csv", "backend"])]
     limits: bool,
-    /// How often each scene has its turn of 10 steps.
+    /// Turns of each scene; a turn is 10 steps.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
-    /// What runs the sweeps.
-    #[arg(long, value_parser = words::backend(), value_delimiter = ',', default_values = ["cpu"])]
+    /// Backends that run the sweeps.
+    #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
     backend: Vec<BackendChoice>,
-    /// Numbers of threads; 0 is one a core.
+    /// Numbers of threads; 0 means one per core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: Vec<u16>,
     /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Show ratios to what --json printed earlier.
+    /// Show time ratios to an earlier output of --json.
     ///
-    /// What became slower or faster beyond the spread is marked.
+    /// Rows that are slower or faster beyond the spread are marked.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -53,7 +50,6 @@ pub struct BenchArgs {
 }
 
 impl BenchArgs {
-    /// Measures and prints.
     pub fn run(&self) -> Result<()> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads: Vec<_> = self.threads.iter().map(|&t| if t == 0 { cores } else { t.into() }).collect();
@@ -61,14 +57,14 @@ impl BenchArgs {
             return self.print_limits(&threads);
         }
         let config = settings::awake(self.set.iter().map(String::as_str))?;
-        // Read before minutes are spent.
+        // A bad file is refused before the measurement, which takes minutes.
         let baseline = self.baseline.as_deref().map(Bench::read).transpose()?;
         let usual = if self.quick { &QUICK[..] } else { &STANDARD[..] };
         let specs =
             if self.scenes.is_empty() { usual.iter().map(|&s| s.into()).collect() } else { self.scenes.clone() };
         let turns = self.turns.unwrap_or(if self.quick { 3 } else { 9 });
         let open = || -> Result<Vec<Box<dyn Backend>>> {
-            // Nothing but `auto` asks how many bodies there are.
+            // Only `auto` uses the number of bodies.
             self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
         };
         let bar = Progress::steps(specs.len() as u32 * (1 + u32::from(turns)), self.json || self.csv);
@@ -125,7 +121,7 @@ impl BenchArgs {
     }
 }
 
-fn table(rows: &[BenchRow], changes: Option<&[Change]>) -> Table {
+fn table(rows: &[StagesRow], changes: Option<&[Change]>) -> Table {
     let mut table = plain_table();
     let usual =
         "scene,backend,threads,bodies,manifolds,ms,quartiles,detect,color,prepare,run,store,overlap mm,residual,hash";

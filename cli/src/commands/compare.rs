@@ -8,27 +8,25 @@ use super::scene::SceneArgs;
 use super::words;
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
-use drystone::stages::compare::{Difference, compare};
+use drystone::stages::compare::compare;
 use drystone::{Error, Result};
 
-/// Arguments of `drystone compare`.
 #[derive(Args)]
 pub struct CompareArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// The two backends, the one to trust first.
-    #[arg(long, value_parser = words::backend(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
+    /// The two backends; the first is the reference.
+    #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
-    /// Exact shaders: on where the adapter can, unless --plain.
+    /// Require exact shaders, which otherwise run only where the adapter supports them.
     #[arg(long, conflicts_with = "plain")]
     exact: bool,
-    /// Plain WGSL, as in a browser.
+    /// Use plain WGSL, as in a browser.
     #[arg(long)]
     plain: bool,
 }
 
 impl CompareArgs {
-    /// Runs both and prints how far apart they are.
     pub fn run(&self) -> Result<()> {
         let &[a, b] = &self.backends[..] else {
             return Err(Error::input(format!("--backends: two are compared, {} were given", self.backends.len())));
@@ -55,9 +53,12 @@ impl CompareArgs {
         print(format_args!("{} against {}, {bodies} dynamic bodies", named[1], named[0]))?;
         print("  step   differ   position m     rotation        v m/s      w rad/s")?;
         for (step, d) in (1..).zip(&found.steps) {
-            // Every step at first, then the round ones and the last.
+            // The first four steps, every tenth part of the run, and the last step.
             if step <= 4 || step % (scene.steps / 10).max(1) == 0 || step == scene.steps {
-                print_step(step, d)?;
+                print(format_args!(
+                    "{step:>6} {:>8} {:>12.3e} {:>12.3e} {:>12.3e} {:>12.3e}",
+                    d.bodies, d.position, d.rotation, d.velocity, d.angular_velocity
+                ))?;
             }
         }
         match found.first {
@@ -65,11 +66,4 @@ impl CompareArgs {
             None => print("no difference in any bit"),
         }
     }
-}
-
-fn print_step(step: u32, d: &Difference) -> Result<()> {
-    print(format_args!(
-        "{step:>6} {:>8} {:>12.3e} {:>12.3e} {:>12.3e} {:>12.3e}",
-        d.bodies, d.position, d.rotation, d.velocity, d.angular_velocity
-    ))
 }

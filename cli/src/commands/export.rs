@@ -5,65 +5,45 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::output::{print, replacing};
-use super::scene::step_with_contacts;
+use super::scene::check_touching;
 use crate::files;
-use drystone::Simulation;
-use drystone::backend::cpu::Cpu;
-use drystone::config::SolverConfig;
-use drystone::contacts::ContactProblem;
-use drystone::scenes::{CATALOGUE, Scene};
-use drystone::{Error, Result};
+use crate::report::problem_of_step;
+use drystone::scenes::CATALOGUE;
+use drystone::{ContactProblem, Error, Result, Scene};
 
-/// Arguments of `drystone export`.
 #[derive(Args)]
 pub struct ExportArgs {
     /// A scene, or a contact problem.
     ///
-    /// A scene is a name of the catalogue, or a scene file that ends in .json; any other file is a contact problem.
+    /// A name of the catalogue or a .json file is a scene; any other file is a contact problem.
     source: String,
     /// Parameter of the scene; may be given several times.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
     parameter: Vec<String>,
-    /// What step N of the scene asks of the velocities; 1 is the first.
+    /// Export the contact problem of step N of the scene; 1 is the first.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     step: Option<u32>,
-    /// Write it as FCLIB's HDF5, global form.
+    /// File for the problem in FCLIB's HDF5, global form.
     #[arg(long, value_name = "FILE")]
     fclib: PathBuf,
 }
 
 impl ExportArgs {
-    /// Reads or makes the problem and writes it.
     pub fn run(&self) -> Result<()> {
         let path = Path::new(&self.source);
         let is_scene = CATALOGUE.iter().any(|e| e.name == self.source) || path.extension().is_none_or(|e| e == "json");
-        let problem = if is_scene { self.of_scene()? } else { self.of_file(path)? };
+        let problem = if is_scene {
+            let missing = || Error::input(format!("{}: a scene needs --step N", self.source));
+            let problem = problem_of_step(Scene::find(&self.source, &self.parameter)?, self.step.ok_or_else(missing)?)?;
+            check_touching(&problem)?;
+            problem
+        } else if self.step.is_some() || !self.parameter.is_empty() {
+            return Err(Error::input(format!("{}: a contact problem has no --step and no --parameter", self.source)));
+        } else {
+            ContactProblem::read(path)?
+        };
         replacing(&self.fclib, || files::write(&self.fclib, &problem.to_fclib()?))?;
         let (bodies, contacts) = (problem.bodies.len(), problem.contacts.len());
         print(format_args!("{}: {bodies} bodies, {contacts} contacts", self.fclib.display()))
-    }
-
-    fn of_file(&self, path: &Path) -> Result<ContactProblem> {
-        if self.step.is_some() || !self.parameter.is_empty() {
-            return Err(Error::input(format!(
-                "{}: a contact problem has no --step and no --parameter",
-                path.display()
-            )));
-        }
-        ContactProblem::read(path)
-    }
-
-    /// Runs the scene up to the step, at default settings.
-    fn of_scene(&self) -> Result<ContactProblem> {
-        let Some(step) = self.step else {
-            return Err(Error::input(format!("{}: which step of the scene? Say --step N", self.source)));
-        };
-        let scene = Scene::find(&self.source, &self.parameter)?;
-        let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
-        for _ in 1..step {
-            simulation.step(scene.dt)?;
-        }
-        Ok(step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?.0)
     }
 }

@@ -3,43 +3,41 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::json;
 
 use super::output::{print, print_json};
 use super::progress::Progress;
 use super::words;
-use crate::hard::{Case, Check, Limit, Setup};
+use crate::hard::{Case, Check, Limit, Setup, passes};
 use crate::report::hard_cases;
 use crate::settings;
 use drystone::Result;
 use drystone::backend::BackendKind;
 use drystone::preset::Preset;
 
-/// Arguments of `drystone hard`.
 #[derive(Args)]
 pub struct HardArgs {
-    /// Run this case, such as H3; may be given several times.
-    ///
-    /// All are run if none is named; --list names them.
+    /// Run this case, such as H3, instead of all; may be given several times.
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
-    /// Settings by name.
-    #[arg(long, value_parser = words::preset(), default_value_t)]
+    /// Preset of the settings.
+    #[arg(long, value_parser = words::of::<Preset>(), default_value_t)]
     preset: Preset,
     /// Any setting; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// What runs the sweeps.
-    #[arg(long, value_parser = words::numbers(), default_value = "cpu")]
+    /// Backend that runs the sweeps.
+    #[arg(long, value_parser = words::of::<BackendKind>(), default_value = "cpu")]
     backend: BackendKind,
-    /// Leave out what takes minutes.
+    /// Leave out the cases that take minutes.
     #[arg(long)]
     short: bool,
-    /// List the cases and run none.
+    /// List the cases without running them.
     #[arg(long)]
     list: bool,
     /// Write the page of all cases into this directory.
     ///
-    /// Runs every preset on the CPU, and `balanced` on every backend.
+    /// The page has every preset on the CPU, and `balanced` on every backend.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json"])]
     page: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -48,12 +46,10 @@ pub struct HardArgs {
 }
 
 impl HardArgs {
-    /// Runs the cases and prints each as it ends.
     pub fn run(&self) -> Result<()> {
-        let named: Result<Vec<&Case>> = self.case.iter().map(|name| Case::find(name)).collect();
-        let cases = match named? {
-            named if named.is_empty() => Case::ALL.iter().filter(|c| !(self.short && c.long)).collect(),
-            named => named,
+        let cases: Vec<&Case> = match &self.case[..] {
+            [] => Case::ALL.iter().filter(|c| !(self.short && c.long)).collect(),
+            names => names.iter().map(|name| Case::find(name)).collect::<Result<_>>()?,
         };
         if self.list {
             return cases.iter().try_for_each(|c| print(format_args!("{:<10}  {}", c.name, c.summary)));
@@ -82,15 +78,13 @@ impl HardArgs {
             }
             all.push((case, checks));
         }
-        let passed = |checks: &[Check]| checks.iter().all(|c| c.passed);
         if self.json {
-            let case = |(case, checks): &(&Case, Vec<Check>)| serde_json::json!({"case": case.name, "summary": case.summary, "passed": passed(checks), "checks": checks});
-            let cases: Vec<_> = all.iter().map(case).collect();
+            let cases: Vec<_> = all.iter().map(|(case, checks)| json!({"case": case.name, "summary": case.summary, "passed": passes(checks), "checks": checks})).collect();
             return print_json(
-                &serde_json::json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "cases": cases}),
+                &json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "cases": cases}),
             );
         }
-        print(format_args!("{} of {} cases pass", all.iter().filter(|(_, c)| passed(c)).count(), all.len()))
+        print(format_args!("{} of {} cases pass", all.iter().filter(|(_, checks)| passes(checks)).count(), all.len()))
     }
 }
 

@@ -1,17 +1,15 @@
 //! `drystone scenes` and `drystone adapters`.
 
 use clap::Args;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::output::{plain_table, print, print_json};
 use super::words;
-use drystone::Result;
-use drystone::backend::gpu::adapters;
-use drystone::config::SolverConfig;
+use drystone::backend::gpu::{AdapterSummary, adapters};
 use drystone::preset::Preset;
-use drystone::scenes::{CATALOGUE, schema};
+use drystone::scenes::{CATALOGUE, Entry, Parameter, schema};
+use drystone::{Result, SolverConfig};
 
-/// Arguments of `drystone scenes`.
 #[derive(Args)]
 pub struct ScenesArgs {
     /// Print one JSON object.
@@ -23,18 +21,14 @@ pub struct ScenesArgs {
 }
 
 impl ScenesArgs {
-    /// Lists the catalogue.
     pub fn run(&self) -> Result<()> {
         if self.schema {
             return print(serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
         }
         if self.json {
-            let parameter = |p: &drystone::scenes::Parameter| serde_json::json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
-            let scene = |e: &drystone::scenes::Entry| {
-                let parameters: Vec<_> = e.parameters.iter().map(parameter).collect();
-                serde_json::json!({"name": e.name, "summary": e.summary, "parameters": parameters})
-            };
-            return print_json(&serde_json::json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
+            let parameter = |p: &Parameter| json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
+            let scene = |e: &Entry| json!({"name": e.name, "summary": e.summary, "parameters": e.parameters.iter().map(parameter).collect::<Vec<_>>()});
+            return print_json(&json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
         }
         for entry in CATALOGUE {
             print(format_args!("{}\n    {}", entry.name, entry.summary))?;
@@ -46,16 +40,14 @@ impl ScenesArgs {
     }
 }
 
-/// Arguments of `drystone settings`.
 #[derive(Args)]
 pub struct SettingsArgs {
-    /// Print those of this preset.
-    #[arg(long, value_parser = words::preset(), default_value_t)]
+    /// Print the values of this preset.
+    #[arg(long, value_parser = words::of::<Preset>(), default_value_t)]
     preset: Preset,
 }
 
 impl SettingsArgs {
-    /// Lists the settings with their values, as TOML, and what each is.
     pub fn run(&self) -> Result<()> {
         let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
         let schema = schemars::schema_for!(SolverConfig).to_value();
@@ -63,13 +55,13 @@ impl SettingsArgs {
     }
 }
 
-/// Prints the settings of a table, each under the first sentence of its description; nested tables come last.
+/// Prints each setting of a table under the first sentence of its description; nested tables come last.
 fn print_settings(config: &toml::Table, schema: &Value, described: &Value) -> Result<()> {
     let properties = described["properties"].as_object().expect("a struct has properties");
     let (tables, settings): (Vec<_>, Vec<_>) = properties.iter().partition(|(name, _)| config[*name].is_table());
     for (name, property) in settings {
         let value = match &config[name] {
-            // As it was written, without what f64 sees of its rounding.
+            // The shortest text of the f32; the f64 has digits of its rounding.
             toml::Value::Float(x) => format!("{:?}", *x as f32),
             value => value.to_string(),
         };
@@ -83,28 +75,23 @@ fn print_settings(config: &toml::Table, schema: &Value, described: &Value) -> Re
     Ok(())
 }
 
-/// The first sentence of a description: the others give reasons.
+/// The first sentence of a description; the others give reasons.
 fn first_sentence(property: &Value) -> String {
     let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
     text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first).to_owned()
 }
 
-/// The definition of a kind that a property names.
 fn definition<'a>(schema: &'a Value, property: &Value) -> Option<&'a Value> {
     property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name])
 }
 
 /// The words that a setting takes: ` One of a, b.`, or nothing.
 fn words(schema: &Value, property: &Value) -> String {
-    let words = definition(schema, property)
-        .and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array()))
-        .into_iter()
-        .flatten();
-    let words: Vec<_> = words.filter_map(|w| w["const"].as_str().or_else(|| w.as_str())).collect();
+    let values = definition(schema, property).and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array()));
+    let words: Vec<_> = values.into_iter().flatten().filter_map(|w| w["const"].as_str().or(w.as_str())).collect();
     if words.is_empty() { String::new() } else { format!(" One of {}.", words.join(", ")) }
 }
 
-/// Arguments of `drystone adapters`.
 #[derive(Args)]
 pub struct AdaptersArgs {
     /// Print one JSON object.
@@ -113,15 +100,14 @@ pub struct AdaptersArgs {
 }
 
 impl AdaptersArgs {
-    /// Lists the adapters, the one that `gpu` takes first.
     pub fn run(&self) -> Result<()> {
         let found = adapters();
         if self.json {
-            let adapter = |a: &drystone::backend::gpu::AdapterSummary| {
-                serde_json::json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
+            let adapter = |a: &AdapterSummary| {
+                json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
                     "hardware": a.hardware, "exact": a.exact, "buffer_limit": a.buffer_limit})
             };
-            return print_json(&serde_json::json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
+            return print_json(&json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
         }
         if found.is_empty() {
             return print("none; everything runs on the CPU");
@@ -129,15 +115,8 @@ impl AdaptersArgs {
         let mut table = plain_table();
         table.set_header(["name", "api", "kind", "driver", "exact mode", "largest buffer"]);
         for a in found {
-            let exact = if a.exact { "yes" } else { "no" };
-            table.add_row([
-                a.name,
-                a.api,
-                a.kind.into(),
-                a.driver,
-                exact.into(),
-                format!("{} MiB", a.buffer_limit >> 20),
-            ]);
+            let (exact, buffer) = (if a.exact { "yes" } else { "no" }, format!("{} MiB", a.buffer_limit >> 20));
+            table.add_row([a.name, a.api, a.kind.into(), a.driver, exact.into(), buffer]);
         }
         print(table)
     }

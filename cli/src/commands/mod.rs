@@ -1,4 +1,4 @@
-//! The command line: parse, one library call, print.
+//! The command line: each command parses, makes one library call and prints.
 
 mod bench;
 mod compare;
@@ -21,8 +21,6 @@ mod words;
 
 pub use report::SurveyArgs;
 
-#[cfg(not(feature = "view"))]
-use clap::Args;
 use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -30,8 +28,6 @@ use self::output::say;
 use crate::files;
 use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::nearest;
-#[cfg(not(feature = "view"))]
-use drystone::{Error, Result};
 
 /// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
@@ -80,9 +76,9 @@ enum Command {
     Adapters(list::AdaptersArgs),
 }
 
-/// A command that this build leaves out.
+/// A command that needs the feature `view`.
 #[cfg(not(feature = "view"))]
-#[derive(Args)]
+#[derive(clap::Args)]
 struct NotBuilt {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     rest: Vec<String>,
@@ -90,20 +86,21 @@ struct NotBuilt {
 
 #[cfg(not(feature = "view"))]
 impl NotBuilt {
-    fn run(&self) -> Result<()> {
-        Err(Error::input("pictures and windows need a build with them: `cargo install --path cli --features view`"))
+    fn run(&self) -> drystone::Result<()> {
+        let needed = "pictures and windows need a build with them: `cargo install --path cli --features view`";
+        Err(drystone::Error::input(needed))
     }
 }
 
-/// A command that takes a negative number for a value everywhere: what is out of range is refused as such, not as an argument
-/// that there is not. Of `-1e-3` clap knows no number: real numbers allow hyphens.
+/// Accepts negative numbers as values everywhere, so that clap reports a number out of range and not an unknown argument. clap does
+/// not recognize `-1e-3` as a number; real arguments therefore allow hyphens.
 fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional() && !a.is_allow_hyphen_values_set();
     let allow = |a: clap::Arg| if takes(&a) { a.allow_negative_numbers(true) } else { a };
     command.mut_args(allow).mut_subcommands(with_negative_numbers)
 }
 
-/// The arguments of this process; ends it where they cannot be used, or help is asked for.
+/// Parses the arguments; ends the process if they are invalid or ask for help.
 fn arguments() -> Cli {
     let command = with_negative_numbers(Cli::command());
     let parsed = command.clone().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
@@ -126,11 +123,10 @@ fn arguments() -> Cli {
     })
 }
 
-/// Runs the command line; returns the exit code: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 after
-/// Ctrl-C.
+/// Runs the command line. Exit codes: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 after Ctrl-C.
 pub fn main() -> std::process::ExitCode {
     let cli = arguments();
-    // Ctrl-C removes unfinished files. The call fails only if the process handles signals already.
+    // Ctrl-C removes unfinished files. The call fails only if a handler is set already.
     let _ = ctrlc::set_handler(|| {
         files::discard_drafts();
         std::process::exit(130);
@@ -154,7 +150,7 @@ pub fn main() -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(e) => {
-            // One line, whatever the caller's names are made of.
+            // File names may contain line breaks; the message is one line.
             say(format_args!("drystone: {}", e.to_string().replace(char::is_control, " ")));
             e.exit_code().into()
         }

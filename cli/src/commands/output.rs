@@ -1,4 +1,4 @@
-//! What commands print, and files that take the place of others.
+//! Output of the commands.
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -7,14 +7,13 @@ use std::path::Path;
 use comfy_table::{Table, presets};
 use drystone::{Error, Result};
 
-/// A table without lines.
 pub(super) fn plain_table() -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     table
 }
 
-/// Runs what writes a file, and says so if the file took the place of another.
+/// Calls `write` and prints a note if it replaced an existing file.
 pub(super) fn replacing<T>(path: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
     let was_there = path.is_file();
     let written = write()?;
@@ -24,7 +23,7 @@ pub(super) fn replacing<T>(path: &Path, write: impl FnOnce() -> Result<T>) -> Re
     Ok(written)
 }
 
-/// Prints to standard output, and a line break. That the reader of a pipe has seen enough is no error.
+/// Prints a line to standard output. A closed pipe is no error.
 pub(super) fn print(text: impl Display) -> Result<()> {
     match writeln!(std::io::stdout(), "{text}") {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::file("standard output")(e)),
@@ -32,12 +31,11 @@ pub(super) fn print(text: impl Display) -> Result<()> {
     }
 }
 
-/// Prints a line to standard error. Nothing depends on a reader of it: `eprintln!` would panic without one.
+/// Prints a line to standard error; unlike `eprintln!` without panicking if nothing reads it.
 pub(super) fn say(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// Prints a value as JSON on one line.
 pub(super) fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(serde_json::to_string(value).expect("reports serialize"))
 }

@@ -10,10 +10,8 @@ use crate::files;
 use crate::maze::{Game, Map, Outcome, Script, pilot, play};
 use crate::settings;
 use drystone::backend::choose;
-use drystone::config::SolverConfig;
-use drystone::{Error, Result};
+use drystone::{Error, Result, SolverConfig};
 
-/// Arguments of `drystone play`.
 #[derive(Args)]
 pub struct PlayArgs {
     #[command(subcommand)]
@@ -31,13 +29,13 @@ struct MazeArgs {
     /// easy, medium, hard, or the path of a map.
     #[arg(default_value = "easy")]
     board: String,
-    /// Play this script of tilts without a window and print how it went.
+    /// Play this script of tilts without a window and print the result.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// Find the way, follow it, and write the tilts as a script.
+    /// Find a way to the goal, follow it, and write the tilts as a script.
     #[arg(long, value_name = "FILE", conflicts_with = "script")]
     pilot: Option<PathBuf>,
-    /// Draw the game: FILE.gif, FILE.mp4, FOLDER/, or FILE.png of its middle.
+    /// Draw the game: FILE.gif, FILE.mp4, FOLDER/, or the middle of the game as FILE.png.
     #[cfg(feature = "view")]
     #[arg(long, value_name = "PATH", requires = "script")]
     out: Option<PathBuf>,
@@ -56,7 +54,6 @@ struct MazeArgs {
 }
 
 impl PlayArgs {
-    /// Plays.
     pub fn run(&self) -> Result<()> {
         let GameArgs::Maze(maze) = &self.game;
         maze.run()
@@ -86,12 +83,11 @@ impl MazeArgs {
         self.window(map, config)
     }
 
-    /// Plays, and draws what was played.
     #[cfg(feature = "view")]
     fn draw(&self, game: Game, script: &Script, out: &std::path::Path) -> Result<crate::maze::Played> {
         use crate::maze::SAMPLES;
         use crate::view::{Canvas, Output, draw_game, poses};
-        // What cannot be drawn or written is refused before the game.
+        // Errors of the canvas and the file are reported before the game.
         let (map, world) = (game.map.clone(), game.world().clone());
         let mut canvas = Canvas::new(&world, self.size)?;
         let mut output = Output::open(out, self.size, SAMPLES)?;

@@ -1,4 +1,4 @@
-//! How far a command is: a bar on a terminal, elsewhere a line now and then.
+//! Progress of a command: a bar on a terminal, elsewhere a line every ten seconds.
 
 use std::cell::Cell;
 use std::io::IsTerminal;
@@ -8,22 +8,21 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::say;
 
-/// Time between two lines where standard error is no terminal.
+/// Time between two lines if standard error is no terminal.
 const BETWEEN: Duration = Duration::from_secs(10);
 
-/// The unit of progress that is shown as a share of the whole.
+/// The unit that shows progress as a share of the total.
 pub const PERCENT: &str = "%";
 
-/// How far something is.
 pub struct Progress {
     bar: ProgressBar,
     unit: &'static str,
-    /// When the last line was due; none on a terminal.
+    /// Time of the last line; none on a terminal.
     last: Option<Cell<Instant>>,
 }
 
 impl Progress {
-    /// Over `count` of what `unit` names. `quiet` draws no bar.
+    /// Counts `count` units; `quiet` draws no bar.
     pub fn new(unit: &'static str, count: u64, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let style = match unit {
@@ -36,35 +35,25 @@ impl Progress {
         Self { bar: bar.with_style(style), unit, last: (!terminal).then(|| Cell::new(Instant::now())) }
     }
 
-    /// Over the steps of a run.
     pub fn steps(steps: u32, quiet: bool) -> Self {
         Self::new("step", steps.into(), quiet)
     }
 
-    /// One more is done.
     pub fn inc(&self) {
         self.bar.inc(1);
         self.line();
     }
 
-    /// So many of so many are done.
     pub fn set(&self, done: u64, total: u64) {
         self.bar.set_length(total);
         self.bar.set_position(done);
         self.line();
     }
 
-    /// How many there are, as is known only now.
-    pub fn set_length(&self, count: u64) {
-        self.bar.set_length(count);
-    }
-
-    /// What is done now.
     pub fn set_message(&self, what: impl Into<String>) {
         self.bar.set_message(what.into());
     }
 
-    /// Takes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -76,7 +65,7 @@ impl Progress {
         }
     }
 
-    /// `step 120/600`, and what is done now.
+    /// `step 120/600` and the message.
     fn text(&self) -> String {
         let (unit, done, of) = (self.unit, self.bar.position(), self.bar.length().unwrap_or(0));
         let far = if unit == PERCENT { format!("{} %", 100 * done / of.max(1)) } else { format!("{unit} {done}/{of}") };
@@ -89,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_said_when_it_is_due_and_not_before() {
+    fn a_line_is_printed_when_it_is_due_and_not_before() {
         let mut progress = Progress::new("case", 5, true);
         let due = Instant::now() - BETWEEN;
         progress.last = Some(Cell::new(due));
@@ -98,9 +87,9 @@ mod tests {
         progress.inc();
         assert!(when(&progress) > due, "a line was due");
         assert_eq!(progress.text(), "case 1/5  H3");
-        let said = when(&progress);
+        let printed = when(&progress);
         progress.inc();
-        assert_eq!((when(&progress), progress.text()), (said, "case 2/5  H3".into()));
+        assert_eq!((when(&progress), progress.text()), (printed, "case 2/5  H3".into()));
         let survey = Progress::new(PERCENT, 1, true);
         survey.set(30, 90);
         assert_eq!(survey.text(), "33 %");

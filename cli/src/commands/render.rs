@@ -10,61 +10,54 @@ use super::scene::{MACHINE, SceneArgs, SleepArgs};
 use super::words;
 use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
-use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
-use drystone::config::SolverConfig;
-use drystone::scenes::{CATALOGUE, Scene};
+use drystone::scenes::CATALOGUE;
 use drystone::stages::memory;
-use drystone::{Error, Result};
+use drystone::{Error, Result, Scene, Simulation, SolverConfig};
 
-/// Bytes that a body takes in a frame: pose and color.
+/// Memory of a body in a frame: pose and color (bytes).
 const FRAME: f64 = 32.0;
 
-/// Heading of the options in the help.
 const PICTURES: &str = "Pictures";
 
-/// Arguments of `drystone render`.
 #[derive(Args)]
 pub struct RenderArgs {
     #[command(flatten)]
     scene: Option<SceneArgs>,
-    /// What runs the sweeps.
-    #[arg(long, value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
+    /// Backend that runs the sweeps.
+    #[arg(long, value_parser = words::of::<BackendChoice>(), default_value_t, help_heading = MACHINE)]
     backend: BackendChoice,
     #[command(flatten)]
     sleep: SleepArgs,
     /// FILE.png, FILE.gif, FILE.mp4, or FOLDER/ for numbered PNGs.
     #[arg(long, help_heading = PICTURES, value_name = "PATH", required_unless_present = "gallery")]
     out: Option<PathBuf>,
-    /// Pictures, evenly spaced over the run.
+    /// Number of pictures, evenly spaced over the run.
     ///
-    /// 1 shows its end. PNG takes 1, the others 60 unless told.
+    /// One picture shows the end of the run. The default is 1 for PNG and 60 for the other formats.
     #[arg(long, help_heading = PICTURES, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Width and height in pixels.
     #[arg(long, help_heading = PICTURES, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
     size: (u32, u32),
-    /// What bodies are colored by.
+    /// Quantity that the colors of bodies show.
     #[arg(long, help_heading = PICTURES, value_enum, default_value_t)]
     color: ColorBy,
-    /// Turn of the camera around the scene, in degrees.
+    /// Angle of the camera around the scene, in degrees.
     #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 30.0)]
     yaw: f32,
-    /// Height of the camera above the horizon, in degrees.
+    /// Elevation of the camera above the horizon, in degrees.
     #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 25.0)]
     pitch: f32,
-    /// Draw the motion in a CSV that `drystone run --out` wrote.
-    ///
-    /// It must be of this scene, which is not solved again.
+    /// Draw the motion in a CSV file of `drystone run --out` of the same scene, without solving it again.
     #[arg(long, help_heading = PICTURES, value_name = "FILE")]
     from: Option<PathBuf>,
-    /// Draw every scene of the catalogue into this folder, and a page.
+    /// Draw every scene of the catalogue into this folder, with a page.
     #[arg(long, help_heading = PICTURES, value_name = "FOLDER", conflicts_with_all = ["out", "from", "frames", "SceneArgs"])]
     gallery: Option<PathBuf>,
 }
 
 impl RenderArgs {
-    /// Runs the scene, or reads its motion, and draws it.
     pub fn run(&self) -> Result<()> {
         match (&self.gallery, &self.scene, &self.out) {
             (Some(folder), ..) => self.gallery(folder),
@@ -85,16 +78,12 @@ impl RenderArgs {
                 "--frames {frames}: a PNG is one picture; write FILE.gif, FILE.mp4 or FOLDER/"
             )));
         }
-        // What cannot be drawn or written is refused before the run.
+        // Errors of the canvas and the file are reported before the run.
         let mut canvas = Canvas::new(&scene.world, self.size)?;
         let seconds = f64::from(scene.steps) * f64::from(scene.dt);
         let mut output = Output::open(out, self.size, f64::from(frames) / seconds.max(1e-3))?;
         let film = match &self.from {
-            Some(path) => {
-                let mut film = Film::read(scene, self.color, path)?;
-                film.thin(frames as usize);
-                film
-            }
+            Some(path) => Film::read(scene, self.color, path)?.thinned(frames as usize),
             None => self.shoot(scene, config, frames, args.json)?,
         };
         film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
@@ -102,7 +91,7 @@ impl RenderArgs {
         print(out.display())
     }
 
-    /// Solves the scene and keeps `frames` of its states.
+    /// Solves the scene and keeps `frames` evenly spaced states.
     fn shoot(&self, scene: Scene, config: SolverConfig, frames: u32, quiet: bool) -> Result<Film> {
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), false)?;
         if !quiet {
@@ -132,7 +121,7 @@ impl RenderArgs {
         Look { yaw, pitch }
     }
 
-    /// Every scene of the catalogue, a third of the way through its run, and a page.
+    /// Draws every scene of the catalogue after a third of its steps, and writes a page.
     fn gallery(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
         let (width, height) = self.size;

@@ -12,7 +12,6 @@ use crate::report::{RUNS, convergence, problems, rules};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
 
-/// Arguments of `drystone report`.
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct ReportArgs {
@@ -24,18 +23,18 @@ pub struct ReportArgs {
 
 #[derive(Subcommand)]
 enum Page {
-    /// What each rule of the course sheet does.
+    /// Effects of each rule of the course sheet.
     Rules {
-        /// Directory that the page and its pictures are written into.
+        /// Directory for the page and its pictures.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
     },
-    /// How many sweeps contact problems take to which error.
+    /// Sweeps that contact problems need to reach an error.
     Convergence {
-        /// Directory that the page is written into.
+        /// Directory for the page.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
-        /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+        /// Directory of contact problems, in addition to those of catalogue scenes.
         #[arg(long, value_name = "DIR")]
         problems: Option<PathBuf>,
     },
@@ -43,31 +42,30 @@ enum Page {
 
 /// Speed against error: a page of pictures and tables, and the rows behind it.
 ///
-/// Stopped, it goes on where it stopped: scenes whose rows are there already, from the same program and machine, are not run again.
+/// A stopped report continues: it keeps the rows in DIR that the same program measured on the same machine.
 #[derive(Args)]
 pub struct SurveyArgs {
     /// Directory for index.html, speed-against-error.svg, scenes.csv and problems.csv.
     #[arg(long, default_value = "report")]
     out: PathBuf,
-    /// Fewer scenes and settings: within two minutes.
+    /// Run fewer scenes and settings, within two minutes.
     #[arg(long)]
     quick: bool,
-    /// Only this scene, as tower or tower:n=20,top_ratio=100, or the path of a file; may be given several times.
+    /// Only this scene, as tower or tower:n=20,top_ratio=100 or a file; may be given several times.
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Directory of contact problems that are solved besides steps of the catalogue's scenes.
+    /// Directory of contact problems, in addition to those of catalogue scenes.
     #[arg(long, value_name = "DIR")]
     problems: Option<PathBuf>,
     /// Threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// Draw the rows that are there, and run nothing.
+    /// Draw the existing rows without running scenes.
     #[arg(long, conflicts_with_all = ["quick", "scene", "problems", "threads"])]
     draw: bool,
 }
 
 impl ReportArgs {
-    /// Makes the page.
     pub fn run(&self) -> Result<()> {
         match &self.page {
             None => self.survey.run(&[]),
@@ -79,10 +77,10 @@ impl ReportArgs {
                 print(out.join("rules.md").display())
             }
             Some(Page::Convergence { out, problems }) => {
-                let bar = Progress::steps(0, false);
+                let (bar, mut done) = (Progress::steps(0, false), 0);
                 let page = convergence(problems.as_deref(), |problems| {
-                    bar.set_length(problems as u64);
-                    bar.inc();
+                    done += 1;
+                    bar.set(done, problems as u64);
                 })?;
                 bar.finish();
                 std::fs::create_dir_all(out).map_err(Error::file(out))?;
@@ -95,19 +93,17 @@ impl ReportArgs {
 }
 
 impl SurveyArgs {
-    /// Threads that each engine should have.
     pub fn threads(&self) -> usize {
         self.threads.into()
     }
 
-    /// Runs drystone and whoever else takes part, and makes the page.
     pub fn run(&self, others: &[&Team]) -> Result<()> {
         let report = if self.draw { Report::read(&self.out)? } else { self.measure(others)? };
         print(report.write(&self.out)?.display())
     }
 
     fn measure(&self, others: &[&Team]) -> Result<Report> {
-        // Fails only if it was set before, which nothing does. This thread is one of them.
+        // Fails only if the pool exists already. This thread is one of its threads.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
         let extent = if self.quick { Extent::Quick } else { Extent::Full };
         let scenes = match self.scene.is_empty() {

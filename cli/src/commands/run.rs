@@ -1,97 +1,72 @@
 //! `drystone run`.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::Args;
-use comfy_table::CellAlignment;
 
 use super::output::{plain_table, print, print_json, replacing, say};
 use super::progress::Progress;
-use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, step_with_contacts};
+use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, check_touching};
 use crate::files;
 use crate::report::{RunReport, Trajectory};
-use drystone::Simulation;
 use drystone::backend::choose;
-use drystone::scenes::Scene;
-use drystone::{Error, Result};
+use drystone::{Error, Result, Scene, Simulation};
 
-/// Arguments of `drystone run`.
 #[derive(Args)]
 pub struct RunArgs {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Take the time of each kernel by the clock of the GPU.
+    /// Measure the time of each kernel by the clock of the GPU.
     ///
-    /// A software adapter is slower with it.
+    /// A software adapter is slower with this clock.
     #[arg(long, help_heading = MACHINE)]
     kernel_times: bool,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// So many worlds of the scene, as one problem.
-    ///
-    /// They stand beside each other: their bodies never meet.
+    /// Solve N separate worlds of the scene as one problem.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = SCENE)]
     worlds: u32,
-    /// Let each world have one more of this parameter, such as seed.
+    /// Increase this parameter by one from each world to the next.
     ///
-    /// One more than the world before; without it all are the same.
+    /// Without it, all worlds are the same.
     #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
     vary: Option<String>,
-    /// Write the motion of the bodies that can move, as CSV.
+    /// Write the motion of all bodies except fixed ones as CSV.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out: Option<PathBuf>,
     /// Write every K-th step.
     #[arg(long, help_heading = OUTPUT, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-    /// Write what a step asks as a contact problem, for `drystone solve`.
+    /// Write the contact problem of a step, for `drystone solve`.
     ///
-    /// What it asks of the velocities; step 1 is the first.
-    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT)]
-    save_problem: Option<SaveProblem>,
+    /// Step 1 is the first.
+    #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT, value_parser = step_and_file)]
+    save_problem: Option<(u32, PathBuf)>,
 }
 
-/// Which step to save as a contact problem, and where.
-#[derive(Clone, Debug)]
-struct SaveProblem {
-    step: u32,
-    file: PathBuf,
+fn step_and_file(text: &str) -> std::result::Result<(u32, PathBuf), &'static str> {
+    let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
+    let step = step.parse().map_err(|_| "STEP must be a whole number")?;
+    if file.is_empty() { Err("FILE is missing") } else { Ok((step, file.into())) }
 }
 
-impl FromStr for SaveProblem {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
-        let (step, file) = text.split_once(':').ok_or("write it as STEP:FILE")?;
-        let step = step.parse().map_err(|_| "STEP must be a whole number")?;
-        if file.is_empty() { Err("FILE is missing") } else { Ok(Self { step, file: file.into() }) }
-    }
-}
-
-impl SaveProblem {
-    /// Refuses what could not be saved, before anything runs.
-    fn check(&self, scene: &Scene) -> Result<()> {
-        let (step, file, steps) = (self.step, self.file.display(), scene.steps);
-        if !(1..=steps).contains(&step) {
-            return Err(Error::input(format!("--save-problem {step}:{file}: the run has steps 1 to {steps}")));
-        }
-        if !scene.world.joints.is_empty() {
-            let (name, joints) = (&scene.name, scene.world.joints.len());
-            return Err(Error::input(format!(
-                "--save-problem {step}:{file}: {name} has {joints} joints, which a contact problem has not"
-            )));
-        }
-        Ok(())
+/// Refuses a step that cannot be saved, before the run.
+fn check_save((step, file): &(u32, PathBuf), scene: &Scene) -> Result<()> {
+    let (file, steps, name, joints) = (file.display(), scene.steps, &scene.name, scene.world.joints.len());
+    let refuse = |why: String| Err(Error::input(format!("--save-problem {step}:{file}: {why}")));
+    match joints {
+        _ if !(1..=steps).contains(step) => refuse(format!("the run has steps 1 to {steps}")),
+        0 => Ok(()),
+        _ => refuse(format!("{name} has {joints} joints, which a contact problem has not")),
     }
 }
 
 impl RunArgs {
-    /// Runs the scene and prints the report.
     pub fn run(&self) -> Result<()> {
         let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
-        self.save_problem.iter().try_for_each(|save| save.check(&scene))?;
+        self.save_problem.iter().try_for_each(|save| check_save(save, &scene))?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
@@ -104,10 +79,12 @@ impl RunArgs {
         let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
-                let stats = match self.save_problem.as_ref().filter(|save| save.step == step) {
-                    Some(save) => {
-                        let (problem, stats) = step_with_contacts(&mut simulation, &scene.name, scene.dt, step)?;
-                        replacing(&save.file, || files::write(&save.file, problem.to_text().as_bytes()))?;
+                let stats = match self.save_problem.as_ref().filter(|save| save.0 == step) {
+                    Some((_, file)) => {
+                        let name = format!("{}, step {step}", scene.name);
+                        let (problem, stats) = simulation.step_with_contacts(&name, scene.dt)?;
+                        check_touching(&problem)?;
+                        replacing(file, || files::write(file, problem.to_text().as_bytes()))?;
                         stats
                     }
                     None => simulation.step(scene.dt)?,
@@ -140,11 +117,6 @@ impl RunArgs {
 
 fn print_table(report: &RunReport) -> Result<()> {
     let mut table = plain_table();
-    for (what, value) in report.rows() {
-        table.add_row([what, value]);
-    }
-    if let Some(column) = table.column_mut(0) {
-        column.set_cell_alignment(CellAlignment::Left);
-    }
+    table.add_rows(report.rows().into_iter().map(|(what, value)| [what, value]));
     print(table)
 }

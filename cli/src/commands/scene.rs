@@ -1,4 +1,4 @@
-//! Arguments that commands share: the scene, how to solve it, and what runs it.
+//! Arguments that commands share: scene, settings, backend.
 
 use std::path::PathBuf;
 
@@ -7,24 +7,20 @@ use clap::Args;
 use super::output::say;
 use super::words;
 use crate::settings;
-use drystone::Simulation;
 use drystone::backend::BackendChoice;
-use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP, SolverConfig};
-use drystone::contacts::ContactProblem;
+use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP};
 use drystone::load::Load;
 use drystone::preset::Preset;
-use drystone::scenes::{CATALOGUE, Scene};
+use drystone::scenes::CATALOGUE;
 use drystone::stages::memory;
-use drystone::stats::StepStats;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Error, Result, Scene, SolverConfig};
 
 // Headings of options in the help.
 pub(super) const SCENE: &str = "Scene";
 pub(super) const SETTINGS: &str = "Settings of the solver";
-pub(super) const MACHINE: &str = "What it runs on";
+pub(super) const MACHINE: &str = "Machine";
 pub(super) const OUTPUT: &str = "Output";
 
-/// A scene, and how to solve it.
 #[derive(Args)]
 pub(super) struct SceneArgs {
     /// A scene of the catalogue, or a scene file.
@@ -34,78 +30,65 @@ pub(super) struct SceneArgs {
     /// Parameter of the scene; may be given several times.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE", help_heading = SCENE)]
     pub(super) parameter: Vec<String>,
-    /// Steps, if not as many as the scene says.
+    /// Number of steps, instead of the scene's own.
     #[arg(long, help_heading = SCENE, value_parser = clap::value_parser!(u32).range(0..))]
     pub(super) steps: Option<u32>,
-    /// Length of a step, if not what the scene says.
+    /// Length of a step, instead of the scene's own.
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
     pub(super) dt: Option<f32>,
-    /// Settings by name, before --set and the others.
-    #[arg(long, value_parser = words::preset(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
+    /// Preset of the settings; --set and other options change it.
+    #[arg(long, value_parser = words::of::<Preset>(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
     pub(super) preset: Preset,
-    /// Choose the substeps by the overlap of what stands, as 1mm.
+    /// Choose the substeps by the largest overlap of bodies at rest, as 1mm.
     ///
-    /// A bare number is in meters. A heavy load that comes on at once swings up to twice as deep.
-    #[arg(
-        long,
-        value_name = "LENGTH",
-        value_parser = length,
-        allow_hyphen_values = true,
-        conflicts_with = "substeps",
-        help_heading = SETTINGS
-    )]
+    /// A bare number is in meters. A heavy load that is applied suddenly overlaps up to twice as deep.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    #[arg(conflicts_with = "substeps", help_heading = SETTINGS)]
     pub(super) max_penetration: Option<f64>,
-    /// Substeps of a step.
+    /// Substeps per step.
     #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     pub(super) substeps: Option<u32>,
-    /// Biased sweeps of a substep.
+    /// Biased sweeps per substep.
     #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     pub(super) iterations: Option<u32>,
-    /// Relax sweeps of a substep.
+    /// Relax sweeps per substep.
     #[arg(long, value_name = "N", help_heading = SETTINGS, value_parser = clap::value_parser!(u32).range(0..))]
     pub(super) relax: Option<u32>,
-    /// What the sweeps do.
-    #[arg(long, value_parser = words::method(), help_heading = SETTINGS)]
+    /// Method of the sweeps.
+    #[arg(long, value_parser = words::of::<Method>(), help_heading = SETTINGS)]
     pub(super) method: Option<Method>,
     /// Any setting; may be given several times.
     ///
     /// `drystone settings` lists them.
     #[arg(long, value_name = "KEY=VALUE", help_heading = SETTINGS)]
     pub(super) set: Vec<String>,
-    /// Settings from a TOML file, before --set and the others.
+    /// Settings from a TOML file; --set and other options change them.
     #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
     pub(super) config: Option<PathBuf>,
-    /// Threads on the CPU; 0 is one a core.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 0,
-        value_parser = clap::value_parser!(u16).range(0..=1024),
-        help_heading = MACHINE
-    )]
+    /// Threads on the CPU; 0 means one per core.
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = MACHINE)]
+    #[arg(value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub(super) threads: u16,
     /// Print one JSON object instead of a table.
     #[arg(long, help_heading = OUTPUT)]
     pub(super) json: bool,
 }
 
-/// What runs the sweeps of one scene.
 #[derive(Args)]
 pub(super) struct BackendArgs {
-    /// What runs the sweeps.
-    #[arg(long = "backend", value_name = "BACKEND", value_parser = words::backend(), default_value_t, help_heading = MACHINE)]
+    /// Backend that runs the sweeps.
+    #[arg(long = "backend", value_name = "BACKEND", value_parser = words::of::<BackendChoice>(), default_value_t, help_heading = MACHINE)]
     pub(super) choice: BackendChoice,
-    /// Ask the GPU for the reference's results to the last bit.
+    /// Make the GPU give the reference's results to the last bit.
     #[arg(long, help_heading = MACHINE)]
     pub(super) exact: bool,
 }
 
-/// Scenes that run for their result.
 #[derive(Args)]
 pub(super) struct SleepArgs {
-    /// Let nothing fall asleep.
+    /// Keep all bodies awake.
     ///
-    /// Without it what was slow for half a second does, until it is touched: --set sleep_after=0.5, sleep_speed=0.01.
+    /// By default, bodies slower than sleep_speed for sleep_after seconds sleep until another body touches them.
     #[arg(long, help_heading = SETTINGS)]
     pub(super) no_sleep: bool,
 }
@@ -119,17 +102,16 @@ impl SleepArgs {
 }
 
 impl SceneArgs {
-    /// The scene with its step length, and the settings for a comparison: nothing sleeps unless `--set sleep_after` says so.
+    /// The scene and the settings for a comparison: bodies sleep only with `--set sleep_after`.
     pub(super) fn load_awake(&self) -> Result<(Scene, SolverConfig)> {
         self.load_from(self.base()?.without_sleep(), 1, None)
     }
 
-    /// The scene, or some worlds of it ([`Scene::find_worlds`]), with its step length, and the settings.
+    /// The scene, or some worlds of it ([`Scene::find_worlds`]), and the settings.
     pub(super) fn load(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
         self.load_from(self.base()?, worlds, vary)
     }
 
-    /// The settings that the others change.
     fn base(&self) -> Result<SolverConfig> {
         self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
     }
@@ -158,45 +140,38 @@ impl SceneArgs {
         Ok((scene, config))
     }
 
-    /// Sets the number of threads, once for the process: one a core unless told, and one for the reference.
+    /// Sets the number of threads of the process. The default is one per core, and one for the reference.
     pub(super) fn set_threads(&self, backend: BackendChoice) {
         let unless_told = usize::from(backend == BackendChoice::Reference);
         let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
-        // Fails only if it was set before, which nothing does.
-        // This thread is one of them: to hand work to a pool of other threads and wait costs 14 us a step.
+        // Fails only if the pool exists already. This thread is one of its threads: a separate pool costs 14 us per step.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
     }
 }
 
-/// Moves a scene on by the step that is its `number`th, and gives what that asked of the velocities, if anything.
-pub(super) fn step_with_contacts(
-    simulation: &mut Simulation,
-    scene: &str,
-    dt: f32,
-    number: u32,
-) -> Result<(ContactProblem, StepStats)> {
-    let (problem, stats) = simulation.step_with_contacts(&format!("{scene}, step {number}"), dt)?;
-    match problem.contacts.is_empty() {
-        true => Err(Error::input(format!("{}: nothing touches that is awake", problem.name))),
-        false => Ok((problem, stats)),
+/// Refuses a contact problem without contacts.
+pub(super) fn check_touching(problem: &ContactProblem) -> Result<()> {
+    if !problem.contacts.is_empty() {
+        return Ok(());
     }
+    Err(Error::input(format!("{}: nothing touches that is awake", problem.name)))
 }
 
-/// Worlds with fewer bodies are built within a second.
+/// Worlds with fewer bodies take less than a second to build.
 const MANY_BODIES: u64 = 200_000;
 
-/// Says that a world is built, where that takes a while.
+/// Prints a line before a large world is built.
 fn announce(scene: &str, parameters: &[String], worlds: usize) {
     let Some(entry) = CATALOGUE.iter().find(|e| e.name == scene) else { return };
     // `Scene::find_worlds` refuses wrong parameters.
     let bodies = entry.body_count(parameters).unwrap_or(0).saturating_mul(worlds as u64);
-    // What does not fit is refused before anything is built.
+    // A world that exceeds the memory is refused later, before it is built.
     if bodies >= MANY_BODIES && memory::check(bodies as f64 * memory::BODY, scene).is_ok() {
         say(format_args!("building {bodies} bodies ..."));
     }
 }
 
-/// Picks the substeps that keep the heaviest contact of a scene as shallow as asked for, and says which.
+/// Chooses the substeps for which the heaviest contact overlaps by at most `most`, and prints them.
 fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
     let Some(load) = Load::heaviest(&scene.world, config) else {
         say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));

@@ -9,41 +9,35 @@ use super::words;
 use crate::report::{CurveRow, SolveReport, SolveSettings};
 use drystone::backend::BackendKind;
 use drystone::config::Method;
-use drystone::contacts::ContactProblem;
 use drystone::solver::Order;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Error, Result};
 
-/// Most sweeps where a tolerance says when to end.
+/// Largest number of sweeps with a tolerance.
 const MOST_SWEEPS: u32 = 40_000;
 
-/// Arguments of `drystone solve`.
 #[derive(Args)]
 pub struct SolveArgs {
-    /// A contact problem, as `run --save-problem` writes it, or FCLIB's.
-    ///
-    /// docs/contacts-format.md describes the format.
+    /// A contact problem of `run --save-problem` (docs/contacts-format.md), or FCLIB's.
     file: PathBuf,
-    /// Sweeps.
+    /// Number of sweeps.
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     sweeps: u32,
     /// Sweep until the error e_vel is less than this, at most 40000 times.
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true, conflicts_with = "sweeps")]
     tolerance: Option<f64>,
-    /// What is done with the sweeps.
-    #[arg(long, value_parser = words::method(), default_value = "accelerated")]
+    /// Method of the sweeps.
+    #[arg(long, value_parser = words::of::<Method>(), default_value = "accelerated")]
     method: Method,
-    /// In which order they go over the contacts.
-    #[arg(long, value_parser = words::order(), default_value_t)]
+    /// Order of the sweeps.
+    #[arg(long, value_parser = words::of::<Order>(), default_value_t)]
     order: Order,
-    /// How often they go over a manifold before the next one.
-    ///
-    /// Unless told, 2 by manifolds and 1 by contacts.
+    /// Passes over a manifold before the next one; the default is 2 by manifolds and 1 by contacts.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
-    /// What runs them; errors are always measured in f64.
-    #[arg(long, value_parser = words::numbers(), default_value = "f64")]
+    /// Backend that runs the sweeps; errors are always measured in f64.
+    #[arg(long, value_parser = words::of::<BackendKind>(), default_value = "f64")]
     backend: BackendKind,
-    /// Ask the GPU for the reference's results to the last bit.
+    /// Make the GPU give the reference's results to the last bit.
     #[arg(long)]
     exact: bool,
     /// Print one JSON object instead of a table.
@@ -52,7 +46,6 @@ pub struct SolveArgs {
 }
 
 impl SolveArgs {
-    /// Solves the problem and prints the report.
     pub fn run(&self) -> Result<()> {
         if let Some(tolerance) = self.tolerance.filter(|t| !(t.is_finite() && *t > 0.0)) {
             return Err(Error::input(format!("--tolerance {tolerance}: must be more than 0")));
@@ -72,7 +65,7 @@ impl SolveArgs {
         } else {
             print_table(&report)?;
         }
-        if report.is_spoiled() {
+        if report.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan()) {
             let path = self.file.display();
             return Err(Error::input(format!("{path}: impulses left the finite range after {} sweeps", report.sweeps)));
         }

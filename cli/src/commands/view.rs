@@ -6,7 +6,6 @@ use super::scene::{BackendArgs, SceneArgs, SleepArgs};
 use crate::view::{ColorBy, Live, window};
 use drystone::Result;
 
-/// Arguments of `drystone view`.
 #[derive(Args)]
 pub struct ViewArgs {
     #[command(flatten)]
@@ -15,13 +14,12 @@ pub struct ViewArgs {
     backend: BackendArgs,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// What bodies are colored by.
+    /// Quantity that the colors of bodies show.
     #[arg(long, value_enum, default_value_t)]
     color: ColorBy,
 }
 
 impl ViewArgs {
-    /// Shows the scene until the window is closed.
     pub fn run(&self) -> Result<()> {
         let (scene, mut config) = self.scene.load(1, None)?;
         self.sleep.apply(&mut config);

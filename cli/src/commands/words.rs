@@ -8,79 +8,62 @@ use drystone::config::Method;
 use drystone::preset::Preset;
 use drystone::solver::Order;
 
-/// A name and its help.
-type Word = (&'static str, &'static str);
+pub(super) trait Named: FromStr<Err = drystone::Error> + Clone + Send + Sync + 'static {
+    /// The name and the help of each value.
+    const WORDS: &'static [(&'static str, &'static str)];
+}
 
-const PRESETS: [Word; Preset::ALL.len()] = [
-    ("fast", "4 substeps: for games and previews"),
-    ("balanced", "8 substeps"),
-    ("accurate", "32 substeps: heavy on light"),
-    ("reference", "128 substeps: to hold the others against"),
-];
-
-const METHODS: [Word; Method::ALL.len()] = [
-    ("plain", "One after another: projected Gauss-Seidel"),
-    (
-        "accelerated",
-        "With Nesterov's momentum, and a restart as soon as steps grow. Pays from three sweeps on: the first two are the plain ones",
-    ),
-];
-
-const ORDERS: [Word; Order::ALL.len()] = [
-    (
-        "contacts",
-        "Every contact by itself: in the order of the file each takes the first color that is free on both of its bodies",
-    ),
-    (
-        "manifolds",
-        "Contacts of the same two bodies with one frame together, up to four, as in a step: manifolds are colored, those with something fixed come last",
-    ),
-];
-
-const BACKENDS: [Word; BackendChoice::ALL.len()] = [
-    (
-        "auto",
-        "A hardware GPU where there is one and the scene is large enough that it pays, as measured by some steps of a small pile on both; else the CPU",
-    ),
-    ("gpu", "The compute shaders, on the best adapter there is"),
-    ("cpu", "The CPU, with as many threads as there are"),
-    ("reference", "The CPU reference, one constraint at a time on one thread"),
-];
-
-const NUMBERS: [Word; BackendKind::ALL.len()] = [
-    ("f64", "The reference in double precision"),
-    ("reference", "The reference, one constraint at a time on one thread, in single precision"),
-    ("cpu", "Sixteen constraints at a time, in single precision"),
-    ("gpu", "The compute shaders, in single precision"),
-];
-
-/// Takes one of `words`, each the name of a `T`.
-fn one_of<T>(words: &[Word]) -> impl TypedValueParser<Value = T> + use<T>
-where
-    T: FromStr<Err = drystone::Error> + Clone + Send + Sync + 'static,
-{
-    let values = words.iter().map(|&(name, help)| PossibleValue::new(name).help(help));
+/// Parses a value of a kind by its name.
+pub(super) fn of<T: Named>() -> impl TypedValueParser<Value = T> {
+    let values = T::WORDS.iter().map(|&(name, help)| PossibleValue::new(name).help(help));
     PossibleValuesParser::new(values).try_map(|name| name.parse::<T>())
 }
 
-pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
-    one_of(&PRESETS)
+impl Named for Preset {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("fast", "4 substeps: for games and previews"),
+        ("balanced", "8 substeps"),
+        ("accurate", "32 substeps: heavy on light"),
+        ("reference", "128 substeps: for comparison with the others"),
+    ];
 }
 
-pub(super) fn method() -> impl TypedValueParser<Value = Method> {
-    one_of(&METHODS)
+impl Named for Method {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("plain", "Projected Gauss-Seidel"),
+        (
+            "accelerated",
+            "Nesterov's momentum, restarted when the changes grow; differs from plain from the third sweep on",
+        ),
+    ];
 }
 
-pub(super) fn order() -> impl TypedValueParser<Value = Order> {
-    one_of(&ORDERS)
+impl Named for Order {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("contacts", "Single contacts: in file order each takes the first color that is free on both bodies"),
+        (
+            "manifolds",
+            "Manifolds of up to four contacts with the same bodies and frame are colored; fixed bodies come last",
+        ),
+    ];
 }
 
-pub(super) fn backend() -> impl TypedValueParser<Value = BackendChoice> {
-    one_of(&BACKENDS)
+impl Named for BackendChoice {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("auto", "A hardware GPU for scenes in which it is faster, by a measurement on a small pile; else the CPU"),
+        ("gpu", "The compute shaders, on the best adapter"),
+        ("cpu", "The CPU lanes, on all threads"),
+        ("reference", "The CPU reference, one constraint at a time on one thread"),
+    ];
 }
 
-pub(super) fn numbers() -> impl TypedValueParser<Value = BackendKind> {
-    one_of(&NUMBERS)
+impl Named for BackendKind {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("f64", "The reference in double precision"),
+        ("reference", "The reference in single precision, one constraint at a time on one thread"),
+        ("cpu", "Sixteen constraints at a time, in single precision"),
+        ("gpu", "The compute shaders, in single precision"),
+    ];
 }
 
 #[cfg(test)]
@@ -89,14 +72,14 @@ mod tests {
 
     #[test]
     fn every_kind_is_offered_by_its_name() {
-        fn same<T: ToString>(words: &[Word], all: &[T]) {
+        fn same<T: ToString + Named>(all: &[T]) {
             let names: Vec<_> = all.iter().map(T::to_string).collect();
-            assert_eq!(words.iter().map(|word| word.0).collect::<Vec<_>>(), names);
+            assert_eq!(T::WORDS.iter().map(|word| word.0).collect::<Vec<_>>(), names);
         }
-        same(&PRESETS, &Preset::ALL);
-        same(&METHODS, &Method::ALL);
-        same(&ORDERS, &Order::ALL);
-        same(&BACKENDS, &BackendChoice::ALL);
-        same(&NUMBERS, &BackendKind::ALL);
+        same(&Preset::ALL);
+        same(&Method::ALL);
+        same(&Order::ALL);
+        same(&BackendChoice::ALL);
+        same(&BackendKind::ALL);
     }
 }

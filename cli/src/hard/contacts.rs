@@ -3,10 +3,8 @@
 use glam::{Quat, Vec3};
 
 use super::{Checks, DT, LEAST, Setup, cube, energy, floor, watch, weightless};
-use drystone::Result;
-use drystone::metrics;
 use drystone::stats::largest;
-use drystone::world::{Body, MassProperties, Shape, World};
+use drystone::{Body, MassProperties, Result, Shape, World, metrics};
 
 pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for share in [0.25, 0.5, 1.0_f32] {
@@ -15,16 +13,10 @@ pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
         world.add(cube(0.0, 1.0 - share));
         let mut simulation = setup.simulation(world)?;
         let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
-        checks.at_most(
-            format!("{:.0} %: speed at any time over the push limit", 100.0 * share),
-            speed / f64::from(setup.config.push_limit),
-            1.0,
-        );
-        checks.at_most(
-            format!("{:.0} %: overlap after 5 s [mm]", 100.0 * share),
-            1e3 * simulation.penetration().max,
-            1.0,
-        );
+        let (percent, limit) = (100.0 * share, f64::from(setup.config.push_limit));
+        checks.at_most(format!("{percent:.0} %: speed at any time over the push limit"), speed / limit, 1.0);
+        let depth = 1e3 * simulation.penetration().max;
+        checks.at_most(format!("{percent:.0} %: overlap after 5 s [mm]"), depth, 1.0);
     }
     Ok(())
 }
@@ -60,9 +52,7 @@ pub(super) fn nearly_parallel(setup: &Setup, checks: &mut Checks) -> Result<()> 
         world.add(cube(0.0, 0.5));
         world.add(upper);
         let mut simulation = setup.simulation(world)?;
-        for _ in 0..540 {
-            simulation.step(DT)?;
-        }
+        (0..540).try_for_each(|_| simulation.step(DT).map(drop))?;
         let fastest = largest(LEAST, watch(&mut simulation, 60, metrics::rms_speed)?);
         checks.at_most(format!("{what}: rms speed in the tenth second [mm/s]"), 1e3 * fastest, 1.0);
         Ok(())
@@ -71,7 +61,7 @@ pub(super) fn nearly_parallel(setup: &Setup, checks: &mut Checks) -> Result<()> 
         let turn = Quat::from_rotation_y(angle) * Quat::from_rotation_x(angle);
         rest(format!("turned by {angle:e} rad"), cube(0.0, 1.5).rotation(turn))?;
     }
-    // On its edge, a little off balance.
+    // The cube stands on its edge, a little off balance.
     let on_edge = Quat::from_rotation_z(std::f32::consts::FRAC_PI_4 + 0.01);
     let rocking = Body::dynamic().shape(Shape::cuboid(0.25, 0.25, 0.25)).rotation(on_edge);
     rest("a cube let go on its edge".into(), rocking.position(0.0, 1.0 + 0.25 * 2_f32.sqrt(), 0.0))?;
@@ -81,14 +71,14 @@ pub(super) fn nearly_parallel(setup: &Setup, checks: &mut Checks) -> Result<()> 
 pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let mut world = floor(0.5);
     let point = MassProperties { mass: 1.0, principal_inertia: Vec3::splat(1e-9), ..MassProperties::IMMOVABLE };
-    let mut still = Vec::new();
-    still.push(world.add(Body::dynamic().shape(Shape::ball(0.1)).mass_properties(point).position(0.0, 0.1, 0.0)));
-    still.push(
-        world.add(Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.1)).mass_properties(point).position(1.0, 0.1, 0.0)),
-    );
     let lying = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
-    still.push(world.add(Body::dynamic().shape(Shape::cylinder(0.5, 1e-3)).rotation(lying).position(3.0, 1e-3, 0.0)));
-    // Pairs of infinite mass inside of each other.
+    let still = [
+        Body::dynamic().shape(Shape::ball(0.1)).mass_properties(point).position(0.0, 0.1, 0.0),
+        Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.1)).mass_properties(point).position(1.0, 0.1, 0.0),
+        Body::dynamic().shape(Shape::cylinder(0.5, 1e-3)).rotation(lying).position(3.0, 1e-3, 0.0),
+    ];
+    let still = still.map(|body| world.add(body));
+    // Bodies of infinite mass overlap.
     let wall = |body: Body| body.shape(Shape::cuboid(0.5, 0.5, 0.5)).position(6.0, 0.5, 0.0);
     world.add(wall(Body::fixed()));
     world.add(wall(Body::kinematic().velocity(0.1 * Vec3::X, Vec3::ZERO)));
@@ -103,8 +93,8 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Painlevé: a rod at `angle` from the floor whose tip slides at 5 m/s. Where mu > 4/3 there are angles at which friction presses the tip
-/// into the floor faster than any normal force lifts it out.
+/// Painlevé: the tip of an inclined rod slides at 5 m/s. If mu > 4/3, friction presses the tip into the floor at some angles faster
+/// than any normal force lifts it.
 pub(super) fn painleve(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for (mu, degrees, way) in
         [(1.5, 60.0, -1.0), (2.0, 60.0, -1.0), (2.0, 60.0, 1.0), (3.0, 45.0, -1.0), (3.0, 45.0, 1.0_f32)]
@@ -112,19 +102,15 @@ pub(super) fn painleve(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let mut world = floor(mu);
         let turn = Quat::from_rotation_z((degrees as f32 - 90.0).to_radians());
         let rod = Body::dynamic().shape(Shape::capsule(1.0, 0.01)).friction(mu).rotation(turn);
-        // The lower end touches; +x leans away from it.
+        // The lower end touches the floor; the rod leans to -x from there.
         let y = (degrees as f32).to_radians().sin() + 0.01;
         world.add(rod.position(0.0, y, 0.0).velocity(5.0 * way * Vec3::X, Vec3::ZERO));
         let before = energy(&world);
         let mut simulation = setup.simulation(world)?;
-        let all = watch(&mut simulation, 300, energy)?;
-        let grown = all.iter().scan(before, |last, &e| {
-            let by = e - *last;
-            *last = e;
-            Some(by)
-        });
-        let what =
-            format!("mu {mu}, {degrees} degrees, tip to {}", if way > 0.0 { "its middle" } else { "the outside" });
+        let all = [vec![before], watch(&mut simulation, 300, energy)?].concat();
+        let grown = all.windows(2).map(|pair| pair[1] - pair[0]);
+        let to = if way > 0.0 { "its middle" } else { "the outside" };
+        let what = format!("mu {mu}, {degrees} degrees, tip to {to}");
         checks.at_most(format!("{what}: most energy gained in a step, relative"), largest(LEAST, grown) / before, 1e-3);
         checks.finite(&format!("{what}: "), &simulation.world);
     }

@@ -1,80 +1,66 @@
-//! Hard cases: what breaks solvers, each with a number and the limit that it should keep.
+//! Hard cases for solvers: each measures quantities and compares them with limits.
 
 mod contacts;
 mod inputs;
 mod motions;
 mod stacks;
 
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::config::SolverConfig;
-use drystone::metrics;
-use drystone::scenes::Scene;
 use drystone::stages::suggest::hint;
 use drystone::stats::largest;
-use drystone::world::{Body, Shape, World};
-use drystone::{Error, Result};
+use drystone::{Backend, Body, Error, Result, Scene, Shape, Simulation, SolverConfig, World, metrics};
 use glam::Vec3;
 
 pub use motions::{Tumble, flip_time, rolling_error};
 
-/// A case.
 pub struct Case {
-    /// Short name, as the command line takes it.
     pub name: &'static str,
-    /// What is hard about it, and what is asked.
     pub summary: &'static str,
-    /// Whether it takes minutes.
+    /// Whether the case takes minutes.
     pub long: bool,
     run: fn(&Setup, &mut Checks) -> Result<()>,
 }
 
-/// One number of a case.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Check {
-    /// What was measured, with its unit.
+    /// The quantity, with its unit.
     pub what: String,
-    /// What it came to.
     pub value: f64,
-    /// What it should be.
     pub limit: Limit,
-    /// Whether it is.
     pub passed: bool,
 }
 
-/// What a number should be.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Limit {
-    /// This or less.
     AtMost(f64),
-    /// This or more.
     AtLeast(f64),
 }
 
-impl Check {
-    /// Passes if `value` is at most `limit`; NaN never passes.
-    pub fn at_most(what: impl Into<String>, value: f64, limit: f64) -> Self {
-        Self { what: what.into(), value, limit: Limit::AtMost(limit), passed: value <= limit }
-    }
-
-    /// Passes if `value` is at least `limit`; NaN never passes.
-    pub fn at_least(what: impl Into<String>, value: f64, limit: f64) -> Self {
-        Self { what: what.into(), value, limit: Limit::AtLeast(limit), passed: value >= limit }
+impl Limit {
+    /// Whether a value keeps the limit; NaN never does.
+    pub fn holds(self, value: f64) -> bool {
+        match self {
+            Self::AtMost(limit) => value <= limit,
+            Self::AtLeast(limit) => value >= limit,
+        }
     }
 }
 
-/// The numbers of a case.
+/// Whether all checks of a case passed.
+pub fn passes(checks: &[Check]) -> bool {
+    checks.iter().all(|check| check.passed)
+}
+
 #[derive(Default)]
 struct Checks(Vec<Check>);
 
 impl Checks {
-    fn at_most(&mut self, what: impl Into<String>, value: f64, limit: f64) {
-        self.0.push(Check::at_most(what, value, limit));
+    fn add(&mut self, what: String, value: f64, limit: Limit) {
+        self.0.push(Check { what, value, limit, passed: limit.holds(value) });
     }
 
-    fn at_least(&mut self, what: impl Into<String>, value: f64, limit: f64) {
-        self.0.push(Check::at_least(what, value, limit));
+    fn at_most(&mut self, what: impl Into<String>, value: f64, limit: f64) {
+        self.add(what.into(), value, Limit::AtMost(limit));
     }
 
     /// Passes if every number of a world is finite.
@@ -89,11 +75,9 @@ impl Checks {
     }
 }
 
-/// What a case is run with.
 pub struct Setup<'a> {
-    /// Settings; the substeps of a case that needs its own are its own.
     pub config: SolverConfig,
-    /// Opens what runs the sweeps.
+    /// Opens the backend that runs the sweeps.
     pub open: &'a (dyn Fn() -> Result<Box<dyn Backend>> + Sync),
 }
 
@@ -102,13 +86,11 @@ impl Setup<'_> {
         Simulation::new(world, self.config.clone(), (self.open)()?)
     }
 
-    /// Runs a scene of the catalogue and says what became of it.
-    fn run(&self, name: &str, parameters: &[&str], steps: u32) -> Result<Outcome> {
-        let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
-        self.outcome(Scene::find(name, &parameters)?.world, steps)
+    fn run(&self, spec: &str, steps: u32) -> Result<Outcome> {
+        self.outcome(Scene::find_spec(spec)?.world, steps)
     }
 
-    /// Runs a world at 60 steps a second and says what became of it.
+    /// Runs a world at 60 steps a second and measures its end.
     fn outcome(&self, world: World, steps: u32) -> Result<Outcome> {
         let mut simulation = self.simulation(world.clone())?;
         let mut deepest = 0.0;
@@ -132,22 +114,20 @@ impl Setup<'_> {
 /// Length of a step (s).
 const DT: f32 = 1.0 / 60.0;
 
-/// What became of a world.
 #[derive(Clone, Copy, Debug)]
 struct Outcome {
-    /// Dynamic bodies that are not in place.
+    /// Number of dynamic bodies that are not in place.
     fallen: f64,
-    /// Largest horizontal way of a body (m).
+    /// Largest horizontal distance of a body from its first position (m).
     drift: f64,
-    /// Speed at the end, root mean square (m/s).
+    /// Root mean square speed (m/s).
     rms: f64,
-    /// Deepest overlap, looked at twice a second (m).
+    /// Deepest overlap of all times, measured twice a second (m).
     deepest: f64,
-    /// The same at the end (m).
+    /// Deepest overlap at the end (m).
     at_rest: f64,
 }
 
-/// Less than anything.
 const LEAST: f64 = f64::NEG_INFINITY;
 
 fn floor(friction: f32) -> World {
@@ -164,66 +144,63 @@ fn weightless() -> World {
     World { gravity: Vec3::ZERO, ..World::new() }
 }
 
-fn energy(world: &World) -> f64 {
+/// Kinetic and potential energy (J).
+pub(crate) fn energy(world: &World) -> f64 {
     world.kinetic_energy() + world.potential_energy()
 }
 
-/// By how much a value is off an exact one, relative.
+/// Relative error of a value.
 fn off(value: f64, exact: f64) -> f64 {
     (value / exact - 1.0).abs()
 }
 
-/// What `measure` says after each of `steps` steps.
+/// Values of `measure` after each of `steps` steps.
 fn watch(simulation: &mut Simulation, steps: u32, measure: impl Fn(&World) -> f64) -> Result<Vec<f64>> {
     (0..steps).map(|_| simulation.step(DT).map(|_| measure(&simulation.world))).collect()
 }
 
+const CASES: &[Case] = &[
+    case("H1", "a cube under a cube of 10 to 1e6 times its mass", stacks::light_under_heavy),
+    case("H2", "towers of 20 and 40 cubes, shifted by 1 cm to either side in turn, 10 s", stacks::towers),
+    case(
+        "H3",
+        "towers with a top 100 and 1000 times heavier, and with masses 1 and 1000 in turn, 10 s",
+        stacks::heavy_tops,
+    ),
+    case("H4", "more contacts than statics need: a cube on 4, 16, 64 points; 135 planks", stacks::redundancy),
+    case("H5", "a card house of five storeys, cards 200 times as long as thick, 10 s", stacks::cards),
+    case("H6", "a level chain of 100 links falls, with 1000 times the mass of a link at its end", motions::heavy_chain),
+    case("H7", "a rod of inertia 1:1000:1000 at 1000 rad/s, free and on a floor", motions::spinning_rod),
+    case("H8", "cubes that start 25, 50 and 100 % inside of each other", contacts::overlaps),
+    case(
+        "H9",
+        "balls on an edge, on a corner, in the same place: contacts without a defined normal",
+        contacts::no_direction,
+    ),
+    case("H10", "edges that are 1e-7 to 1e-3 rad from parallel; a cube that rocks", contacts::nearly_parallel),
+    case("H11", "tiny inertia, hair-thin rods, pairs of immovable bodies", contacts::no_inertia),
+    case("H12", "10 and 100 km from the origin; input that is not finite", inputs::far_and_bad),
+    case("kapla", "105 planks, 60 s", stacks::kapla),
+    case("arch", "arches at 0.12 of their radius stand, at 0.095 fall", stacks::arches),
+    case("aqueduct", "eight arches on piers of loose blocks, 10 s", stacks::aqueduct),
+    Case { long: true, ..case("pyramid100", "5,050 boxes for 10,000 steps", stacks::large_pyramid) },
+    case("painleve", "a rod pushed on its tip where rigid Coulomb friction has no answer", contacts::painleve),
+    case("flip", "a free body about its middle axis turns over on time, energy stays, 20 s", motions::flip),
+    case("rolling", "25 balls on a plate that is pushed at 60 and 90 degrees", motions::rolling),
+    case(
+        "release",
+        "a load of 100 times the mass of a ball is removed from two balls: they stay in place",
+        motions::release,
+    ),
+];
+
+const fn case(name: &'static str, summary: &'static str, run: fn(&Setup, &mut Checks) -> Result<()>) -> Case {
+    Case { name, summary, long: false, run }
+}
+
 impl Case {
-    /// All of them.
-    pub const ALL: &'static [Self] = &[
-        Self::new("H1", "a cube under a cube of 10 to 1e6 times its mass", stacks::light_under_heavy),
-        Self::new("H2", "towers of 20 and 40 cubes, shifted by 1 cm to either side in turn, 10 s", stacks::towers),
-        Self::new(
-            "H3",
-            "towers with a top 100 and 1000 times heavier, and with masses 1 and 1000 in turn, 10 s",
-            stacks::heavy_tops,
-        ),
-        Self::new("H4", "more contacts than statics need: a cube on 4, 16, 64 points; 135 planks", stacks::redundancy),
-        Self::new("H5", "a card house of five storeys, cards 200 times as long as thick, 10 s", stacks::cards),
-        Self::new(
-            "H6",
-            "a level chain of 100 links falls, with 1000 times the mass of a link at its end",
-            motions::heavy_chain,
-        ),
-        Self::new("H7", "a rod of inertia 1:1000:1000 at 1000 rad/s, free and on a floor", motions::spinning_rod),
-        Self::new("H8", "cubes that start 25, 50 and 100 % inside of each other", contacts::overlaps),
-        Self::new(
-            "H9",
-            "balls on an edge, on a corner, in the same place: contacts without a defined normal",
-            contacts::no_direction,
-        ),
-        Self::new("H10", "edges that are 1e-7 to 1e-3 rad from parallel; a cube that rocks", contacts::nearly_parallel),
-        Self::new("H11", "tiny inertia, hair-thin rods, pairs of immovable bodies", contacts::no_inertia),
-        Self::new("H12", "10 and 100 km from the origin; input that is not finite", inputs::far_and_bad),
-        Self::new("kapla", "105 planks, 60 s", stacks::kapla),
-        Self::new("arch", "arches at 0.12 of their radius stand, at 0.095 fall", stacks::arches),
-        Self::new("aqueduct", "eight arches on piers of loose blocks, 10 s", stacks::aqueduct),
-        Self { long: true, ..Self::new("pyramid100", "5,050 boxes for 10,000 steps", stacks::large_pyramid) },
-        Self::new("painleve", "a rod pushed on its tip where rigid Coulomb friction has no answer", contacts::painleve),
-        Self::new("flip", "a free body about its middle axis turns over on time, energy stays, 20 s", motions::flip),
-        Self::new("rolling", "25 balls on a plate that is pushed at 60 and 90 degrees", motions::rolling),
-        Self::new(
-            "release",
-            "a load of 100 times the mass of a ball is removed from two balls: they stay in place",
-            motions::release,
-        ),
-    ];
+    pub const ALL: &'static [Self] = CASES;
 
-    const fn new(name: &'static str, summary: &'static str, run: fn(&Setup, &mut Checks) -> Result<()>) -> Self {
-        Self { name, summary, long: false, run }
-    }
-
-    /// The case of that name.
     pub fn find(name: &str) -> Result<&'static Self> {
         Self::ALL.iter().find(|c| c.name.eq_ignore_ascii_case(name)).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|c| c.name).collect();
@@ -232,7 +209,6 @@ impl Case {
         })
     }
 
-    /// Runs it.
     pub fn run(&self, setup: &Setup) -> Result<Vec<Check>> {
         let mut checks = Checks::default();
         (self.run)(setup, &mut checks).map_err(|e| e.within(self.name))?;
@@ -244,14 +220,12 @@ impl Case {
 mod tests {
     use super::*;
 
-    /// Two cubes 0.2 m in each other, which are pushed apart by 0.1 m/s at the most: 0.17 m deep after half a second, not at all after five.
+    /// Two cubes overlap by 0.2 m and separate at 0.1 m/s at most: the overlap is 0.17 m after half a second and 0 after five.
     #[test]
     fn overlap_is_looked_at_on_the_way() {
-        let mut world = World::new();
-        world.gravity = glam::Vec3::ZERO;
-        for x in [0.0, 0.8] {
-            world.add(drystone::Body::dynamic().shape(drystone::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 0.0, 0.0));
-        }
+        let mut world = weightless();
+        world.add(cube(0.0, 0.0));
+        world.add(cube(0.8, 0.0));
         let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn Backend>);
         let setup = Setup { config: SolverConfig::default().with(|c| c.push_limit = 0.1), open: &open };
         let outcome = setup.outcome(world, 300).expect("a run");

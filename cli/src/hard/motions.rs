@@ -1,16 +1,13 @@
-//! Motions that are known on paper, or by what they keep.
+//! Motions with a closed form or a conserved quantity.
 
 use std::f64::consts::PI;
 
 use glam::{DVec3, Quat, Vec3};
 
 use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
-use drystone::Result;
-use drystone::Simulation;
 use drystone::config::Friction;
-use drystone::scenes::Scene;
 use drystone::stats::largest;
-use drystone::world::{BallJoint, Body, MassProperties, Shape, World};
+use drystone::{BallJoint, Body, MassProperties, Result, Scene, Shape, Simulation, World};
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const LINKS: usize = 100;
@@ -19,12 +16,9 @@ pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let bar = Body::dynamic().shape(Shape::cuboid(0.25, 0.05, 0.05)).density(500.0);
     let mut held: Option<usize> = None;
     for k in 0..=LINKS {
-        let is_end = k == LINKS;
-        let half = if is_end { RADIUS } else { 0.25 };
-        let body = if is_end {
-            Body::dynamic().shape(Shape::ball(RADIUS)).total_mass(1000.0 * bar.mass.mass)
-        } else {
-            bar.clone()
+        let (half, body) = match k {
+            LINKS => (RADIUS, Body::dynamic().shape(Shape::ball(RADIUS)).total_mass(1000.0 * bar.mass.mass)),
+            _ => (0.25, bar.clone()),
         };
         let index = world.add(body.position(0.5 * k as f32 + half, 0.0, 0.0));
         world.join(match held {
@@ -34,11 +28,10 @@ pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
         held = Some(index);
     }
     let before = energy(&world);
-    // The most that the swing can set free.
+    // The largest potential energy that the swing can release.
     let scale: f64 = world.bodies.iter().map(|b| f64::from(b.mass.mass) * 9.81 * f64::from(b.position.x)).sum();
     let mut simulation = setup.simulation(world)?;
-    let mut gap = 0.0_f64;
-    let mut gained = f64::NEG_INFINITY;
+    let (mut gap, mut gained) = (0.0, LEAST);
     for _ in 0..600 {
         simulation.step(DT)?;
         gap = largest(gap, [simulation.world.joint_gap().into()]);
@@ -52,7 +45,7 @@ pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
 
 pub(super) fn spinning_rod(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const HALF: f32 = 0.5;
-    // Solid cylinder: r²/2 along, r²/4 + l²/12 across.
+    // The moments of a solid cylinder are r²/2 along and r²/4 + l²/12 across its axis.
     let radius = (4.0 * HALF * HALF / 12.0 / (500.0 - 0.25)).sqrt();
     let rod = Body::dynamic().shape(Shape::cylinder(HALF, radius));
     let mut free = weightless();
@@ -72,18 +65,17 @@ pub(super) fn spinning_rod(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// What a free body with moments 1, 2, 3 kg m² and spin (`first`, 10, 0) rad/s does in 20 s.
+/// The motion of a free body with moments 1, 2, 3 kg m² and spin (`first`, 10, 0) rad/s over 20 s.
 pub struct Tumble {
-    /// When its spin about the middle axis changes sign (s).
+    /// Times at which the spin about the middle axis changes sign (s).
     pub flips: Vec<f64>,
-    /// Largest relative change of the energy.
+    /// Largest relative changes of energy and angular momentum.
     pub energy: f64,
-    /// Largest relative change of the angular momentum.
     pub momentum: f64,
 }
 
 impl Tumble {
-    /// Runs it with `config` at 60 steps a second.
+    /// Runs the simulation at 60 steps a second.
     pub fn new(first: f32, simulation: impl FnOnce(World) -> Result<Simulation>) -> Result<Self> {
         let mut world = weightless();
         let inertia = Vec3::new(1.0, 2.0, 3.0);
@@ -99,7 +91,7 @@ impl Tumble {
             let body = &world.bodies[0];
             let spin = f64::from((body.rotation.inverse() * body.angular_velocity).y);
             if spin * before < 0.0 {
-                // Where the line through both is zero.
+                // Linear interpolation of the zero.
                 tumble.flips.push((f64::from(step) - spin / (spin - before)) / 60.0);
             }
             before = spin;
@@ -116,8 +108,8 @@ impl Tumble {
     }
 }
 
-/// Time between two flips of that body, 2 K(k) / rate (Landau and Lifshitz, "Mechanics", section 37), with moments
-/// i < j < l and 2 E j > L²; the first comes after half of it (s).
+/// Time between two flips of this body (s): 2 K(k) / rate (Landau and Lifshitz, "Mechanics", section 37), with moments
+/// i < j < l and 2 E j > L². The first flip comes after half of this time.
 pub fn flip_time(first: f64) -> f64 {
     let (i, j, l) = (1.0, 2.0, 3.0);
     let twice_energy = i * first * first + j * 100.0;
@@ -138,21 +130,18 @@ pub(super) fn flip(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let fast = Tumble::new(1.0, |world| setup.simulation(world))?;
     checks.at_most("spin (0.01, 10, 0): first flip, relative error", off(first, 0.5 * flip_time(0.01)), 0.005);
     checks.at_most("spin (0.01, 10, 0): energy in 20 s, relative error", slow.energy, 1e-5);
-    checks.at_most(
-        "spin (1, 10, 0): time between flips in 20 s, relative error",
-        off(fast.between(), flip_time(1.0)),
-        0.005,
-    );
+    let between = off(fast.between(), flip_time(1.0));
+    checks.at_most("spin (1, 10, 0): time between flips in 20 s, relative error", between, 0.005);
     checks.at_most("spin (1, 10, 0): energy in 20 s, relative error", fast.energy, 1e-5);
     Ok(())
 }
 
-/// SimBenchmark's rolling test: 25 balls on a plate that is pushed at `angle` degrees from x to z. All move along the push with
-/// accelerations known on paper; the error is the mean over 4 s of |dv|² of the plate plus that of the first ball (m²/s²).
+/// SimBenchmark's rolling test: a force pushes a plate with 25 balls at `angle` degrees from x to z. The accelerations have a closed
+/// form; the error is the mean over 4 s of |dv|² of the plate plus that of the first ball (m²/s²).
 pub fn rolling_error(angle: f32, simulation: impl FnOnce(World) -> Result<Simulation>) -> Result<f64> {
     let scene = Scene::find("rolling", &[format!("angle={angle}")])?;
     let (m, plate, g, mu, balls, push) = (1.0, 10.0, 9.81, 0.4, 25.0, 150.0);
-    // A ball that rolls on the plate takes 2/7 of its acceleration.
+    // A rolling ball has 2/7 of the acceleration of the plate.
     let slip = push - mu * (plate + balls * m) * g;
     let a_ball = slip / plate / (3.5 + balls * m / plate);
     let a_plate = 3.5 * a_ball;
@@ -179,12 +168,12 @@ pub(super) fn rolling(setup: &Setup, checks: &mut Checks) -> Result<()> {
     checks.at_most("disc, 60 degrees: mean squared error [m²/s²]", error(60.0, Friction::Disc)?, 1e-5);
     checks.at_most("disc, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Disc)?, 1e-5);
     checks.at_most("box, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Box)?, 1e-5);
-    // A plate that does not move: the limit of each direction alone is beyond the push.
+    // The plate does not move: the friction limit of each direction alone exceeds the push.
     checks.at_most("box, 60 degrees: off the error of a plate that stays, 3.145 m²/s²", (across - 3.145).abs(), 0.005);
     Ok(())
 }
 
-/// Three balls on a floor, the top one of 100 times, which is taken off after 2 s.
+/// Three balls on a floor; the top one has 100 times the mass and is removed after 2 s.
 pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let mut world = floor(0.5);
     let ball = |y: f32, density: f32| Body::dynamic().shape(Shape::ball(0.5)).density(density).position(0.0, y, 0.0);
@@ -192,9 +181,7 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let second = world.add(ball(1.5, 1000.0));
     let top = world.add(ball(2.5, 1e5));
     let mut simulation = setup.simulation(world)?;
-    for _ in 0..120 {
-        simulation.step(DT)?;
-    }
+    (0..120).try_for_each(|_| simulation.step(DT).map(drop))?;
     simulation.world.bodies[top].position = Vec3::new(50.0, 0.5, 0.0);
     let highest = largest(LEAST, watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
     checks.at_most("rise of the ball under the load above its place [mm]", 1e3 * (highest - 1.5), 5.0);

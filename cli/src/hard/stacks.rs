@@ -1,26 +1,23 @@
-//! What stands, or should.
+//! Stacks that should stand.
 
-use super::{Checks, DT, Setup};
+use super::{Checks, DT, Limit, Setup};
 use drystone::config::Method;
 use drystone::load::Load;
 use drystone::residuals::Measure;
-use drystone::scenes::Scene;
 use drystone::solver::{Order, Solver};
 use drystone::stats::largest;
-use drystone::world::{Body, Shape, World};
-use drystone::{Result, SolvedManifold};
+use drystone::{Body, Result, Scene, Shape, SolvedManifold, World};
 
-/// Sweeps over a saved step, a power of two.
+/// Sweeps over the first step; a power of two.
 const SWEEPS: u32 = 4096;
-/// Ten seconds.
+/// Steps in ten seconds.
 const TEN: u32 = 600;
 
 pub(super) fn light_under_heavy(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for ratio in [10.0, 100.0, 1e3, 1e4, 1e5, 1e6_f64] {
-        let parameters = ["n=2".to_owned(), format!("top_ratio={ratio}")];
-        let world = Scene::find("tower", &parameters)?.world;
-        let law =
-            Load::heaviest(&world, &setup.config).expect("a load").overlap(setup.config.substeps, DT, &setup.config);
+        let world = Scene::find_spec(&format!("tower:n=2,top_ratio={ratio}"))?.world;
+        let load = Load::heaviest(&world, &setup.config).expect("a load");
+        let law = load.overlap(setup.config.substeps, DT, &setup.config);
         let outcome = setup.outcome(world, TEN)?;
         checks.stands(&outcome, format!("1 under {ratio}"));
         checks.at_most(format!("1 under {ratio}: overlap at rest over the static law"), outcome.at_rest / law, 1.2);
@@ -33,7 +30,7 @@ pub(super) fn light_under_heavy(setup: &Setup, checks: &mut Checks) -> Result<()
 
 pub(super) fn towers(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for n in [20, 40] {
-        let outcome = setup.run("tower", &[&format!("n={n}"), "offset=0.01"], TEN)?;
+        let outcome = setup.run(&format!("tower:n={n},offset=0.01"), TEN)?;
         checks.stands(&outcome, format!("{n} cubes"));
         checks.at_most(format!("{n} cubes: drift [m]"), outcome.drift, 0.1);
         checks.at_most(format!("{n} cubes: rms speed at the end [m/s]"), outcome.rms, 0.05);
@@ -43,11 +40,10 @@ pub(super) fn towers(setup: &Setup, checks: &mut Checks) -> Result<()> {
 
 pub(super) fn heavy_tops(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for (n, top) in [(20, 100), (10, 1000), (20, 1000)] {
-        let parameters = [&format!("n={n}"), &format!("top_ratio={top}"), "offset=0.01"];
-        let outcome = setup.run("tower", &parameters.map(|p| p as &str), TEN)?;
+        let outcome = setup.run(&format!("tower:n={n},top_ratio={top},offset=0.01"), TEN)?;
         checks.stands(&outcome, format!("{n} cubes, top {top} times"));
     }
-    let alternating = setup.run("mass-ratio", &["n=10", "ratio=1000"], TEN)?;
+    let alternating = setup.run("mass-ratio:n=10,ratio=1000", TEN)?;
     checks.stands(&alternating, "10 cubes, 1 and 1000 in turn");
     checks.at_most("10 cubes, 1 and 1000 in turn: rms speed at the end [m/s]", alternating.rms, 0.05);
     Ok(())
@@ -56,16 +52,13 @@ pub(super) fn heavy_tops(setup: &Setup, checks: &mut Checks) -> Result<()> {
 pub(super) fn redundancy(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for side in [1, 2, 4] {
         let mut simulation = setup.simulation(cube_on_pads(side))?;
-        for _ in 0..300 {
-            simulation.step(DT)?;
-        }
+        (0..300).try_for_each(|_| simulation.step(DT).map(drop))?;
         let (points, asymmetry) = asymmetry(simulation.manifolds(), side);
         checks.at_most(format!("{points} points: asymmetry of the forces"), asymmetry, 0.05);
     }
-    let planks = Scene::find("kapla", &["storeys=9".into()])?.world;
-    for (what, world) in
-        [("64 points".to_owned(), cube_on_pads(4)), (format!("{} planks", planks.dynamic_count()), planks)]
-    {
+    let planks = Scene::find_spec("kapla:storeys=9")?.world;
+    let worlds = [("64 points".to_owned(), cube_on_pads(4)), (format!("{} planks", planks.dynamic_count()), planks)];
+    for (what, world) in worlds {
         let (growth, left) = convergence(setup, world)?;
         checks.at_most(format!("{what}: largest growth of e_vel as sweeps double"), growth, 1.0);
         checks.at_most(format!("{what}: e_vel after {SWEEPS} sweeps"), left, 1e-3);
@@ -85,11 +78,11 @@ fn cube_on_pads(side: usize) -> World {
     world
 }
 
-/// Contact points, and by what share the force on a pad is off the mean of the pads that are its mirror images.
+/// The number of contact points, and the largest relative difference of the force on a pad from the mean over its mirror images.
 fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usize) -> (usize, f64) {
     let force = |m: &SolvedManifold| m.points().iter().map(|p| f64::from(p.normal_impulse)).sum::<f64>();
     let points = manifolds.clone().map(|m| m.points().len()).sum();
-    // Pads are the first bodies, in rows.
+    // The pads are the first bodies, row by row.
     let mut forces = vec![f64::NAN; side * side];
     manifolds.for_each(|m| forces[m.body_a.min(m.body_b)] = force(&m));
     let image = |i: usize| {
@@ -105,7 +98,7 @@ fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usiz
     (points, largest(0.0, worst))
 }
 
-/// By how much e_vel grows most as plain sweeps in f64 double, over the first step of a world, and what is left of it.
+/// The largest growth of e_vel when the number of plain f64 sweeps over the first step doubles, and the last e_vel.
 fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
     let problem = setup.simulation(world)?.step_with_contacts("first step", DT)?.0;
     let mut solver = Solver::new(&problem, Method::Plain, Order::Manifolds, None)?;
@@ -117,7 +110,7 @@ fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
     let (mut growth, mut before) = (0.0_f64, error(1)?);
     for power in 0..SWEEPS.ilog2() {
         let e = error(1 << power)?;
-        // Below that it is rounding.
+        // Smaller errors are rounding.
         growth = largest(growth, [if e < 1e-12 { 0.0 } else { e / before }]);
         before = e;
     }
@@ -125,36 +118,35 @@ fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
 }
 
 pub(super) fn cards(setup: &Setup, checks: &mut Checks) -> Result<()> {
-    let outcome = setup.run("card-house", &["storeys=5", "length=0.4", "thickness=0.002"], TEN)?;
+    let outcome = setup.run("card-house:storeys=5,length=0.4,thickness=0.002", TEN)?;
     checks.stands(&outcome, "34 cards");
     checks.at_most("34 cards: deepest overlap [mm]", 1e3 * outcome.deepest, 1.0);
     Ok(())
 }
 
 pub(super) fn kapla(setup: &Setup, checks: &mut Checks) -> Result<()> {
-    let outcome = setup.run("kapla", &[], 3600)?;
+    let outcome = setup.run("kapla", 3600)?;
     checks.stands(&outcome, "105 planks");
     checks.at_most("105 planks: drift [m]", outcome.drift, 0.1);
     Ok(())
 }
 
 pub(super) fn arches(setup: &Setup, checks: &mut Checks) -> Result<()> {
-    let thick = setup.run("arch", &["voussoirs=31", "thickness=0.12"], TEN)?;
-    let thin = setup.run("arch", &["voussoirs=31", "thickness=0.095"], TEN)?;
-    checks.stands(&thick, "0.12 of the radius");
-    checks.at_least("0.095 of the radius: stones out of place", thin.fallen, 1.0);
+    let thin = setup.run("arch:voussoirs=31,thickness=0.095", TEN)?;
+    checks.stands(&setup.run("arch:voussoirs=31,thickness=0.12", TEN)?, "0.12 of the radius");
+    checks.add("0.095 of the radius: stones out of place".into(), thin.fallen, Limit::AtLeast(1.0));
     Ok(())
 }
 
 pub(super) fn aqueduct(setup: &Setup, checks: &mut Checks) -> Result<()> {
-    let outcome = setup.run("aqueduct", &["arches=8"], TEN)?;
+    let outcome = setup.run("aqueduct:arches=8", TEN)?;
     checks.stands(&outcome, "stones");
     checks.at_most("stones: rms speed at the end [m/s]", outcome.rms, 1e-3);
     Ok(())
 }
 
 pub(super) fn large_pyramid(setup: &Setup, checks: &mut Checks) -> Result<()> {
-    let outcome = setup.run("pyramid", &["base=100"], 10_000)?;
+    let outcome = setup.run("pyramid:base=100", 10_000)?;
     checks.stands(&outcome, "boxes");
     checks.at_most("boxes: drift [m]", outcome.drift, 0.1);
     checks.at_most("boxes: rms speed at the end [m/s]", outcome.rms, 0.05);
@@ -167,12 +159,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn forces_that_lean_to_one_side_are_seen() {
+    fn an_eccentric_load_has_asymmetric_forces() {
         let mut world = cube_on_pads(2);
         let lopsided = world.bodies[4].clone().position(0.2, 1.0, 0.0);
         let measure = |world: World| {
             let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn drystone::Backend>);
-            // With 8 substeps the order of the pads in a sweep shows: 0.07.
+            // With 8 substeps the order of the pads in a sweep makes the asymmetry 0.07.
             let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
             let setup = Setup { config, open: &open };
             let mut simulation = setup.simulation(world).expect("a simulation");

@@ -1,50 +1,43 @@
-//! A map as a world: the board is one kinematic body of triangles, so that the ball rolls over one surface.
+//! A map as a world: the board is one kinematic triangle mesh.
 //!
-//! Boxes side by side, which are the obvious board, catch a ball that has sunk in by ever so little at the side of the next
-//! box. Between triangles that know their neighbors only the one below the ball answers, with its own normal.
+//! On a board of boxes side by side, a ball that overlaps the floor slightly hits the side of the next box. In a mesh, triangles know
+//! their neighbors, and only the triangle below the ball has a contact, with its own normal.
 
 use std::collections::HashMap;
 
 use glam::{Quat, Vec2, Vec3};
 
 use super::map::{Cell, Map};
-use drystone::Result;
-use drystone::scenes::Scene;
-use drystone::world::{Body, Shape, World};
+use drystone::{Body, Result, Scene, Shape, World};
 
-/// Side of a cell (m).
+// Side of a cell, radii of ball and hole, height of the walls and depth of the holes (m).
 pub const CELL: f32 = 0.06;
-/// Radius of the ball (m).
 pub const RADIUS: f32 = 0.015;
-/// Radius of a hole (m).
 const HOLE: f32 = 0.4 * CELL;
-/// Height of the walls, and depth of the holes (m).
 const HEIGHT: f32 = 0.022;
 const DEPTH: f32 = 0.04;
 /// Corners of a hole, a multiple of four.
 const SEGMENTS: u16 = 24;
-/// Steps a second.
+/// Steps per second.
 const RATE: f32 = 120.0;
 
-/// Index of the board in the world of [`scene`].
+// Indices of the bodies in the world of [`scene`].
 pub const BOARD: usize = 0;
-/// Index of the floor of the goal.
 pub const GOAL: usize = 1;
-/// Index of the ball.
 pub const BALL: usize = 3;
 
-/// The world of a map: board, goal and lids of the walls (kinematic, around the origin), and the ball at rest on the start. Rows go
+/// The world of a map: kinematic board, goal and lids of the walls around the origin, and the ball at rest on the start. Rows lie
 /// along z, columns along x; the floor is at y = 0.
 pub fn scene(map: &Map) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::kinematic().named("board").shape(surface(map)?));
-    // A body of its own, so that it shows. Edges that end a surface have its normal too: the ball notices nothing.
+    // The goal is a separate body, so that it has another color. Boundary edges have the normal of their surface, so the ball rolls on.
     let mut plate = Surface::default();
     plate.quad(corners(map, map.goal.0 as isize, map.goal.1 as isize), Vec3::Y);
-    world.add(Body::kinematic().named("goal").shape(plate.shape()?));
+    world.add(Body::kinematic().named("goal").shape(Shape::mesh(plate.vertices, plate.triangles)?));
     let mut lids = Body::kinematic().named("walls");
     for (place, half_length) in wall_runs(map) {
-        // Above the ball's middle by more than its contacts look.
+        // The lid is beyond the contact distance of the ball.
         let lid = Shape::cuboid(half_length, 0.0005, 0.5 * CELL);
         lids = lids.shape_at(lid, place + (HEIGHT + 0.0005) * Vec3::Y, Quat::IDENTITY);
     }
@@ -55,7 +48,6 @@ pub fn scene(map: &Map) -> Result<Scene> {
     Ok(Scene { dt: 1.0 / RATE, ..Scene::new(format!("maze {}", map.name), world, 10 * RATE as u32) })
 }
 
-/// Middle of a cell on the floor of the board (m).
 pub fn center_of(map: &Map, (row, column): (usize, usize)) -> Vec3 {
     corner(map, row as f32 + 0.5, column as f32 + 0.5)
 }
@@ -69,16 +61,16 @@ fn corners(map: &Map, row: isize, column: isize) -> [Vec3; 4] {
     [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(r, c)| corner(map, (row + r) as f32, (column + c) as f32))
 }
 
-/// How far the ball is from what it can touch (m); negative when it overlaps.
+/// Distances of the ball from floor and walls (m); an overlap is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gap {
-    /// From the floor; none over a hole.
+    /// None over a hole.
     pub floor: Option<f32>,
-    /// From the nearest wall; infinite if none is in one of the cells around.
+    /// Distance from the nearest wall in the cells around; infinite without one.
     pub wall: f32,
 }
 
-/// Distances of a ball whose middle is at `ball`, on the board.
+/// The gap of a ball with its center at `ball`, in the frame of the board.
 pub(super) fn gap(map: &Map, ball: Vec3) -> Gap {
     let origin = corner(map, 0.0, 0.0);
     let (row, column) = (((ball.z - origin.z) / CELL).floor(), ((ball.x - origin.x) / CELL).floor());
@@ -99,13 +91,13 @@ pub(super) fn gap(map: &Map, ball: Vec3) -> Gap {
     gap
 }
 
-/// Cells with the rim of walls around them.
+/// All cells, and the rim of walls around them.
 fn places(map: &Map) -> impl Iterator<Item = (isize, isize)> {
     let (rows, columns) = (map.rows as isize, map.columns as isize);
     (-1..=rows).flat_map(move |row| (-1..=columns).map(move |column| (row, column)))
 }
 
-/// Middle and half length of each run of walls in a row.
+/// Center and half length of each run of walls in a row.
 fn wall_runs(map: &Map) -> Vec<(Vec3, f32)> {
     let mut runs: Vec<(isize, isize, isize)> = Vec::new();
     for (row, column) in places(map).filter(|&(r, c)| map.at(r, c) == Cell::Wall) {
@@ -120,7 +112,6 @@ fn wall_runs(map: &Map) -> Vec<(Vec3, f32)> {
     runs.iter().map(run).collect()
 }
 
-/// Triangles that share their corners where they meet.
 #[derive(Default)]
 struct Surface {
     vertices: Vec<Vec3>,
@@ -130,7 +121,7 @@ struct Surface {
 
 impl Surface {
     fn vertex(&mut self, p: Vec3) -> u32 {
-        // Equal to a micrometer is equal.
+        // Vertices within a micrometer are the same.
         let key = (p * 1e6).round().as_ivec3().to_array();
         *self.known.entry(key).or_insert_with(|| {
             self.vertices.push(p);
@@ -138,10 +129,10 @@ impl Surface {
         })
     }
 
-    /// A triangle that looks to the side of `normal`.
+    /// Adds a triangle that faces the side of `normal`.
     fn triangle(&mut self, [a, b, c]: [Vec3; 3], normal: Vec3) {
-        let looks = (b - a).cross(c - a).dot(normal) > 0.0;
-        let corners = if looks { [a, b, c] } else { [a, c, b] };
+        let faces = (b - a).cross(c - a).dot(normal) > 0.0;
+        let corners = if faces { [a, b, c] } else { [a, c, b] };
         let triangle = corners.map(|p| self.vertex(p));
         self.triangles.push(triangle);
     }
@@ -151,18 +142,13 @@ impl Surface {
         self.triangle([a, c, d], normal);
     }
 
-    fn shape(self) -> Result<Shape> {
-        Shape::mesh(self.vertices, self.triangles)
-    }
-
-    /// Upright, from `low` to `high` below and above the edge from `a` to `b`.
+    /// Adds a vertical rectangle on the edge from `a` to `b`, from height `low` to `high`.
     fn upright(&mut self, a: Vec3, b: Vec3, (low, high): (f32, f32), normal: Vec3) {
         let at = |p: Vec3, y: f32| p + y * Vec3::Y;
         self.quad([at(a, low), at(b, low), at(b, high), at(a, high)], normal);
     }
 }
 
-/// Floor, holes, walls and the sides of the board.
 fn surface(map: &Map) -> Result<Shape> {
     let mut surface = Surface::default();
     let (rows, columns) = (map.rows as isize, map.columns as isize);
@@ -177,7 +163,7 @@ fn surface(map: &Map) -> Result<Shape> {
             Cell::Wall => surface.quad(corners.map(|p| p + HEIGHT * Vec3::Y), Vec3::Y),
             Cell::Hole => hole(&mut surface, corners),
         }
-        // The edge that it shares with each neighbor, and the way there.
+        // The neighbors, in the order of the edges of the cell.
         let neighbors = [(-1, 0), (0, 1), (1, 0), (0, -1)];
         for (k, (down, right)) in neighbors.into_iter().enumerate() {
             let (a, b) = (corners[k], corners[(k + 1) % 4]);
@@ -189,10 +175,10 @@ fn surface(map: &Map) -> Result<Shape> {
             }
         }
     }
-    surface.shape()
+    Shape::mesh(surface.vertices, surface.triangles)
 }
 
-/// Floor around a round hole in the middle of a cell, and the wall of the hole.
+/// Adds the floor around a round hole in a cell, and the wall of the hole.
 fn hole(surface: &mut Surface, corners: [Vec3; 4]) {
     let middle = 0.5 * (corners[0] + corners[2]);
     let rim = |k: u16| {
@@ -200,7 +186,7 @@ fn hole(surface: &mut Surface, corners: [Vec3; 4]) {
         let Vec2 { x, y } = HOLE * Vec2::from_angle(angle);
         middle + Vec3::new(x, 0.0, y)
     };
-    // Angles go from x to z: the quarters have the corners right-front, left-front, left-back, right-back.
+    // Angles go from x to z: the corners of the quarters are right front, left front, left back, right back.
     let quarter = |k: u16| corners[[2, 3, 0, 1][usize::from(k * 4 / SEGMENTS) % 4]];
     for k in 0..SEGMENTS {
         let (a, b) = (rim(k), rim(k + 1));
@@ -218,13 +204,13 @@ mod tests {
     use crate::maze::BOARDS;
 
     #[test]
-    fn the_floor_is_closed_but_for_the_holes_and_the_plate_of_the_goal() {
+    fn the_floor_is_closed_except_for_the_holes_and_the_goal() {
         for (name, text) in BOARDS {
             let map = Map::parse(name, text).expect(name);
             let (vertices, triangles) = surface(&map).expect("a surface").triangles();
             let area = |t: &[u32; 3]| {
                 let [a, b, c] = t.map(|i| vertices[i as usize]);
-                // Seen from above: walls count with their lids, upright sides with nothing.
+                // The area seen from above: vertical sides have none.
                 0.5 * (b - a).cross(c - a).y
             };
             assert!(triangles.iter().all(|t| area(t) > -1e-9), "nothing looks down");

@@ -1,4 +1,4 @@
-//! The game: tilts the board, steps the world, and knows when it is won or lost.
+//! The game: tilts the board, steps the world, and decides whether the game is won or lost.
 
 use glam::{Quat, Vec3};
 use serde::Serialize;
@@ -6,57 +6,45 @@ use serde::Serialize;
 use super::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
 use super::map::Map;
 use super::script::{Script, TILT_LIMIT};
-use drystone::Result;
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
-use drystone::world::World;
+use drystone::{Backend, Result, Scene, Simulation, SolverConfig, World};
 
-/// How fast the board tilts (degrees/s).
+/// Rate of the tilt (degrees/s).
 const TILT_RATE: f32 = 60.0;
-/// Steps after which a ball on the floor rolls: a tenth of a second.
+/// Steps of contact with the floor alone after which the ball rolls: a tenth of a second.
 const SETTLED: u32 = 12;
-/// The ball is on the floor if it is nearer than this, and off the walls if it is further from them than that (m). A board that
-/// turns back throws the ball up by some micrometers.
+/// Largest distance of a ball on the floor (m). A board that turns back lifts the ball by some micrometers.
 const ON_FLOOR: f32 = 2e-6;
+/// Least distance of a free ball from the walls (m).
 const OFF_WALLS: f32 = 2e-5;
-/// The ball has arrived when its middle is this near to the goal's (m).
+/// Largest distance between the centers of ball and goal at the end of a game that is won (m).
 const ARRIVED: f32 = 0.4 * CELL;
 
-/// How a game ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// The ball is at the goal: won.
+    /// Won: the ball is at the goal.
     Goal,
-    /// The ball fell into a hole: lost.
+    /// Lost: the ball fell into a hole.
     Hole,
-    /// The script ended before either.
+    /// The script ended first.
     Time,
 }
 
-/// Speed of the ball's surface against the floor where they touch, while it rolls: it has touched nothing else for a tenth of
-/// a second, in which friction ends what a wall began (m/s).
+/// Slip of the rolling ball: the relative speed of ball and floor at their contact (m/s), in the given number of steps. The ball rolls
+/// if it touched nothing else for a tenth of a second, in which friction ends the slip that a wall causes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Slip {
-    /// Root of the mean square.
     pub rms: f64,
-    /// Largest.
     pub max: f64,
-    /// Steps that were measured.
     pub steps: u32,
 }
 
-/// What moves the bodies of a game: drystone's [`Simulation`], or another engine that is compared with it.
+/// The engine of a game: drystone's [`Simulation`], or another one for comparison.
 pub trait Engine {
-    /// What it is called.
     fn name(&self) -> String;
-    /// The bodies as they are.
     fn world(&self) -> &World;
-    /// The same, to write the velocities of the kinematic ones.
+    /// The game writes the velocities of kinematic bodies.
     fn world_mut(&mut self) -> &mut World;
-    /// Moves them by `dt` seconds.
     fn step(&mut self, dt: f32) -> Result<()>;
 }
 
@@ -78,30 +66,30 @@ impl Engine for Simulation {
     }
 }
 
-/// A game that is played.
 pub struct Game {
-    /// The board.
     pub map: Map,
     engine: Box<dyn Engine>,
-    /// How it ended, if it did.
+    /// None while the game runs.
     pub outcome: Option<Outcome>,
-    /// Tilts of the board now, to the right and to the front (degrees).
+    /// Tilts of the board to the right and to the front (degrees).
     pub tilt: [f32; 2],
     steps: u32,
     dt: f32,
-    /// Steps for which the floor was all that the ball touched.
+    /// Last steps in which the ball touched only the floor.
     rolled: u32,
-    slips: (f64, f64, u32),
+    slip: Slip,
+    /// Sum of the squares of the slip (m²/s²).
+    squares: f64,
+    /// Deepest overlap with floor or walls at the end of a step (m).
     deepest: f32,
 }
 
 impl Game {
-    /// A game that has not begun.
     pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         Self::with(map, |scene| Ok(Box::new(Simulation::new(scene.world, config, backend)?)))
     }
 
-    /// A game that has not begun, moved by the engine that `build` makes for its scene.
+    /// A game with the engine that `build` makes for its scene.
     pub fn with(map: Map, build: impl FnOnce(Scene) -> Result<Box<dyn Engine>>) -> Result<Self> {
         let scene = scene(&map)?;
         Ok(Self {
@@ -112,17 +100,18 @@ impl Game {
             dt: scene.dt,
             engine: build(scene)?,
             rolled: 0,
-            slips: (0.0, 0.0, 0),
+            slip: Slip::default(),
+            squares: 0.0,
             deepest: 0.0,
         })
     }
 
-    /// Board and ball: bodies [`BOARD`] and [`BALL`], and what else is seen.
+    /// Board and ball are the bodies [`BOARD`] and [`BALL`].
     pub fn world(&self) -> &World {
         self.engine.world()
     }
 
-    /// Seconds since the start.
+    /// Time since the start (s).
     pub fn time(&self) -> f32 {
         self.steps as f32 * self.dt
     }
@@ -132,13 +121,13 @@ impl Game {
         self.dt
     }
 
-    /// Where the ball is, on the board (m).
+    /// Position of the ball in the frame of the board (m).
     pub fn ball(&self) -> Vec3 {
         let bodies = &self.world().bodies;
         bodies[BOARD].rotation.inverse() * bodies[BALL].position
     }
 
-    /// Tilts the board towards `wanted` (right and front, degrees) and moves everything by one step, unless the game has ended.
+    /// Tilts the board towards `wanted` (right and front, degrees) and makes one step, unless the game has ended.
     pub fn step(&mut self, wanted: [f32; 2]) -> Result<()> {
         if self.outcome.is_some() {
             return Ok(());
@@ -167,8 +156,7 @@ impl Game {
         Ok(())
     }
 
-    /// Overlap, and slip while the floor is all that the ball touches: from poses and velocities alone, so that engines can be
-    /// compared.
+    /// Measures overlap and slip by poses and velocities alone, so that engines can be compared.
     fn measure(&mut self) {
         let gap = gap(&self.map, self.ball());
         self.deepest = self.deepest.max(-gap.floor.unwrap_or(0.0)).max(-gap.wall);
@@ -179,61 +167,39 @@ impl Game {
             let (board, ball) = (&bodies[BOARD], &bodies[BALL]);
             let at = ball.position - RADIUS * (board.rotation * Vec3::Y);
             let slip = f64::from((ball.velocity_at(at) - board.velocity_at(at)).length());
-            let (squares, max, steps) = &mut self.slips;
-            *squares += slip * slip;
-            *max = max.max(slip);
-            *steps += 1;
+            self.squares += slip * slip;
+            let steps = self.slip.steps + 1;
+            self.slip = Slip { rms: (self.squares / f64::from(steps)).sqrt(), max: self.slip.max.max(slip), steps };
         }
-    }
-
-    /// Slip so far.
-    pub fn slip(&self) -> Slip {
-        let (squares, max, steps) = self.slips;
-        Slip { rms: (squares / f64::from(steps.max(1))).sqrt(), max, steps }
-    }
-
-    /// Deepest overlap with floor or walls at the end of any step so far (m).
-    pub fn penetration(&self) -> f32 {
-        self.deepest
     }
 }
 
-/// Where the ball was.
+/// Position of the ball on the board at a time (s): to the right, up and to the front of the center (m).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
-    /// Seconds since the start.
     pub time: f32,
-    /// Place on the board: to the right, up, to the front of its middle (m).
     pub ball: [f32; 3],
 }
 
-/// A game as it went.
 #[derive(Clone, Debug, Serialize)]
 pub struct Played {
-    /// Name of the board.
     pub board: String,
-    /// What moved the bodies.
     pub engine: String,
-    /// How it ended.
     pub outcome: Outcome,
-    /// When it ended (s).
     pub time: f32,
-    /// Steps until then.
     pub steps: u32,
     /// Deepest overlap (m).
     pub penetration: f32,
-    /// Slip while rolling.
     pub slip: Slip,
-    /// The ball's way, 20 samples a second.
+    /// Positions of the ball, 20 per second.
     pub track: Vec<Sample>,
 }
 
-/// Steps between two samples of the track.
+// Steps between two samples of the track, and samples per second.
 const SAMPLE: u32 = 6;
-/// Samples of the track a second.
 pub const SAMPLES: f64 = 20.0;
 
-/// Plays `script` to its end, or until the game is won or lost. `game` has not begun; `watch` sees every sample of the track.
+/// Plays `script` until it ends or the game is won or lost. `watch` gets the game at every sample of the track.
 pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Result<Played> {
     let mut track = Vec::new();
     loop {
@@ -251,8 +217,8 @@ pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Re
         outcome: game.outcome.unwrap_or(Outcome::Time),
         time: game.time(),
         steps: game.steps,
-        penetration: game.penetration(),
-        slip: game.slip(),
+        penetration: game.deepest,
+        slip: game.slip,
         engine: game.engine.name(),
         board: game.map.name,
         track,

@@ -5,45 +5,38 @@ use std::path::Path;
 use drystone::stages::suggest::hint;
 use drystone::{Error, Result};
 
-/// What is at one place of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
-    /// The ball rolls here.
     Floor,
-    /// Higher than the ball.
     Wall,
-    /// A round hole that the ball falls through.
+    /// A round hole, wider than the ball.
     Hole,
 }
 
-/// Rows of cells, and where the ball begins and ends.
+/// A board: rows of cells, start and goal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Map {
-    /// Name of the board, or of its file.
     pub name: String,
     /// Rows from the far side to the near side.
     pub rows: usize,
     /// Cells in a row, from left to right.
     pub columns: usize,
     cells: Vec<Cell>,
-    /// Row and column where the ball begins.
+    /// Rows and columns of start and goal.
     pub start: (usize, usize),
-    /// Row and column where it must come.
     pub goal: (usize, usize),
 }
 
-/// The boards that come with the crate, by growing difficulty.
 pub const BOARDS: [(&str, &str); 3] = [
     ("easy", include_str!("../../mazes/easy.txt")),
     ("medium", include_str!("../../mazes/medium.txt")),
     ("hard", include_str!("../../mazes/hard.txt")),
 ];
 
-/// Most rows and columns.
+/// Largest number of rows and columns.
 const MOST: usize = 64;
 
 impl Map {
-    /// Finds a board by its name, else reads the file of that name.
     pub fn find(name_or_path: &str) -> Result<Self> {
         if let Some((name, text)) = BOARDS.iter().find(|b| b.0 == name_or_path) {
             return Self::parse(name, text);
@@ -58,8 +51,8 @@ impl Map {
         Self::parse(name_or_path, &text)
     }
 
-    /// Reads a map: `.` floor, `#` wall, `O` hole, `S` start, `G` goal; one line a row, all of one length. Lines that begin with
-    /// `;` and empty lines are left out. Beyond the map is wall.
+    /// Reads a map: `.` floor, `#` wall, `O` hole, `S` start, `G` goal; a line is a row, and all rows have one length. Empty lines and
+    /// lines that begin with `;` are ignored.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let refuse = |line: usize, column: usize, what: String| {
             Err(Error::input(format!("{name}: line {line}, column {column}: {what}")))
@@ -101,8 +94,8 @@ impl Map {
                 return refuse(line, MOST + 1, format!("more than {MOST} columns"));
             }
             if count != columns {
-                let first = "the first row";
-                return refuse(line, count.min(columns) + 1, format!("{count} cells; {first} has {columns}"));
+                let what = format!("{count} cells; the first row has {columns}");
+                return refuse(line, count.min(columns) + 1, what);
             }
             rows += 1;
         }
@@ -113,7 +106,7 @@ impl Map {
         Ok(Self { name: name.into(), rows, columns, cells, start, goal })
     }
 
-    /// What is at a place; wall beyond the map.
+    /// The cell at a place; beyond the map there are walls.
     pub fn at(&self, row: isize, column: isize) -> Cell {
         let inside = |x: isize, end: usize| usize::try_from(x).ok().filter(|&x| x < end);
         match (inside(row, self.rows), inside(column, self.columns)) {
@@ -132,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_boards_that_come_with_the_crate_are_maps_with_more_and_more_holes() {
+    fn the_boards_of_the_crate_have_increasing_numbers_of_holes() {
         let holes = BOARDS.map(|(name, text)| {
             let map = Map::parse(name, text).expect(name);
             map.cells.iter().filter(|c| **c == Cell::Hole).count()

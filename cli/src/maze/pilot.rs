@@ -1,4 +1,4 @@
-//! Finds the way to the goal and writes a script that follows it.
+//! Finds a way to the goal and a script that follows it.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -11,9 +11,9 @@ use super::map::{Cell, Map};
 use super::script::{Script, TILT_LIMIT};
 use drystone::{Error, Result};
 
-/// Steps from one point of the script to the next: 0.05 s.
+/// Steps between two points of the script: 0.05 s.
 const HOLD: u32 = 6;
-/// Pull towards the next cell (1/s²) and damping (1/s): a little less than critical.
+/// Stiffness towards the next cell (1/s²) and damping (1/s): slightly less than critical.
 const PULL: f32 = 9.0;
 const DAMPING: f32 = 5.0;
 /// Acceleration of a ball that rolls on a slope of 1 (m/s²).
@@ -21,7 +21,7 @@ const ROLLING: f32 = 9.81 * 5.0 / 7.0;
 /// Longest script (s).
 const PATIENCE: f32 = 120.0;
 
-/// Plays `game`, which has not begun, and returns the script that wins it, with 3 s to spare.
+/// Plays `game` and returns the script that wins it, with 3 s to spare.
 pub fn pilot(mut game: Game) -> Result<Script> {
     let way: Vec<Vec2> = way(&game.map).iter().map(|&cell| center_of(&game.map, cell).xz()).collect();
     if way.is_empty() {
@@ -41,7 +41,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
         let acceleration = PULL * (way[next] - at) - DAMPING * speed;
         let slope = |a: f32| ((a / ROLLING).atan().to_degrees().clamp(-TILT_LIMIT, TILT_LIMIT) * 100.0).round() / 100.0;
         wanted = [slope(acceleration.x), slope(acceleration.y)];
-        // The script reaches what is wanted at its next point; it is played just as it will be read.
+        // The script reaches the wanted tilt at its next point. The pilot plays the rounded times that `Script::text` writes.
         let end = (game.time() + HOLD as f32 * game.dt()) * 1000.0;
         script.push(end.round() / 1000.0, wanted);
         for _ in 0..HOLD {
@@ -50,7 +50,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
     }
     match game.outcome {
         Some(Outcome::Goal) => {
-            // Held for a while, for a ball that is a little late.
+            // The last tilt is held for a ball that is late.
             script.push(script.end() + 3.0, wanted);
             Ok(script)
         }
@@ -58,7 +58,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
     }
 }
 
-/// Cells from the start to the goal by the shortest way that keeps off holes where it can; empty if there is none.
+/// Cells of the cheapest way from the start to the goal, where cells beside holes cost more; empty without a way.
 fn way(map: &Map) -> Vec<(usize, usize)> {
     let place = |(row, column): (usize, usize)| (row as isize, column as isize);
     let free = |(row, column): (isize, isize)| map.at(row, column) == Cell::Floor;
@@ -74,7 +74,7 @@ fn way(map: &Map) -> Vec<(usize, usize)> {
         if cost > best[&(row, column)].0 {
             continue;
         }
-        // Straight on only: a ball that cuts a corner meets it.
+        // No diagonal steps: the ball would hit the corner of a wall.
         for (r, c) in &around[..4] {
             let there = (row + r, column + c);
             let cost = cost + price(there);
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_way_is_the_shortest_that_keeps_off_holes() {
+    fn the_way_avoids_holes() {
         let map = Map::parse("m", "S.O.G\n.....\n.....\n").expect("a map");
         let cells = way(&map);
         assert!(cells.iter().all(|&(row, _)| row < 3) && cells.contains(&(2, 2)), "{cells:?}");
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_way_there_is_none() {
+    fn a_goal_behind_walls_has_no_way() {
         assert!(way(&Map::parse("m", "S#G\n.#.\n").expect("a map")).is_empty());
     }
 }

@@ -4,18 +4,18 @@ use std::fmt::Write;
 
 use drystone::{Error, Result};
 
-/// Furthest that the board tilts about either axis (degrees).
+/// Largest tilt of the board about either axis (degrees).
 pub const TILT_LIMIT: f32 = 8.0;
 
-/// What the board is asked to tilt to, piece by piece on straight lines.
+/// The wanted tilts of the board over time, linear between points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Script {
-    /// Time (s), ascending, and the tilts to the right and to the front (degrees).
+    /// Ascending times (s) and tilts to the right and to the front (degrees).
     points: Vec<(f32, [f32; 2])>,
 }
 
 impl Script {
-    /// Reads a script: one `time right front` a line, seconds and degrees; `#` begins a comment.
+    /// Reads a script: each line is `time right front` in seconds and degrees; `#` begins a comment.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let mut script = Self::default();
         for (line, row) in (1..).zip(text.lines()) {
@@ -24,7 +24,7 @@ impl Script {
             };
             let row = row.split('#').next().unwrap_or_default();
             let words: Vec<&str> = row.split_whitespace().collect();
-            // Words are parts of the row, so the difference of their places is where they stand.
+            // The words are slices of the row: the difference of the addresses is the column.
             let column = |word: &str| word.as_ptr() as usize - row.as_ptr() as usize;
             if words.is_empty() {
                 continue;
@@ -44,10 +44,8 @@ impl Script {
             }
             for (tilt, word) in [(right, words[1]), (front, words[2])] {
                 if tilt.abs() > TILT_LIMIT {
-                    return Err(refuse(
-                        column(word),
-                        format!("{tilt} degrees: the board tilts by {TILT_LIMIT} at most"),
-                    ));
+                    let what = format!("{tilt} degrees: the board tilts by {TILT_LIMIT} at most");
+                    return Err(refuse(column(word), what));
                 }
             }
             script.points.push((time, [right, front]));
@@ -58,17 +56,15 @@ impl Script {
         Ok(script)
     }
 
-    /// Adds a point after the last one.
     pub fn push(&mut self, time: f32, tilt: [f32; 2]) {
         self.points.push((time, tilt));
     }
 
-    /// When it ends (s).
     pub fn end(&self) -> f32 {
         self.points.last().map_or(0.0, |p| p.0)
     }
 
-    /// Tilts to the right and to the front at a time (degrees): none before the first point, those of the last after it.
+    /// Tilts to the right and to the front at a time (degrees). The first point is reached from zero at time 0; the last tilt lasts.
     pub fn at(&self, time: f32) -> [f32; 2] {
         let after = self.points.partition_point(|p| p.0 <= time);
         let earlier = if after == 0 { (0.0, [0.0; 2]) } else { self.points[after - 1] };
@@ -81,7 +77,7 @@ impl Script {
     pub fn text(&self) -> String {
         let mut text = String::from("# time right front: seconds, degrees\n");
         for (time, [right, front]) in &self.points {
-            // Writing to memory does not fail.
+            // Writing to memory cannot fail.
             let _ = writeln!(text, "{time} {right} {front}");
         }
         text
@@ -93,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_its_points_a_script_is_straight() {
+    fn a_script_is_linear_between_its_points() {
         let script = Script::parse("s", "# a comment\n1 2 -4\n\n3 4 0 # another\n").expect("a script");
         assert_eq!(script.at(0.5), [1.0, -2.0]);
         assert_eq!(script.at(2.0), [3.0, -2.0]);

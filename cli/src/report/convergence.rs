@@ -1,49 +1,34 @@
-//! `drystone report convergence`: how many sweeps contact problems take to which error, plain and accelerated.
+//! `drystone report convergence`: sweeps that contact problems need to reach an error, plain and accelerated.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use drystone::Simulation;
-use drystone::backend::cpu::Cpu;
-use drystone::config::{Method, SolverConfig};
-use drystone::contacts::ContactProblem;
-use drystone::scenes::Scene;
-use drystone::solver::Order;
+use drystone::config::Method;
 use drystone::stats::median;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
 
 use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};
 
-/// Scenes of the catalogue whose steps are solved, with their parameters and the step.
-const STEPS: [(&str, &[&str], u32); 5] = [
-    ("tower", &["n=10"], 30),
-    ("wall", &["rows=8", "columns=8"], 60),
-    ("pyramid", &[], 30),
-    ("pile", &["n=200"], 90),
-    ("pile", &["n=200"], 300),
-];
+/// Catalogue scenes, each with the step that is solved.
+const STEPS: [(&str, u32); 5] =
+    [("tower:n=10", 30), ("wall:rows=8,columns=8", 60), ("pyramid", 30), ("pile:n=200", 90), ("pile:n=200", 300)];
 
-/// What is compared: a method, and how often a manifold is swept before the next one.
+/// Kinds of sweeps: the method, and the passes over a manifold before the next one.
 const KINDS: [(Method, u8); 4] =
     [(Method::Plain, 1), (Method::Plain, 2), (Method::Accelerated, 1), (Method::Accelerated, 2)];
 
-/// Most sweeps of one solve.
 const MOST: u32 = 40_000;
 
-/// Scenes that are run under settings with equal numbers of sweeps, and their steps.
-const RUNS: [(&str, &[&str], u32); 4] = [
-    ("tower", &["n=20", "offset=0.01"], 300),
-    ("wall", &[], 120),
-    ("mass-ratio", &["ratio=1000"], 300),
-    ("pile", &["n=1000"], 180),
-];
+/// Scenes that run with equal numbers of sweeps, and their steps.
+const RUNS: [(&str, u32); 4] =
+    [("tower:n=20,offset=0.01", 300), ("wall", 120), ("mass-ratio:ratio=1000", 300), ("pile:n=1000", 180)];
 
-/// Substeps, and sweeps of each kind in one: 16 or 64 in all.
+/// Substeps, and biased and relax sweeps per substep: 16 or 64 in all.
 const SETTINGS: [(u32, u32); 7] = [(8, 1), (4, 2), (2, 4), (1, 8), (32, 1), (4, 8), (2, 16)];
 
-/// Makes the page from steps of catalogue scenes and the `.contacts` files of `folder`; `after_problem` is called with the
-/// number of problems after each.
+/// Makes the page from steps of catalogue scenes and the `.contacts` files of `folder`. `after_problem` is called after each problem
+/// with the number of problems.
 pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) -> Result<String> {
     let problems = problems(folder)?;
     let mut page = include_str!("convergence_head.md").to_owned();
@@ -53,8 +38,7 @@ pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) 
     Ok(page)
 }
 
-/// How many sweeps `problems` take to which error, and what momentum and repeated passes gain over them; `after_problem` is called
-/// after each.
+/// Writes the sweeps of each kind to each error, and the medians of their gains over plain sweeps with one pass.
 fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: impl FnMut()) -> Result<()> {
     page.push_str(
         "\n| problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |\n|---|--:|---|--:|--:|--:|--:|--:|\n",
@@ -63,22 +47,20 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
     for problem in problems {
         let mut first = None;
         for (kind, (fewer, lower)) in KINDS.iter().zip(&mut gains) {
-            let report = solved(problem, *kind, MOST, 1e-4)?;
+            let solved = |sweeps, tolerance| {
+                SolveReport::new(problem, &SolveSettings::by_manifolds(kind.0, kind.1, sweeps, tolerance), None)
+            };
+            let report = solved(MOST, 1e-4)?;
             let to = |i: usize| report.reached[i].sweeps.map_or(f64::INFINITY, f64::from);
-            let after_32 = solved(problem, *kind, 32, 0.0)?.curve.last().map_or(f64::NAN, |row| row.residuals.e_vel);
+            let after_32 = solved(32, 0.0)?.curve.last().map_or(f64::NAN, |row| row.residuals.e_vel);
             let (plain_sweeps, plain_error) = *first.get_or_insert((to(2), after_32));
             fewer.push(plain_sweeps / to(2));
             lower.push(plain_error / after_32);
             let sweeps = [0, 1, 2, 3].map(|i| report.reached[i].sweeps.map_or("-".into(), |n| n.to_string()));
-            let (name, contacts) = (&problem.name, problem.contacts.len());
-            let (name, contacts) =
-                if *kind == KINDS[0] { (name.as_str(), contacts.to_string()) } else { ("", String::new()) };
-            let _ = writeln!(
-                page,
-                "| {name} | {contacts} | {} | {} | {after_32:.1e} |",
-                kind_name(*kind),
-                sweeps.join(" | ")
-            );
+            let begin =
+                if *kind == KINDS[0] { format!("{} | {}", problem.name, problem.contacts.len()) } else { " | ".into() };
+            let (kind, sweeps) = (kind_name(*kind), sweeps.join(" | "));
+            let _ = writeln!(page, "| {begin} | {kind} | {sweeps} | {after_32:.1e} |");
         }
         after_problem();
     }
@@ -90,15 +72,13 @@ fn solves(page: &mut String, problems: &[ContactProblem], mut after_problem: imp
     Ok(())
 }
 
-/// What plain and accelerated sweeps make of whole runs.
 fn runs(page: &mut String) -> Result<()> {
     page.push_str(include_str!("convergence_runs.md"));
     page.push_str("\n| scene | substeps | sweeps | method | deepest [mm] | rms speed [mm/s] | in place |\n");
     page.push_str("|---|--:|--:|---|--:|--:|--:|\n");
-    for (name, parameters, steps) in RUNS {
-        let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
-        let scene = Scene::find(name, &parameters)?;
-        let mut title = [&[name.to_owned()], &parameters[..]].concat().join(" ");
+    for (spec, steps) in RUNS {
+        let scene = Scene::find_spec(spec)?;
+        let mut title = spec.replace([':', ','], " ");
         for (substeps, sweeps) in SETTINGS {
             // Momentum begins with the third sweep.
             let methods = if sweeps < 3 { &[Method::Plain][..] } else { &[Method::Plain, Method::Accelerated] };
@@ -112,18 +92,15 @@ fn runs(page: &mut String) -> Result<()> {
                 let backend = Box::new(Cpu::new());
                 let mut report = RunReport::new(&scene, &config, &*backend);
                 let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
-                for _ in 0..steps {
-                    report.add(&simulation.step(scene.dt)?);
-                }
+                (0..steps).try_for_each(|_| simulation.step(scene.dt).map(|stats| report.add(&stats)))?;
                 report.measure(&scene, simulation);
-                let (deepest, speed) = (1e3 * report.penetration_max, 1e3 * report.speed_rms);
+                let RunReport { in_place, bodies, penetration_max: deepest, speed_rms: speed, .. } = report;
+                let (deepest, speed, title) = (1e3 * deepest, 1e3 * speed, std::mem::take(&mut title));
                 let method = format!("{method:?}").to_lowercase();
-                let in_place =
-                    if scene.stands { format!("{} of {}", report.in_place, report.bodies) } else { String::new() };
+                let in_place = if scene.stands { format!("{in_place} of {bodies}") } else { String::new() };
                 let _ = writeln!(
                     page,
-                    "| {} | {substeps} | {sweeps} + {sweeps} | {method} | {deepest:.2} | {speed:.2} | {in_place} |",
-                    std::mem::take(&mut title)
+                    "| {title} | {substeps} | {sweeps} + {sweeps} | {method} | {deepest:.2} | {speed:.2} | {in_place} |"
                 );
             }
         }
@@ -135,37 +112,25 @@ fn kind_name((method, passes): (Method, u8)) -> String {
     format!("{method:?}, {passes} pass{}", if passes == 1 { "" } else { "es" }).to_lowercase()
 }
 
-fn solved(
-    problem: &ContactProblem,
-    (method, passes): (Method, u8),
-    sweeps: u32,
-    tolerance: f64,
-) -> Result<SolveReport> {
-    let settings = SolveSettings { method, order: Order::Manifolds, passes, sweeps, tolerance };
-    SolveReport::new(problem, &settings, None)
+/// The contact problem of a step of a scene at default settings without sleep; step 1 is the first.
+pub fn problem_of_step(scene: Scene, step: u32) -> Result<ContactProblem> {
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
+    (1..step).try_for_each(|_| simulation.step(scene.dt).map(drop))?;
+    Ok(simulation.step_with_contacts(&format!("{}, step {step}", scene.name), scene.dt)?.0)
 }
 
 /// Contact problems: steps of catalogue scenes, then the `.contacts` files of a folder by their names.
 pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
     let mut problems = Vec::new();
-    for (name, parameters, step) in STEPS {
-        let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
-        let scene = Scene::find(name, &parameters)?;
-        let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
-        for _ in 1..step {
-            simulation.step(scene.dt)?;
-        }
-        problems.push(simulation.step_with_contacts(&format!("{}, step {step}", scene.name), scene.dt)?.0);
+    for (spec, step) in STEPS {
+        problems.push(problem_of_step(Scene::find_spec(spec)?, step)?);
     }
     if let Some(folder) = folder {
         let entries = std::fs::read_dir(folder).and_then(|all| all.map(|e| e.map(|e| e.path())).collect());
         let mut paths: Vec<_> = entries.map_err(Error::file(folder))?;
         paths.retain(|path| path.extension().is_some_and(|e| e == "contacts"));
         paths.sort();
-        for path in paths {
-            problems.push(ContactProblem::read(path)?);
-        }
+        paths.into_iter().try_for_each(|path| ContactProblem::read(path).map(|problem| problems.push(problem)))?;
     }
     Ok(problems)
 }
@@ -174,24 +139,21 @@ pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
 mod tests {
     use super::*;
 
-    /// The numbers in a cell of the page's tables that begin with this.
+    /// The cells of the rows of the page that begin with this text.
     fn cells(page: &str, begins: &str) -> Vec<Vec<String>> {
         let lines = page.lines().filter(|l| l.starts_with(begins));
         lines.map(|l| l.split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
     }
 
-    /// A tower of four, of which one problem is made: medians over one are its own.
+    /// With one problem, medians are its own values.
     #[test]
     fn gains_are_plain_over_own() {
-        let scene = Scene::find("tower", &["n=4".into()]).expect("the scene");
-        let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("a simulation");
-        let problem = simulation.step_with_contacts("tower", scene.dt).expect("a problem").0;
+        let problem = problem_of_step(Scene::find_spec("tower:n=4").expect("the scene"), 1).expect("a problem");
         let (mut page, mut solved) = (String::new(), 0);
         solves(&mut page, std::slice::from_ref(&problem), || solved += 1).expect("solves");
         assert_eq!(solved, 1);
         // | problem | contacts | sweeps | 1e-1 | 1e-2 | 1e-3 | 1e-4 | after 32 |
-        let first = cells(&page, "| tower | ").remove(0);
+        let first = cells(&page, "| tower, step 1 | ").remove(0);
         let number = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{cell} in {page}"));
         for kind in ["plain, 2 passes", "accelerated, 1 pass", "accelerated, 2 passes"] {
             let own = cells(&page, &format!("|  |  | {kind} |")).remove(0);

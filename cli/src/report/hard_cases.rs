@@ -1,13 +1,12 @@
-//! The page of hard cases: every preset on the CPU, and the default on every backend.
+//! The page of hard cases: every preset on the CPU, and the default preset on every backend.
 
 use std::fmt::Write;
 
-use crate::hard::{Case, Check, Limit, Setup};
+use crate::hard::{Case, Check, Limit, Setup, passes};
 use drystone::Result;
 use drystone::backend::BackendKind;
 use drystone::preset::Preset;
 
-/// What the columns are run with.
 const COLUMNS: [(Preset, BackendKind); 6] = [
     (Preset::Fast, BackendKind::Cpu),
     (Preset::Balanced, BackendKind::Cpu),
@@ -17,38 +16,44 @@ const COLUMNS: [(Preset, BackendKind); 6] = [
     (Preset::Balanced, BackendKind::Gpu),
 ];
 
-/// Whether a case is run in that column: what takes minutes on the CPU takes hours with many substeps or in a software adapter.
+/// Whether a column has a case: a long case would take hours with many substeps or on a software adapter.
 fn is_run(case: &Case, (preset, numbers): (Preset, BackendKind)) -> bool {
     !case.long || numbers == BackendKind::Cpu && preset.config().substeps <= Preset::Balanced.config().substeps
 }
 
-/// Runs that the page takes.
 pub fn count(cases: &[&Case]) -> u64 {
     cases.iter().flat_map(|case| COLUMNS.iter().map(|&column| u64::from(is_run(case, column)))).sum()
 }
 
-/// The page as Markdown. `progress` is called with what begins next.
+/// The page as Markdown. `progress` gets the name of each run before it begins.
 pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     let mut passed = [0; COLUMNS.len()];
     let mut rows = String::new();
     for case in cases {
         let mut columns: Vec<Option<Vec<Check>>> = Vec::new();
         for (k, &(preset, numbers)) in COLUMNS.iter().enumerate() {
-            if !is_run(case, COLUMNS[k]) {
+            if !is_run(case, (preset, numbers)) {
                 columns.push(None);
                 continue;
             }
             progress(&format!("{} {preset} {numbers}", case.name));
             let checks = case.run(&Setup { config: preset.config().without_sleep(), open: &|| numbers.open(false) })?;
-            passed[k] += usize::from(checks.iter().all(|c| c.passed));
+            passed[k] += usize::from(passes(&checks));
             columns.push(Some(checks));
         }
         writeln!(rows, "| **{}** | {} ||||||||", case.name, case.summary).expect("text takes all");
         let asked = columns.iter().flatten().next().map_or(&[][..], |checks| checks);
         for (i, check) in asked.iter().enumerate() {
+            let cell = |check: &Check| match (number(check.value), check.passed) {
+                (value, true) => value,
+                (value, false) => format!("**{value}**"),
+            };
             let cells: Vec<_> = columns.iter().map(|c| c.as_ref().map_or("not run".into(), |c| cell(&c[i]))).collect();
-            writeln!(rows, "| | {} | {} | {} |", check.what, limit(check.limit), cells.join(" | "))
-                .expect("text takes all");
+            let limit = match check.limit {
+                Limit::AtMost(x) => format!("≤ {x}"),
+                Limit::AtLeast(x) => format!("≥ {x}"),
+            };
+            writeln!(rows, "| | {} | {limit} | {} |", check.what, cells.join(" | ")).expect("text takes all");
         }
     }
     let of = |k: usize| cases.iter().filter(|c| is_run(c, COLUMNS[k])).count();
@@ -70,19 +75,7 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     ))
 }
 
-fn limit(limit: Limit) -> String {
-    match limit {
-        Limit::AtMost(x) => format!("≤ {x}"),
-        Limit::AtLeast(x) => format!("≥ {x}"),
-    }
-}
-
-fn cell(check: &Check) -> String {
-    let value = number(check.value);
-    if check.passed { value } else { format!("**{value}**") }
-}
-
-/// A number with as many digits as say something.
+/// A number with three or four significant digits, or a whole number.
 pub fn number(x: f64) -> String {
     if x == 0.0 || (x.fract() == 0.0 && x.abs() < 1e5) {
         format!("{x:.0}")

@@ -1,4 +1,4 @@
-//! What runs came to: one run for people and programs, its motion, and pages made from many runs.
+//! Reports of single runs, and pages from many runs.
 
 pub mod bench;
 pub mod comparison;
@@ -12,7 +12,7 @@ mod scene_hash;
 mod solve;
 mod trajectory;
 
-pub use convergence::{convergence, problems};
+pub use convergence::{convergence, problem_of_step, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
 pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};

@@ -1,4 +1,4 @@
-//! Interleaved measurements: all participants take turns, round after round, so that a slow machine slows all of them.
+//! Interleaved measurements: all participants take turns, so that a slow phase of the machine affects all of them.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use cpu_time::ProcessTime;
 use drystone::Result;
 use drystone::stats::quantile;
 
-/// Lets each of `participants` take its turn, in each of `rounds` rounds; the turn is told the number of its round.
+/// Gives each participant one turn in each round; `turn` gets the number of the round.
 pub fn interleave<T>(
     rounds: usize,
     participants: &mut [T],
@@ -15,30 +15,28 @@ pub fn interleave<T>(
     (0..rounds).try_for_each(|round| participants.iter_mut().try_for_each(|participant| turn(round, participant)))
 }
 
-/// Lower quartile, median and upper quartile of what the turns of a participant gave.
+/// Lower quartile, median and upper quartile of the measurements of the turns.
 pub fn quartiles(turns: &[f64]) -> [f64; 3] {
     [0.25, 0.5, 0.75].map(|q| quantile(turns, q))
 }
 
-/// Processor time of this process where one thread does everything, so that what else the machine does counts less; wall time
-/// where there are several, and where a GPU is waited for.
+/// Processor time of this process for one thread, which depends less on other processes; wall time for several threads and the GPU.
 pub struct Clock {
     processor: bool,
     start: Instant,
 }
 
 impl Clock {
-    /// For work on a backend of this name, in the pool as it is.
+    /// The clock for a backend of this name in the current pool of threads.
     pub fn of(backend: &str) -> Self {
         Self { processor: backend != "gpu" && rayon::current_num_threads() == 1, start: Instant::now() }
     }
 
-    /// `processor` or `wall`.
     pub fn name(&self) -> &'static str {
         if self.processor { "processor" } else { "wall" }
     }
 
-    /// Since some moment.
+    /// Time since a fixed moment.
     pub fn now(&self) -> Duration {
         if self.processor { ProcessTime::now().as_duration() } else { self.start.elapsed() }
     }

@@ -1,4 +1,4 @@
-//! What one run was and what it came to: rows for people, JSON for programs.
+//! Report of one run, as rows and as JSON.
 
 mod rows;
 
@@ -6,13 +6,10 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::config::SolverConfig;
+use crate::hard::energy;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
-use drystone::scenes::{Group, Scene};
-use drystone::stats::{HardestContact, KernelTime, StepStats, median};
-use drystone::world::{Body, BodyKind, World};
+use drystone::stats::{HardestContact, KernelTime, median};
+use drystone::{Backend, BodyKind, Scene, Simulation, SolverConfig, StepStats, World};
 use glam::Vec3;
 
 /// Bodies whose islands take the same number of substeps.
@@ -27,37 +24,29 @@ pub struct EffortRow {
 /// Report of one run; its fields are the keys of the JSON object.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
-    /// Name of the scene.
     pub scene: String,
     /// `reference`, `cpu` or `gpu`.
     pub backend: String,
-    /// What it ran on.
     pub adapter: String,
-    /// Worlds beside each other.
     pub worlds: usize,
-    /// Dynamic bodies of all of them.
     pub bodies: usize,
-    /// Steps that were run.
     pub steps: u32,
     /// Length of a step (s).
     pub dt: f32,
-    /// Settings.
     pub config: SolverConfig,
     /// Wall time of each step (ms).
     pub step_ms: Vec<f64>,
-    /// Steps in which a body was awake; in the others nothing is done.
+    /// Steps with an awake body; other steps do nothing.
     pub awake_steps: u32,
-    /// Wall time of these, median and least (ms).
+    /// Wall times over the awake steps (ms).
     pub awake_ms: Option<Spread>,
-    /// Wall time of each stage, median and least over these (ms).
     pub stage_ms: Vec<StageRow>,
-    /// Time of each kernel by the clock of the device, if it was asked for, median and least over these (ms).
+    /// Times by the clock of the device, if requested.
     pub kernel_ms: Vec<KernelRow>,
-    /// Bytes a second that the device reads and writes when it copies (B/s), if it was asked for times.
+    /// Bytes per second that the device reads and writes in a copy (B/s), if requested.
     pub copy_bandwidth: Option<f64>,
-    /// Manifolds at the end, those that bodies sleep on among them.
+    /// Manifolds and points at the end, with those of sleeping bodies.
     pub manifolds: usize,
-    /// Their contact points.
     pub points: usize,
     /// Bodies by the substeps that they took in the last step in which a body was awake.
     pub efforts: Vec<EffortRow>,
@@ -65,59 +54,47 @@ pub struct RunReport {
     pub most_substeps: u32,
     /// The contact that asked for most substeps in that last step.
     pub hardest_contact: Option<HardestContact>,
-    /// Bodies that sleep at the end.
     pub asleep: usize,
     /// The first step after which a body slept.
     pub first_asleep_step: Option<u32>,
-    /// The step after which all bodies slept, if they still do at the end.
+    /// The step since which all bodies sleep.
     pub all_asleep_step: Option<u32>,
-    /// Joints.
     pub joints: usize,
-    /// Largest distance between the anchors of a joint at the end (m); none if the scene has no joints.
+    /// Largest distance between the anchors of a joint at the end (m); none without joints.
     pub joint_gap: Option<f64>,
-    /// Sweeps that were done in all steps, where the settings have a tolerance; else none.
+    /// Executed and planned sweeps of all steps; none without a tolerance.
     pub sweeps: Option<u64>,
-    /// Sweeps that the plans of all steps held, where the settings have a tolerance; else none.
     pub planned_sweeps: Option<u64>,
-    /// Colors of the last step in which a body was awake, as all that follows of a last step.
+    /// Colors in the last awake step. The values up to `bytes_down` are of this step, but for `overflow`.
     pub colors: usize,
-    /// Most manifolds of any step that found no color and were swept alone.
+    /// Largest number of manifolds of a step that found no color and were swept alone.
     pub overflow: usize,
-    /// Share of the pairs of the last step whose manifolds were reused.
+    /// Share of the pairs that reused their manifolds.
     pub reused: f64,
-    /// Dispatches of the last step.
     pub dispatches: usize,
-    /// Bytes that the kernels of the last step read and wrote.
     pub bytes_moved: u64,
-    /// Bytes that the last step sent to the device.
+    /// Bytes to the device and back.
     pub bytes_up: u64,
-    /// Bytes that the last step read back.
     pub bytes_down: u64,
-    /// Deepest overlap at the end (m).
+    /// Overlaps at the end: the deepest, the one that 95 % of the contacts do not exceed, and the mean (m).
     pub penetration_max: f64,
-    /// Overlap at the end that 95 % of the contacts do not exceed (m).
     pub penetration_p95: f64,
-    /// Mean overlap at the end (m).
     pub penetration_mean: f64,
-    /// Speed of the fastest body at the end (m/s).
+    /// Speed at the end (m/s) of the fastest body; no body if nothing moves.
     pub speed_max: f64,
-    /// Which body that is; none if none moves.
     pub fastest: Option<String>,
     /// Root mean square speed at the end (m/s).
     pub speed_rms: f64,
-    /// Kinetic energy at the end (J).
+    /// Kinetic energy at the end, and kinetic and potential energy gained since the start (J).
     pub kinetic_energy: f64,
-    /// Kinetic and potential energy gained since the start (J).
     pub energy_gained: f64,
-    /// Bodies outside the container at the end; none if the scene has no container.
+    /// Bodies outside the container at the end; none without a container.
     pub escaped: Option<usize>,
-    /// Dynamic bodies whose center of mass moved by less than half of their height since the start.
+    /// Dynamic bodies whose centers of mass moved by less than half of their height since the start.
     pub in_place: usize,
-    /// The same for each group of the scene.
     pub standing: Vec<Standing>,
-    /// Bodies whose pose or velocity is not finite.
+    /// Number of bodies whose pose or velocity is not finite, and the first of them.
     pub non_finite: usize,
-    /// The first such body.
     pub first_non_finite: Option<String>,
     #[serde(skip)]
     awake_times: Vec<f64>,
@@ -134,28 +111,22 @@ pub struct RunReport {
     stands: bool,
 }
 
-/// How much of a group still stands.
+/// Number of dynamic bodies of a group, and of those in place.
 #[derive(Clone, Debug, Serialize)]
 pub struct Standing {
-    /// Name of the group.
     pub group: String,
-    /// Its dynamic bodies.
     pub bodies: usize,
-    /// Those of them that are in place.
     pub in_place: usize,
 }
 
-/// Some times (ms).
+/// Median and least of some times (ms).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spread {
-    /// The middle one.
     pub median: f64,
-    /// The least.
     pub min: f64,
 }
 
 impl Spread {
-    /// None of no times.
     fn of(times: &[f64]) -> Option<Self> {
         let min = times.iter().copied().reduce(f64::min)?;
         Some(Self { median: median(times), min })
@@ -168,32 +139,28 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// Time of one kernel over a run (ms).
+/// Times of a kernel over the steps that ran it.
 #[derive(Clone, Debug, Serialize)]
 pub struct KernelRow {
-    /// Name of the kernel.
     pub kernel: &'static str,
-    /// Over the steps that it was in.
     #[serde(flatten)]
     pub ms: Spread,
-    /// Bytes that it read and wrote in the last step that it was in; 0 if it is not of the plan.
+    /// Bytes that the kernel last read and wrote; 0 outside the plan.
     pub bytes: u64,
-    /// Bytes a second of that step, as a share of what copying reaches.
+    /// Rate of these bytes over that of a copy.
     pub share_of_copying: Option<f64>,
 }
 
-/// Time of one stage over a run (ms).
+/// Times of a stage over the awake steps.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageRow {
-    /// Name of the stage.
     pub stage: &'static str,
-    /// Over the steps.
     #[serde(flatten)]
     pub ms: Spread,
 }
 
 impl RunReport {
-    /// The report of a run of `scene` that has not begun. It keeps the places of the bodies, so the world itself may go to the simulation.
+    /// A report before the first step of `scene`. It stores the positions of the bodies; the simulation may take the world itself.
     pub fn new(scene: &Scene, config: &SolverConfig, backend: &dyn Backend) -> Self {
         Self {
             scene: scene.name.clone(),
@@ -211,7 +178,6 @@ impl RunReport {
         }
     }
 
-    /// Takes in one step.
     pub fn add(&mut self, stats: &StepStats) {
         let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
         let step_ms = ms(stats.times.total());
@@ -223,7 +189,7 @@ impl RunReport {
         }
         let all_sleep = self.asleep > 0 && self.asleep == self.bodies;
         self.all_asleep_step = all_sleep.then(|| self.all_asleep_step.unwrap_or(self.steps));
-        // No pass was planned: everything slept when the step began.
+        // Without a dispatch all bodies slept when the step began.
         if self.asleep > 0 && stats.dispatches == 0 {
             return;
         }
@@ -259,8 +225,8 @@ impl RunReport {
         self.bytes_down = stats.traffic.down;
     }
 
-    /// Measures how the run ended. Only the world of the simulation is left when contacts are computed anew: both together would take half as much
-    /// memory again as the steps.
+    /// Measures the end of the run. The simulation is dropped before contacts are computed anew: both together would take 1.5 times the
+    /// memory of the steps.
     pub fn measure(&mut self, scene: &Scene, mut simulation: Simulation) {
         self.awake_ms = Spread::of(&self.awake_times);
         let names = StepStats::default().times.stages().map(|s| s.0);
@@ -296,40 +262,35 @@ impl RunReport {
         self.energy_gained = energy(world) - self.energy_before;
         self.escaped = scene.container.map(|_| scene.escaped(world));
         self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
-        let counted = |bodies: Range<usize>| {
+        // As `drystone::metrics::in_place`, from the stored positions.
+        let in_place = |&i: &usize| {
+            let (center, half_height) = self.places[i];
+            center.as_dvec3().distance(world.bodies[i].center_of_mass().as_dvec3()) < half_height
+        };
+        let standing = |group: &str, bodies: Range<usize>| {
             let dynamic = bodies.filter(|&i| world.bodies.get(i).is_some_and(|b| b.kind == BodyKind::Dynamic));
-            let in_place = dynamic.clone().filter(|&i| self.is_in_place(i, &world.bodies[i])).count();
-            (dynamic.count(), in_place)
+            Standing {
+                group: group.into(),
+                bodies: dynamic.clone().count(),
+                in_place: dynamic.filter(in_place).count(),
+            }
         };
-        let in_place = counted(0..world.bodies.len()).1;
-        let standing = |group: &Group| {
-            let (bodies, in_place) = counted(group.bodies.clone());
-            Standing { group: group.name.clone(), bodies, in_place }
-        };
-        (self.in_place, self.standing) = (in_place, scene.groups.iter().map(standing).collect());
+        let all = standing("", 0..world.bodies.len()).in_place;
+        let groups = scene.groups.iter().map(|group| standing(&group.name, group.bodies.clone())).collect();
+        (self.in_place, self.standing) = (all, groups);
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
         self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
     }
-
-    /// As [`drystone::metrics::in_place`], from the place of the body at the start.
-    fn is_in_place(&self, index: usize, body: &Body) -> bool {
-        let (center, half_height) = self.places[index];
-        center.as_dvec3().distance(body.center_of_mass().as_dvec3()) < half_height
-    }
 }
 
-fn energy(world: &World) -> f64 {
-    world.kinetic_energy() + world.potential_energy()
-}
-
-/// Manifolds of bodies that can be pushed, and their points, whether they sleep or not.
+/// Number of manifolds with a dynamic body, asleep or awake, and of their points.
 fn contacts(simulation: &mut Simulation) -> (usize, usize) {
     let moves: Vec<bool> = simulation.world.bodies.iter().map(|body| body.kind == BodyKind::Dynamic).collect();
     let of_bodies = simulation.manifolds().filter(|m| moves[m.body_a] || moves[m.body_b]);
     of_bodies.fold((0, 0), |(manifolds, points), m| (manifolds + 1, points + m.points().len()))
 }
 
-/// A body's own name and its index.
+/// The index of a body, and its name if it has one.
 fn body_name(world: &World, index: usize) -> String {
     match world.bodies.get(index) {
         Some(body) if !body.name.is_empty() => format!("{index} {:?}", body.name),

@@ -1,96 +1,80 @@
-//! What one solve of a contact problem came to, sweep by sweep.
+//! Report of one solve of a contact problem.
 
 use std::time::Duration;
 
 use serde::Serialize;
 
-use drystone::Result;
-use drystone::backend::Backend;
 use drystone::config::Method;
-use drystone::contacts::ContactProblem;
 use drystone::residuals::{Measure, Residuals};
 use drystone::solver::{Order, Solver};
+use drystone::{Backend, ContactProblem, Result};
 
 use super::rounds::Clock;
 
-/// Errors `e_vel` whose sweeps are reported.
+/// Errors `e_vel` for which sweeps are reported.
 const ERRORS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 
-/// How a contact problem is solved, and when that ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveSettings {
-    /// What is done with the sweeps.
     pub method: Method,
-    /// In which order they go.
     pub order: Order,
-    /// How often a manifold is swept before the next one.
+    /// Passes over a manifold before the next one.
     pub passes: u8,
-    /// Most sweeps.
+    /// Largest number of sweeps.
     pub sweeps: u32,
-    /// Error `e_vel` below which no more are done; 0 does them all.
+    /// Error `e_vel` below which the solve ends.
     pub tolerance: f64,
 }
 
 /// Report of one solve; its fields are the keys of the JSON object.
 #[derive(Clone, Debug, Serialize)]
 pub struct SolveReport {
-    /// Name of the problem.
     pub problem: String,
-    /// Bodies that can move.
     pub bodies: usize,
-    /// Contacts.
     pub contacts: usize,
-    /// What was done with the sweeps.
     pub method: Method,
-    /// Their order.
     pub order: Order,
-    /// How often a manifold was swept before the next one.
+    /// Passes over a manifold before the next one.
     pub passes: u8,
     /// `f64`, or `reference`, `cpu` or `gpu`, which are in f32.
     pub backend: String,
-    /// What it ran on.
     pub adapter: String,
-    /// Colors of that order.
     pub colors: usize,
-    /// Sweeps that were done; they end early where the numbers are not finite.
+    /// Number of sweeps; the solve ends early if a number is not finite.
     pub sweeps: u32,
-    /// Time of the sweeps one by one, without measuring (ms).
+    /// Time of the single sweeps without measurements (ms).
     pub ms: f64,
-    /// When the error first fell below 1e-1 to 1e-4.
+    /// The sweeps to the errors 1e-1 to 1e-4.
     pub reached: Vec<Reached>,
-    /// After each power of two of sweeps, and the last.
+    /// Errors after each power of two of sweeps, and after the last.
     pub curve: Vec<CurveRow>,
 }
 
-/// When `e_vel` first fell below an error.
+/// The first sweep after which `e_vel` is below an error; none if no sweep reaches it.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Reached {
-    /// The error.
     pub e_vel: f64,
-    /// Sweeps until then; none if it did not.
     pub sweeps: Option<u32>,
-    /// Their time (ms).
+    /// Time of the sweeps (ms).
     pub ms: Option<f64>,
 }
 
-/// What is left after some sweeps.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CurveRow {
-    /// Sweeps.
     pub sweeps: u32,
-    /// Their time (ms).
+    /// Time of the sweeps (ms).
     pub ms: f64,
-    /// What they leave.
     #[serde(flatten)]
     pub residuals: Residuals,
 }
 
-impl SolveReport {
-    /// Whether any number of the end is not finite.
-    pub fn is_spoiled(&self) -> bool {
-        self.curve.last().is_some_and(|row| row.residuals.e_vel.is_nan())
+impl SolveSettings {
+    pub fn by_manifolds(method: Method, passes: u8, sweeps: u32, tolerance: f64) -> Self {
+        Self { method, order: Order::Manifolds, passes, sweeps, tolerance }
     }
+}
 
+impl SolveReport {
     /// Solves a problem in f64, or in f32 on a backend.
     pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
         let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;

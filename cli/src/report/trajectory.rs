@@ -1,29 +1,29 @@
 //! The motion of a run as CSV.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::files;
-use drystone::world::{BodyKind, World};
-use drystone::{Error, Result};
+use crate::files::Draft;
+use drystone::{BodyKind, Error, Result, World};
 
-/// The motion of a run as CSV: `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`, centre of mass, world axes. The file is
-/// there when it is finished.
+/// A CSV file with the columns `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`: center of mass, world axes. `finish` puts
+/// it under its name.
 pub struct Trajectory {
     path: PathBuf,
-    writer: csv::Writer<files::Writer>,
+    writer: csv::Writer<File>,
+    draft: Draft,
 }
 
 impl Trajectory {
-    /// Begins a file.
     pub fn create(path: &Path) -> Result<Self> {
-        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(files::Writer::create(path)?) };
+        let draft = Draft::of(path)?;
+        let mut trajectory = Self { path: path.into(), writer: csv::Writer::from_writer(draft.create()?), draft };
         let header = "step time body px py pz qx qy qz qw vx vy vz wx wy wz";
         let written = trajectory.writer.write_record(header.split(' '));
         trajectory.check(written)?;
         Ok(trajectory)
     }
 
-    /// Writes the bodies that can move.
     pub fn write(&mut self, step: u32, dt: f32, world: &World) -> Result<()> {
         for (i, body) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind != BodyKind::Fixed) {
             let (p, q) = (body.center_of_mass(), body.rotation);
@@ -36,10 +36,10 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Ends the file and gives it its name.
     pub fn finish(self) -> Result<()> {
         let unwritten = |e: csv::IntoInnerError<_>| Error::file(&self.path)(e.into_error());
-        self.writer.into_inner().map_err(unwritten)?.finish()
+        self.writer.into_inner().map_err(unwritten)?;
+        self.draft.keep()
     }
 
     fn check(&self, written: csv::Result<()>) -> Result<()> {

@@ -1,4 +1,4 @@
-//! Where a picture is taken from: a camera that turns around a point, and how it frames a scene by itself.
+//! A camera that orbits a point, and the framing of a scene.
 
 use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
@@ -10,22 +10,19 @@ const FIELD: f32 = 0.6;
 /// A box along the world's axes: lower and upper corner (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Lower corner.
     pub low: Vec3,
-    /// Upper corner.
     pub high: Vec3,
 }
 
 impl Bounds {
-    /// Holds nothing; joining with anything gives that.
+    /// An empty box; joined with another box it gives the other.
     pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
-    /// Around a point, `reach` in every direction.
     pub fn around(center: Vec3, reach: f32) -> Self {
         Self { low: center - reach, high: center + reach }
     }
 
-    /// The smallest that holds both. What is not finite holds nothing.
+    /// The smallest box that contains both. A box that is not finite is empty.
     pub fn join(self, other: Self) -> Self {
         if !(other.low.is_finite() && other.high.is_finite()) {
             return self;
@@ -33,40 +30,35 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Middle (m); the origin if it holds nothing.
+    /// Center (m); the origin if the box is empty.
     pub fn center(&self) -> Vec3 {
         if self.low.is_finite() { 0.5 * (self.low + self.high) } else { Vec3::ZERO }
     }
 
-    /// Radius of the sphere around it (m); 1 if it holds nothing.
+    /// Radius of the sphere around the box (m); 1 if the box is empty.
     pub fn radius(&self) -> f32 {
         if self.low.is_finite() { (0.5 * (self.high - self.low).length()).max(1e-3) } else { 1.0 }
     }
 
-    /// Its eight corners.
     pub fn corners(&self) -> [Vec3; 8] {
         let pick = |k: usize, bit: usize, axis: usize| if k >> bit & 1 == 0 { self.low[axis] } else { self.high[axis] };
         std::array::from_fn(|k| Vec3::new(pick(k, 0, 0), pick(k, 1, 1), pick(k, 2, 2)))
     }
 }
 
-/// Looks at a point from a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
+/// `distance` is that of the eye from `target` (m); `up` is a unit vector.
 pub struct Camera {
-    /// The point that it looks at (m).
     pub target: Vec3,
-    /// Distance from there (m).
     pub distance: f32,
-    /// Turn around the upward axis; 0 looks along -z if up is y (rad).
+    /// Angle around the upward axis and elevation (rad); at 0 the camera looks along -z if up is y.
     pub yaw: f32,
-    /// Height above the horizon as an angle (rad).
     pub pitch: f32,
-    /// Unit vector that is up in the picture.
     pub up: Vec3,
 }
 
 impl Camera {
-    /// From the side and from above, so that `bounds` just fill a picture whose width is `aspect` times its height.
+    /// A camera for which `bounds` fill a picture of width `aspect` times its height.
     pub fn framing(bounds: &Bounds, up: Vec3, yaw: f32, pitch: f32, aspect: f32) -> Self {
         let mut camera = Self { target: bounds.center(), distance: bounds.radius(), yaw, pitch, up };
         if !bounds.low.is_finite() {
@@ -75,7 +67,7 @@ impl Camera {
         let slope_y = (0.5 * FIELD).tan();
         let slope_x = slope_y * aspect;
         let [right, above, back] = camera.axes();
-        // Every corner gives a distance, for the wider of its two sides; moving sideways evens out the sides.
+        // Every corner requires a distance for the wider of its two sides; the target moves until opposite margins are equal.
         for _ in 0..8 {
             let seen = |corner: Vec3| {
                 let r = corner - camera.target;
@@ -95,19 +87,18 @@ impl Camera {
         camera
     }
 
-    /// Right, above and back (towards the eye): unit vectors.
+    /// Unit vectors to the right, up and back (towards the eye).
     pub fn axes(&self) -> [Vec3; 3] {
         let upright = Quat::from_rotation_arc(Vec3::Y, self.up);
         let turn = upright * Quat::from_rotation_y(self.yaw) * Quat::from_rotation_x(-self.pitch);
         [turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z]
     }
 
-    /// Where the eye is (m).
     pub fn eye(&self) -> Vec3 {
         self.target + self.distance * self.axes()[2]
     }
 
-    /// From the world to the picture; `reach` is how far around the target things are drawn (m).
+    /// The projection from the world to the picture; `reach` is the radius of the scene around the target (m).
     pub fn projection(&self, aspect: f32, reach: f32) -> Mat4 {
         let far = self.distance + 60.0 * reach;
         let near = (self.distance - reach).max(0.01 * self.distance);
@@ -115,7 +106,7 @@ impl Camera {
         directx::perspective(FIELD, aspect, near, far) * look_at_mat4(eye, self.target, self.axes()[1])
     }
 
-    /// The ray through a place of the picture, -1 to 1 from left to right and from bottom to top: origin and unit direction.
+    /// Origin and unit direction of the ray through a place of the picture, -1 to 1 from left to right and from bottom to top.
     pub fn ray(&self, at: Vec2, aspect: f32) -> (Vec3, Vec3) {
         let slope = (0.5 * FIELD).tan();
         let [right, above, back] = self.axes();
@@ -123,20 +114,20 @@ impl Camera {
         (self.eye(), direction.normalize())
     }
 
-    /// Turns by a drag of the mouse, in heights of the picture.
+    /// Turns the camera by a drag of the mouse, in heights of the picture.
     pub fn orbit(&mut self, drag: Vec2) {
         self.yaw -= 3.0 * drag.x;
         self.pitch = (self.pitch + 3.0 * drag.y).clamp(-1.5, 1.5);
     }
 
-    /// Moves sideways by a drag of the mouse, in heights of the picture.
+    /// Moves the camera sideways by a drag of the mouse, in heights of the picture.
     pub fn pan(&mut self, drag: Vec2) {
         let [right, above, _] = self.axes();
         let height = 2.0 * self.distance * (0.5 * FIELD).tan();
         self.target += height * (drag.y * above - drag.x * right);
     }
 
-    /// Goes nearer by `notches` of the wheel.
+    /// Moves the camera nearer by `notches` of the wheel.
     pub fn zoom(&mut self, notches: f32) {
         self.distance *= 0.9_f32.powf(notches.clamp(-20.0, 20.0));
     }
@@ -168,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_goes_through_the_place_it_was_asked_for() {
+    fn a_ray_goes_through_its_place_in_the_picture() {
         let bounds = Bounds::around(Vec3::new(1.0, 2.0, 3.0), 2.0);
         let camera = Camera::framing(&bounds, Vec3::Y, 0.4, 0.3, 1.6);
         for at in [Vec2::ZERO, Vec2::new(0.5, -0.7)] {
@@ -179,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_frame_gives_a_camera_all_the_same() {
+    fn an_empty_scene_has_a_finite_camera() {
         assert!(Camera::framing(&Bounds::EMPTY, Vec3::Y, 0.0, 0.3, 1.0).eye().is_finite());
         let joined = Bounds::around(Vec3::ZERO, 1.0).join(Bounds::around(Vec3::NAN, 1.0));
         assert_eq!(joined, Bounds::around(Vec3::ZERO, 1.0));

@@ -1,23 +1,18 @@
-//! Pictures without a window: drawn into a texture and read back.
+//! Pictures without a window: the renderer draws into a texture, which is read back.
 
-use super::pipeline::Quality;
+use super::pipeline::{Quality, texture};
 use super::renderer::{Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Result, World};
 
 /// Rows of pixels from the top, four bytes a pixel, sRGB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Pixels in a row.
     pub width: u32,
-    /// Rows.
     pub height: u32,
-    /// `4 * width * height` bytes.
     pub rgba: Vec<u8>,
 }
 
-/// Draws pictures of one size of one world.
 pub struct Canvas {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -25,29 +20,19 @@ pub struct Canvas {
     size: (u32, u32),
     texture: wgpu::Texture,
     read_back: wgpu::Buffer,
-    adapter: String,
 }
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Canvas {
-    /// A canvas on the best adapter there is.
     pub fn new(world: &World, (width, height): (u32, u32)) -> Result<Self> {
-        let (device, queue, summary) = open_device(AdapterChoice::Best)?;
+        let (device, queue, _) = open_device(AdapterChoice::Best)?;
         let most = device.limits().max_texture_dimension_2d;
         if width == 0 || height == 0 || width > most || height > most {
             return Err(Error::input(format!("a picture of {width}x{height}: each side must be 1 to {most} pixels")));
         }
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("picture"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+        let texture = texture(&device, (width, height), FORMAT, 1, usage);
         let read_back = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("picture"),
             size: u64::from(stride(width)) * u64::from(height),
@@ -55,37 +40,21 @@ impl Canvas {
             mapped_at_creation: false,
         });
         let renderer = Renderer::new(&device, &queue, FORMAT, Quality::FINE, world);
-        Ok(Self { device, queue, renderer, size: (width, height), texture, read_back, adapter: summary.to_string() })
+        Ok(Self { device, queue, renderer, size: (width, height), texture, read_back })
     }
 
-    /// What it draws on.
-    pub fn adapter(&self) -> &str {
-        &self.adapter
-    }
-
-    /// Width over height of its pictures.
     pub fn aspect(&self) -> f32 {
         self.size.0 as f32 / self.size.1 as f32
     }
 
-    /// Draws `shot`.
     pub fn draw(&mut self, shot: &Shot) -> Result<Picture> {
         let view = self.texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.renderer.draw(&view, self.size, shot);
         let (width, height) = self.size;
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_texture_to_buffer(
-            self.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &self.read_back,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(stride(width)),
-                    rows_per_image: None,
-                },
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
+        let layout = wgpu::TexelCopyBufferLayout { bytes_per_row: Some(stride(width)), ..Default::default() };
+        let target = wgpu::TexelCopyBufferInfo { buffer: &self.read_back, layout };
+        encoder.copy_texture_to_buffer(self.texture.as_image_copy(), target, self.texture.size());
         self.queue.submit([encoder.finish()]);
         let lost = |e: &dyn std::fmt::Display| Error::Adapter(format!("the device was lost: {e}"));
         let slice = self.read_back.slice(..);
@@ -102,7 +71,7 @@ impl Canvas {
     }
 }
 
-/// Bytes of a row in a buffer: copies want multiples of 256.
+/// Bytes of a row in the buffer; copies require a multiple of 256.
 fn stride(width: u32) -> u32 {
     (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }

@@ -1,21 +1,19 @@
-//! What the color of a body says.
+//! Colors of bodies.
 
-use drystone::world::{BodyKind, World};
-use drystone::{Simulation, SolvedManifold};
+use drystone::{BodyKind, Simulation, SolvedManifold, World};
 
-/// What bodies are colored by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ColorBy {
-    /// Bodies of one kind, density, friction and restitution look alike.
+    /// Density, friction and restitution: equal materials have equal colors.
     #[default]
     Material,
-    /// The color, in the constraint graph, of the contact that bears most on the body.
+    /// The color in the constraint graph of the contact with the largest impulse on the body.
     Batch,
     /// Speed of the center of mass, dark to light.
     Speed,
     /// Sum of the normal impulses on the body in the last substep, dark to light.
     Impulse,
-    /// Whether the body sleeps, dark, or is awake, light.
+    /// Sleeping bodies are dark, awake bodies light.
     Sleeping,
 }
 
@@ -30,12 +28,10 @@ pub type Rgba = [u8; 4];
 
 const FIXED: Rgba = [176, 178, 182, 255];
 const KINEMATIC: Rgba = [150, 160, 178, 255];
-/// Bodies about which there is nothing to say: no contact.
 const NOTHING: Rgba = [222, 222, 218, 255];
 const ASLEEP: Rgba = [74, 92, 128, 255];
 const AWAKE: Rgba = [240, 178, 84, 255];
 
-/// Stones, bricks, slates.
 const MATERIALS: [Rgba; 8] = [
     [196, 162, 118, 255],
     [168, 90, 66, 255],
@@ -47,32 +43,26 @@ const MATERIALS: [Rgba; 8] = [
     [206, 134, 70, 255],
 ];
 
-/// Colors that differ for the color-blind too, first to last from dark to light.
+/// A scale from dark to light for the color-blind too.
 const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
 impl ColorBy {
-    /// Whether it is about what only a run knows, and a recorded motion does not: contacts, and who sleeps.
-    pub fn needs_run(self) -> bool {
-        matches!(self, Self::Batch | Self::Impulse | Self::Sleeping)
-    }
-
-    /// One number for each body: number of the material, number of the batch, speed (m/s), impulse (N s), or 1 if it sleeps and
-    /// 0 if not; NaN for bodies about which there is nothing to say.
+    /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), or 1 for sleep; NaN without a
+    /// contact.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
         let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();
         let manifolds: Vec<SolvedManifold> = simulation.manifolds().collect();
         self.values_of(&simulation.world, &manifolds, &asleep)
     }
 
-    /// The same, for bodies that touch by `manifolds`, and of which some are `asleep`.
     pub(super) fn values_of(self, world: &World, manifolds: &[SolvedManifold], asleep: &[bool]) -> Vec<f32> {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
             Self::Speed => world.bodies.iter().map(|b| b.linear_velocity.length()).collect(),
             Self::Batch => {
-                // Impulse and color of the contact that bears most.
+                // Impulse and color of the contact with the largest impulse.
                 let mut most = vec![(-1.0, f32::NAN); world.bodies.len()];
                 for manifold in manifolds {
                     let impulse = manifold.normal_impulse();
@@ -95,7 +85,7 @@ impl ColorBy {
         }
     }
 
-    /// Where the light end of the scale is, for these values of dynamic bodies: what one in fifty exceeds.
+    /// The value at the light end of the scale: one in fifty dynamic bodies exceeds it.
     pub fn scale(self, world: &World, values: &[f32]) -> f32 {
         let dynamic = world.bodies.iter().zip(values).filter(|(b, v)| b.kind == BodyKind::Dynamic && v.is_finite());
         let mut sorted: Vec<f32> = dynamic.map(|(_, v)| *v).collect();
@@ -103,7 +93,6 @@ impl ColorBy {
         sorted.get(sorted.len().saturating_sub(1 + sorted.len() / 50)).copied().unwrap_or(0.0)
     }
 
-    /// Colors of the bodies for their values.
     pub fn paint(self, world: &World, values: &[f32], scale: f32) -> Vec<Rgba> {
         let color = |(i, (body, &value)): (usize, (&drystone::world::Body, &f32))| match (body.kind, self) {
             (BodyKind::Fixed, _) => FIXED,
@@ -118,12 +107,12 @@ impl ColorBy {
     }
 }
 
-/// Number of each dynamic body's material, in the order in which they first occur.
+/// The number of each dynamic body's material, in the order of first occurrence.
 fn materials(world: &World) -> Vec<f32> {
     let mut known = Vec::new();
     let mut number = |body: &drystone::world::Body| {
         let volume: f32 = body.colliders.iter().map(|c| c.shape.volume()).sum();
-        // To two digits, whatever rounding did.
+        // Two digits, so that rounding makes no difference.
         let density = (body.mass.mass / volume).log10() * 50.0;
         let kind = (density.round() as i32, body.material.friction.to_bits(), body.material.restitution.to_bits());
         known.iter().position(|k| *k == kind).unwrap_or_else(|| {
@@ -134,9 +123,9 @@ fn materials(world: &World) -> Vec<f32> {
     world.bodies.iter().map(|b| if b.kind == BodyKind::Dynamic { number(b) as f32 } else { 0.0 }).collect()
 }
 
-/// A little lighter or darker from body to body, so that neighbors can be told apart.
+/// A shade that varies from body to body, so that neighbors differ.
 fn shaded([r, g, b, a]: Rgba, body: usize) -> Rgba {
-    // Bits that two products scatter, the same everywhere.
+    // A hash by two products, the same on all machines.
     let mixed = (body as u32).wrapping_add(1).wrapping_mul(0x9E37_79B9);
     let scattered = (mixed ^ mixed >> 15).wrapping_mul(0x85EB_CA6B) >> 24;
     let factor = 0.90 + 0.20 * scattered as f32 / 255.0;
@@ -144,7 +133,7 @@ fn shaded([r, g, b, a]: Rgba, body: usize) -> Rgba {
     [scale(r), scale(g), scale(b), a]
 }
 
-/// The color of a batch: hues a golden angle apart, every other one darker.
+/// The color of a batch: hues differ by the golden angle, and every other one is darker.
 pub fn batch_color(batch: u32) -> Rgba {
     let hue = (batch as f32 * 0.618_034 + 0.58).fract() * 6.0;
     let (light, strength) = if batch.is_multiple_of(2) { (0.92, 0.62) } else { (0.74, 0.72) };
@@ -156,9 +145,8 @@ pub fn batch_color(batch: u32) -> Rgba {
     [channel(5.0), channel(3.0), channel(1.0), 255]
 }
 
-/// Dark to light from 0 to 1.
 fn on_scale(x: f32) -> Rgba {
-    // Square root: there is more to tell among the small values.
+    // The square root separates small values.
     let x = x.clamp(0.0, 1.0).sqrt() * (SCALE.len() - 1) as f32;
     let lower = (x as usize).min(SCALE.len() - 2);
     let mix = |k: usize| (SCALE[lower][k] + (x - lower as f32) * (SCALE[lower + 1][k] - SCALE[lower][k])) as u8;
@@ -168,10 +156,7 @@ fn on_scale(x: f32) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::Simulation;
-    use drystone::backend::cpu::Reference;
-    use drystone::config::SolverConfig;
-    use drystone::scenes::Scene;
+    use drystone::{Reference, Scene, Simulation, SolverConfig};
 
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");
@@ -205,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn who_sleeps_is_darker_than_who_is_awake() {
+    fn a_sleeping_body_is_darker_than_an_awake_body() {
         let mut stack = settled("stack", &["n=2".into()]);
         let before = ColorBy::Sleeping.values(&mut stack);
         assert_eq!(before, [0.0, 1.0, 1.0]);

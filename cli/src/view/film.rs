@@ -1,4 +1,4 @@
-//! A run, or a recorded motion, as frames; and the pictures of them, all from one place.
+//! A run or a recorded motion as frames, and pictures of the frames from one camera.
 
 use std::path::Path;
 
@@ -10,35 +10,26 @@ use super::colors::ColorBy;
 use super::mesh::{Poses, poses};
 use super::overlay::ropes;
 use super::renderer::Shot;
-use drystone::Simulation;
-use drystone::scenes::Scene;
-use drystone::world::{BodyKind, World};
-use drystone::{Error, Result};
+use drystone::{BodyKind, Error, Result, Scene, Simulation, World};
 
-/// A world at one time.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Seconds since the start.
+    /// Time since the start (s).
     pub time: f64,
-    /// Position (m) and rotation of each body.
     pub poses: Vec<(Vec3, Quat)>,
-    /// What each body is colored by, as [`ColorBy::values`] gives it.
     pub values: Vec<f32>,
 }
 
-/// Where a film is seen from.
+/// Angle of the camera around the scene, and elevation above the horizon (rad).
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Turn of the camera around the scene (rad).
     pub yaw: f32,
-    /// Its height above the horizon as an angle (rad).
     pub pitch: f32,
 }
 
-/// Step, time, body, place of its center of mass, rotation, velocities: as [`crate::report::Trajectory`] writes them.
+/// Step, time, body, center of mass, rotation and velocities, as [`crate::report::Trajectory`] writes them.
 type Row = (u32, f64, usize, [f32; 3], [f32; 4], [f32; 3], [f32; 3]);
 
-/// Frames of one scene.
 #[derive(Clone, Debug)]
 pub struct Film {
     scene: Scene,
@@ -47,50 +38,41 @@ pub struct Film {
 }
 
 impl Film {
-    /// A film without frames.
     pub fn new(scene: Scene, color: ColorBy) -> Self {
         Self { scene, color, frames: Vec::new() }
     }
 
-    /// Adds the world as it is after the last step.
     pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
         let values = self.color.values(simulation);
         self.frames.push(Frame { time, poses: poses(&simulation.world), values });
     }
 
-    /// Adds a world of which no more is known.
+    /// Adds a world without contacts and sleep.
     fn add_world(&mut self, time: f64, world: &World) {
         self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, &[], &[]) });
     }
 
-    /// The frames.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// Keeps `count` of the frames, evenly spaced and the last one among them.
-    pub fn thin(&mut self, count: usize) {
-        let kept: Vec<usize> = evenly(self.frames.len(), count).collect();
-        let mut index = 0;
-        self.frames.retain(|_| {
-            index += 1;
-            kept.binary_search(&(index - 1)).is_ok()
-        });
+    /// The film with `count` of its frames, evenly spaced, with the last one.
+    pub fn thinned(mut self, count: usize) -> Self {
+        self.frames = evenly(self.frames.len(), count).map(|i| self.frames[i].clone()).collect();
+        self
     }
 
-    /// Reads the motion that `drystone run --out` wrote.
     pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
-        if color.needs_run() {
-            return Err(Error::input(
-                "--from: a recorded motion has neither contacts nor sleep; color by material or speed",
-            ));
+        if matches!(color, ColorBy::Batch | ColorBy::Impulse | ColorBy::Sleeping) {
+            let refusal = "--from: a recorded motion has neither contacts nor sleep; color by material or speed";
+            return Err(Error::input(refusal));
         }
         let file = std::fs::File::open(path).map_err(Error::file(path))?;
         let mut film = Self::new(scene, color);
         let mut world = film.scene.world.clone();
         let mut last: Option<(u32, f64)> = None;
         for (i, row) in csv::Reader::from_reader(file).deserialize::<Row>().enumerate() {
-            // The first line names the columns.
+            // Line 1 has the names of the columns.
             let line = i + 2;
             let refuse = |what: String| Error::input(format!("{}: line {line}: {what}", path.display()));
             let row = row.map_err(|e| match e.into_kind() {
@@ -122,12 +104,11 @@ impl Film {
         Ok(film)
     }
 
-    /// What of the scene is in the pictures: everything that moves, over all frames.
     pub fn bounds(&self) -> Bounds {
         self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(bounds_at(&self.scene.world, &frame.poses)))
     }
 
-    /// Draws every frame from one place, in order, on a canvas for the film's world.
+    /// Draws the frames in order from one camera, on a canvas for the film's world.
     pub fn draw(&self, canvas: &mut Canvas, look: &Look, mut show: impl FnMut(&Picture) -> Result<()>) -> Result<()> {
         let world = &self.scene.world;
         let bounds = self.bounds();
@@ -145,13 +126,13 @@ impl Film {
     }
 }
 
-/// `count` of the numbers below `all`, evenly spaced, the last one among them.
+/// `count` of the numbers below `all`, evenly spaced, with the last one.
 pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(all);
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
 }
 
-/// Around everything in a world that moves, with room around it, and the points that it hangs from.
+/// The bounds of everything that moves in a world, with a margin, and of the points from which bodies hang.
 pub fn bounds(world: &World) -> Bounds {
     bounds_at(world, &poses(world))
 }

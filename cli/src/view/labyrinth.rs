@@ -1,4 +1,4 @@
-//! The maze game in a window: arrow keys or the mouse tilt the board, a clock runs, R starts again.
+//! The maze game in a window: arrow keys or the mouse tilt the board, R restarts the game.
 
 use glam::{Quat, Vec2, Vec3};
 use winit::keyboard::{Key, NamedKey};
@@ -9,37 +9,32 @@ use super::colors::Rgba;
 use super::renderer::Shot;
 use super::show::{Pointer, Show};
 use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
-use drystone::Result;
 use drystone::backend::{BackendChoice, choose};
-use drystone::config::SolverConfig;
-use drystone::world::World;
+use drystone::{Result, SolverConfig, World};
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];
 const GOAL_COLOR: Rgba = [92, 170, 96, 255];
 const WALL_COLOR: Rgba = [150, 98, 58, 255];
 const BALL_COLOR: Rgba = [206, 210, 218, 255];
-/// Steps that a picture waits for at most: a tenth of a second.
+/// Largest number of steps before a picture: a tenth of a second.
 const MOST_STEPS: f32 = 12.0;
 
-/// Color of each body of a game.
 fn colors(world: &World) -> Vec<Rgba> {
     let mut colors = vec![WALL_COLOR; world.bodies.len()];
     (colors[BOARD], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
     colors
 }
 
-/// The board with its rim, however it tilts.
+/// The bounds of the board with its rim at any tilt.
 fn bounds_of(map: &Map) -> Bounds {
     let half = 0.5 * CELL * Vec3::new(map.columns as f32 + 3.0, 1.0, map.rows as f32 + 3.0);
     Bounds { low: -half, high: half }
 }
 
-/// As one sits before it.
 fn camera_for(map: &Map, aspect: f32) -> Camera {
     Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
 }
 
-/// Draws a game that was played, from the poses of its bodies.
 pub fn draw_game(
     canvas: &mut Canvas,
     map: &Map,
@@ -54,15 +49,14 @@ pub fn draw_game(
     })
 }
 
-/// A game on a screen.
 pub struct Labyrinth {
     game: Game,
     map: Map,
     config: SolverConfig,
     backend: BackendChoice,
-    /// Left, right, back, front: which arrows are held.
+    /// Whether each arrow key is down: left, right, back, front.
     held: [bool; 4],
-    /// Where the mouse pulls to from the middle of the window, while it is held.
+    /// Position of the mouse in the window while its button is down.
     mouse: Option<Vec2>,
     begun: bool,
     owed: f32,
@@ -70,7 +64,6 @@ pub struct Labyrinth {
 }
 
 impl Labyrinth {
-    /// A game that begins with the first tilt.
     pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
         let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
         let held = [false; 4];
@@ -78,13 +71,12 @@ impl Labyrinth {
     }
 
     fn restart(&mut self) -> Result<()> {
-        let backend = choose(self.backend, 1, false)?.0;
-        self.game = Game::new(self.map.clone(), self.config.clone(), backend)?;
-        (self.begun, self.owed) = (false, 0.0);
+        let fresh = Self::new(self.map.clone(), self.config.clone(), self.backend)?;
+        *self = Self { held: self.held, mouse: self.mouse, best: self.best, ..fresh };
         Ok(())
     }
 
-    /// Tilts that keys and mouse ask for, to the right and to the front (degrees).
+    /// Tilts that keys and mouse request, to the right and to the front (degrees).
     fn wanted(&self) -> [f32; 2] {
         let arrow = |less: usize, more: usize| f32::from(self.held[more]) - f32::from(self.held[less]);
         match self.mouse {
@@ -203,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mouse_tilts_towards_where_it_is() {
+    fn the_board_tilts_towards_the_mouse() {
         let mut game = labyrinth();
         let at = Vec2::new(0.2, -0.9);
         assert!(game.grab(&Pointer { at, origin: Vec3::ZERO, direction: Vec3::NEG_Z }));

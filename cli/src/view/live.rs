@@ -1,4 +1,4 @@
-//! A scene that runs in a window: pause, step, restart, speed, colors, overlays, a mouse that pulls, settings that change live.
+//! A scene that runs in a window.
 
 use std::time::Duration;
 
@@ -8,17 +8,12 @@ use super::camera::Bounds;
 use super::colors::ColorBy;
 use super::film::bounds;
 use super::overlay::Overlay;
-use drystone::Result;
-use drystone::Simulation;
 use drystone::backend::{BackendChoice, choose};
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
-use drystone::stats::StepStats;
+use drystone::{Result, Scene, Simulation, SolverConfig, StepStats};
 
-/// How fast a body that is pulled closes the gap to the mouse (1/s): soft, however stiff joints are.
+/// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
 
-/// A scene that runs.
 pub struct Live {
     pub(super) scene: Scene,
     exact: bool,
@@ -27,39 +22,36 @@ pub struct Live {
     pub(super) color: ColorBy,
     pub(super) overlay: Overlay,
     pub(super) paused: bool,
-    /// Simulated seconds for a second, asked for.
+    /// Requested simulated seconds per second.
     pub(super) speed: f32,
-    /// The same, reached: a mean over the last pictures.
+    /// Reached simulated seconds per second, a mean over the last pictures.
     pub(super) reached: f32,
-    /// Pictures a second, likewise.
+    /// Pictures per second, a mean over the last pictures.
     pub(super) pictures: f32,
     pub(super) steps: u32,
     pub(super) stats: StepStats,
-    /// Milliseconds of each stage: means over the last steps.
+    /// Times of the stages, means over the last steps (ms).
     pub(super) stage_ms: [f64; 5],
-    /// Why a setting was refused.
     pub(super) refused: Option<String>,
     pub(super) owed: f32,
-    /// How long the steps before the last picture took.
+    /// Time of the steps before the last picture.
     pub(super) stepping: Duration,
     pub(super) grabbed: Option<Grabbed>,
     pub(super) bounds: Bounds,
     pub(super) light_end: f32,
 }
 
-/// A body that the mouse pulls, by the last joint of the world.
+/// A body that the mouse pulls by the last joint of the world.
 pub(super) struct Grabbed {
     pub(super) body: usize,
-    /// The point that is pulled, in the body's frame (m).
+    /// The pulled point in the body's frame (m).
     pub(super) anchor: Vec3,
-    /// Distance from the eye at which the mouse moves (m).
+    /// Distance of the target from the eye (m).
     pub(super) distance: f32,
-    /// Where the mouse is (m).
     pub(super) target: Vec3,
 }
 
 impl Live {
-    /// A scene that is about to run.
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
@@ -86,12 +78,11 @@ impl Live {
         })
     }
 
-    /// Seconds simulated so far.
+    /// Simulated time (s).
     pub fn time(&self) -> f32 {
         self.steps as f32 * self.scene.dt
     }
 
-    /// Begins again with the settings as they are now.
     pub(super) fn restart(&mut self) -> Result<()> {
         let config = self.simulation.config().clone();
         let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;
@@ -104,7 +95,6 @@ impl Live {
         self.refused = self.simulation.set_config(config).err().map(|e| e.to_string());
     }
 
-    /// Goes on with another backend, unless it cannot be opened.
     pub(super) fn set_backend(&mut self, choice: BackendChoice) {
         match choose(choice, self.scene.world.dynamic_count(), self.exact) {
             Ok((backend, _)) => {
@@ -152,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn time_passes_at_the_speed_asked_for_and_stands_still_in_a_pause() {
+    fn time_passes_at_the_requested_speed_and_stops_in_a_pause() {
         let mut live = live("tower");
         (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
         assert_eq!(live.steps, 6);
@@ -168,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mouse_pulls_the_body_under_it_and_lets_it_go() {
+    fn the_mouse_pulls_the_body_under_it_and_releases_it() {
         let mut live = live("tower");
         let camera = live.camera(1.5);
         let top = live.world().bodies.len() - 1;
@@ -189,9 +179,9 @@ mod tests {
         assert!(live.world().joints.is_empty() && live.world().bodies[top].position.y < before.y + 0.5, "it falls");
     }
 
-    /// The number of joints is then the same as before, and the joint is another one.
+    /// The number of joints stays the same while the joint changes.
     #[test]
-    fn another_body_can_be_grabbed_right_after_one_was_let_go() {
+    fn another_body_can_be_grabbed_right_after_one_was_released() {
         let mut live = live("tower");
         let camera = live.camera(1.5);
         let projection = camera.projection(1.5, 10.0);
@@ -217,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_and_backend_change_while_it_runs_and_what_contradicts_is_refused() {
+    fn settings_and_backend_change_during_a_run_and_bad_settings_are_refused() {
         let mut live = live("tower");
         live.step().expect("a step");
         live.set_config(SolverConfig::default().with(|c| c.substeps = 3));

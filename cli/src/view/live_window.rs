@@ -1,4 +1,4 @@
-//! A live scene in a window: its picture, keys, mouse and panel.
+//! Picture, keys, mouse and panel of a live scene.
 
 use std::time::{Duration, Instant};
 
@@ -12,10 +12,9 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::Result;
-use drystone::world::{BallJoint, BodyKind, World};
+use drystone::{BallJoint, BodyKind, Result, World};
 
-/// Steps keep a picture waiting for this long, or for as long as drawing takes if that is longer.
+/// Longest time of the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
 
 impl Show for Live {
@@ -28,7 +27,7 @@ impl Show for Live {
     }
 
     fn bounds(&self) -> Bounds {
-        // Where things are now, unless something flew far away.
+        // The bounds follow the bodies, unless one of them is far away.
         let now = self.bounds.join(bounds(self.world()));
         if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
     }
@@ -45,7 +44,7 @@ impl Show for Live {
     fn colors(&mut self) -> Vec<Rgba> {
         let values = self.color.values(&mut self.simulation);
         let world = &self.simulation.world;
-        // Follows slowly, so that colors do not flicker.
+        // The scale changes slowly, so that colors do not flicker.
         let scale = self.color.scale(world, &values);
         self.light_end += 0.05 * (scale - self.light_end);
         self.color.paint(world, &values, self.light_end.max(0.5 * scale))
@@ -67,7 +66,7 @@ impl Show for Live {
                 self.step()?;
                 self.owed -= self.scene.dt;
             }
-            // What cannot be made up for is let go.
+            // A simulation that is too slow for real time does not accumulate steps.
             self.owed = self.owed.min(2.0 * self.scene.dt);
         }
         self.stepping = began.elapsed();
@@ -103,7 +102,7 @@ impl Show for Live {
         let Pointer { origin, direction, .. } = *pointer;
         let world = &mut self.simulation.world;
         let met = |(i, b): (usize, &drystone::world::Body)| Some((b.meets_ray(origin, direction)?, i));
-        // What stands in front is seen, but only what is dynamic can be pulled.
+        // The mouse pulls dynamic bodies only, through other bodies if need be.
         let dynamic = world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic);
         let Some((distance, body)) = dynamic.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
         let target = origin + distance * direction;

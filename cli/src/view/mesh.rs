@@ -1,13 +1,14 @@
-//! What of a world is drawn: one mesh for all colliders of one geometry, and one instance for each collider.
+//! Meshes of a world: one for all colliders of one geometry, with an instance for each collider.
 
 use std::ops::Range;
 
 use glam::{Quat, Vec3};
 
 use super::camera::Bounds;
-use drystone::world::{BodyKind, Collider, Shape, Triangles, World};
+use drystone::world::{Collider, Triangles};
+use drystone::{BodyKind, Shape, World};
 
-/// A corner of a triangle, as the shader takes it.
+/// A corner of a triangle, in the layout of the shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
@@ -15,7 +16,7 @@ pub struct Vertex {
     normal: [f32; 3],
 }
 
-/// One collider in one picture, as the shader takes it.
+/// A collider in a picture, in the layout of the shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Instance {
@@ -29,54 +30,49 @@ pub struct Instance {
 /// Position (m) and rotation of each body of a world.
 pub type Poses = [(Vec3, Quat)];
 
-/// Poses of the bodies as they are.
 pub fn poses(world: &World) -> Vec<(Vec3, Quat)> {
     world.bodies.iter().map(|b| (b.position, b.rotation)).collect()
 }
 
-// As in shaders/view/mesh.wgsl.
+// The patterns of shaders/view/mesh.wgsl.
 const PLAIN: u32 = 0;
 const CHECKERED: u32 = 1;
 const OCTANTS: u32 = 2;
 
-/// Faces that meet at less than this are one smooth surface: cosine of 35 degrees.
+/// Cosine of the largest angle between faces of a smooth surface, 35 degrees.
 const SMOOTH: f32 = 0.82;
 
-/// A collider, and how its mesh becomes it.
 struct Part {
     body: usize,
     position: Vec3,
     rotation: Quat,
     scale: Vec3,
     pattern: u32,
-    /// Outward normal, if it is a half-space.
+    /// Outward normal of a half-space.
     plane: Option<Vec3>,
-    /// What dynamic bodies can be hidden by: a collider of a body that is not dynamic.
+    /// A collider of a body that is not dynamic; it can hide dynamic bodies.
     screen: Option<Collider>,
 }
 
-/// Colliders that share a mesh.
 struct Group {
     vertices: Range<u32>,
     parts: Vec<Part>,
 }
 
-/// The meshes of a world.
 pub struct Meshes {
-    /// Corners of all triangles.
     pub vertices: Vec<Vertex>,
     groups: Vec<Group>,
 }
 
 impl Meshes {
-    /// Meshes for the bodies of `world`, whose shapes stay as they are.
+    /// Meshes for the bodies of `world`, whose shapes must not change.
     pub fn new(world: &World) -> Self {
         let mut meshes = Self { vertices: Vec::new(), groups: Vec::new() };
         let mut known: Vec<Shape> = Vec::new();
         let (unit_cube, unit_ball) = (Shape::cuboid(1.0, 1.0, 1.0), Shape::ball(1.0));
         for (i, body) in world.bodies.iter().enumerate() {
             for collider in &body.colliders {
-                // All boxes are one mesh, and all balls.
+                // All boxes share a mesh, and all balls.
                 let (shape, scale) = match (collider.shape.as_cuboid(), collider.shape.as_ball()) {
                     (Some(half_extents), _) => (&unit_cube, half_extents),
                     (_, Some(radius)) => (&unit_ball, Vec3::splat(radius)),
@@ -91,12 +87,15 @@ impl Meshes {
                 let screen = (body.kind != BodyKind::Dynamic && plane.is_none()).then(|| collider.clone());
                 let (position, rotation) = (collider.position, collider.rotation);
                 let part = Part { body: i, position, rotation, scale, pattern, plane, screen };
-                // The last one first: bodies of one shape come one after another.
+                // Bodies of one shape often follow each other: the search begins at the end.
                 match known.iter().rposition(|k| k.is_same(shape)) {
                     Some(group) => meshes.groups[group].parts.push(part),
                     None => {
                         known.push(shape.clone());
-                        meshes.add(shape, part);
+                        let first = meshes.vertices.len() as u32;
+                        meshes.vertices.extend(corners(&shape.triangles()));
+                        let vertices = first..meshes.vertices.len() as u32;
+                        meshes.groups.push(Group { vertices, parts: vec![part] });
                     }
                 }
             }
@@ -104,13 +103,6 @@ impl Meshes {
         meshes
     }
 
-    fn add(&mut self, shape: &Shape, part: Part) {
-        let first = self.vertices.len() as u32;
-        self.vertices.extend(corners(&shape.triangles()));
-        self.groups.push(Group { vertices: first..self.vertices.len() as u32, parts: vec![part] });
-    }
-
-    /// Vertices and instances of each draw.
     pub fn draws(&self) -> impl Iterator<Item = (Range<u32>, Range<u32>)> {
         let mut first = 0;
         self.groups.iter().map(move |g| {
@@ -120,8 +112,8 @@ impl Meshes {
         })
     }
 
-    /// One row for each collider, in the order of [`Meshes::draws`]. Half-spaces are drawn as squares of half side `reach`
-    /// around `middle`. Colliders of bodies that are not dynamic are left out where their bounds are `hidden`.
+    /// An instance for each collider, in the order of [`Meshes::draws`]. A half-space is a square of half side `reach` around `middle`.
+    /// Colliders of bodies that are not dynamic vanish if their bounds are `hidden`.
     pub fn instances(
         &self,
         poses: &Poses,
@@ -155,7 +147,7 @@ impl Meshes {
     }
 }
 
-/// Corners of the triangles with normals: flat where faces meet at an edge, smooth where the surface is round.
+/// Corners of the triangles with normals, which are smooth over round surfaces and flat at edges.
 fn corners((vertices, triangles): &Triangles) -> Vec<Vertex> {
     let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| vertices[i as usize]);
@@ -178,7 +170,7 @@ fn corners((vertices, triangles): &Triangles) -> Vec<Vertex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::scenes::Scene;
+    use drystone::Scene;
 
     #[test]
     fn equal_geometry_is_one_draw_and_every_collider_is_an_instance() {
@@ -208,7 +200,7 @@ mod tests {
             let worst = corners.iter().map(|v| Vec3::from_array(v.normal).angle_between(Vec3::from_array(v.position)));
             worst.fold(0.0, f32::max)
         };
-        // The corners of a flat facet would be off by 0.1.
+        // The corners of flat facets would differ by 0.1.
         let ball = off(&Shape::ball(1.0));
         assert!(ball < 0.05, "{ball}");
         assert!((off(&Shape::cuboid(1.0, 1.0, 1.0)) - (1.0_f32 / 3.0).sqrt().acos()).abs() < 1e-3);

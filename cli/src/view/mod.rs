@@ -1,14 +1,4 @@
 //! Pictures of a world, with or without a window.
-//!
-//! ```text
-//! mesh      world -> one mesh a geometry, one instance a collider
-//! colors    bodies -> colors by material, batch, speed or impulse
-//! camera    frames a scene by itself; orbit, pan, zoom; the ray under the cursor
-//! renderer  poses, colors, camera -> a texture: light, shadow map, lines on top
-//! canvas    the same, read back: pictures on whatever adapter there is
-//! film      a run or a recorded motion as frames -> pictures -> png, gif, frames, mp4 (output)
-//! window    events in, pictures out, for anything that can be shown: a scene that runs (live, panel), the maze (labyrinth)
-//! ```
 
 mod camera;
 mod canvas;

@@ -25,7 +25,6 @@ pub(super) fn no_display() -> Error {
     Error::Adapter(format!("no display to open a window on; {without}"))
 }
 
-/// What the mouse does while a button is held.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Drag {
     Nothing,
@@ -34,7 +33,6 @@ enum Drag {
     Pan,
 }
 
-/// A window that is open.
 pub(super) struct Open {
     pub(super) window: Arc<Window>,
     device: wgpu::Device,
@@ -46,7 +44,7 @@ pub(super) struct Open {
     pub(super) ui: egui_winit::State,
     ui_renderer: egui_wgpu::Renderer,
     panel: bool,
-    /// How much of the window the panel covers, from the right (pixels).
+    /// Width of the panel at the right of the window (pixels).
     panel_width: f32,
     drag: Drag,
     mouse: PhysicalPosition<f64>,
@@ -64,7 +62,7 @@ impl Open {
         let mut surface_config = surface
             .get_default_config(&adapter, size.width.max(1), size.height.max(1))
             .ok_or_else(|| Error::Adapter("the adapter cannot draw on this display".into()))?;
-        // The shaders encode sRGB by themselves, and so does egui.
+        // The shaders and egui encode sRGB themselves.
         let formats = surface.get_capabilities(&adapter).formats;
         surface_config.format = formats.into_iter().find(|f| !f.is_srgb()).unwrap_or(surface_config.format);
         surface.configure(&device, &surface_config);
@@ -100,7 +98,7 @@ impl Open {
         self.surface_config.width as f32 / self.surface_config.height as f32
     }
 
-    /// Returns whether the window is still there.
+    /// Returns whether the window still exists.
     pub(super) fn resize(&mut self, width: u32, height: u32) -> bool {
         if width == 0 || height == 0 {
             return true;
@@ -109,23 +107,22 @@ impl Open {
         self.configure()
     }
 
-    /// Makes the surface as large as the window; returns whether that is still there: another program may have closed it.
+    /// Resizes the surface; returns whether the window still exists, since another program may close it.
     fn configure(&self) -> bool {
         let refused = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         self.surface.configure(&self.device, &self.surface_config);
         pollster::block_on(refused.pop()).is_none()
     }
 
-    /// The camera that `show` asks for, for what the panel leaves of the window.
+    /// Sets the camera of `show` for the part of the window beside the panel.
     fn frame_scene(&mut self, show: &dyn Show) {
         let (width, height) = (self.surface_config.width as f32, self.surface_config.height as f32);
-        // Never more than half.
+        // The panel counts for at most half of the window.
         let panel = if self.panel { self.panel_width.min(0.5 * width) } else { 0.0 };
         self.camera = show.camera((width - panel) / height);
         self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
     }
 
-    /// Keys that are the window's own.
     pub(super) fn key(&mut self, key: &Key, down: bool, show: &dyn Show) {
         match key.as_ref() {
             Key::Character("f") if down => self.frame_scene(show),
@@ -166,13 +163,13 @@ impl Open {
         }
     }
 
-    /// Lets time pass, then draws; returns whether the window is still there.
+    /// Advances the time and draws; returns whether the window still exists.
     pub(super) fn frame(&mut self, show: &mut dyn Show) -> Result<bool> {
         let now = Instant::now();
         show.advance((now - self.last).as_secs_f32())?;
         self.last = now;
         if self.drag == Drag::Body {
-            // The camera and the body move even if the mouse does not.
+            // The camera and the body can move while the mouse does not.
             show.drag(&self.pointer());
         }
 
@@ -180,7 +177,7 @@ impl Open {
         let target = match self.surface.get_current_texture() {
             Success(target) | Suboptimal(target) => target,
             Outdated | Lost => return Ok(self.configure()),
-            // Hidden, or late: the next frame may do.
+            // The window is hidden or late; the next frame may succeed.
             _ => return Ok(true),
         };
         let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());
@@ -215,7 +212,7 @@ impl Open {
                 width = shown.map_or(0.0, |s| s.response.rect.width() * ui.ctx().pixels_per_point());
             }
         });
-        // The first time shows how much room it leaves.
+        // The first frame gives the width of the panel.
         if width > 0.0 && std::mem::replace(&mut self.panel_width, width) == 0.0 {
             self.frame_scene(show);
         }
@@ -248,7 +245,7 @@ impl Open {
         for id in &output.textures_delta.free {
             self.ui_renderer.free_texture(id);
         }
-        // Done with: it panics if it is dropped with anything in it.
+        // egui panics if this is dropped with contents.
         output.textures_delta.clear();
     }
 }

@@ -1,4 +1,4 @@
-//! Where pictures go: one PNG, an animated GIF, a folder of PNGs, or an MP4 through ffmpeg.
+//! Files of pictures: PNG, animated GIF, a folder of PNGs, or MP4 by ffmpeg.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -9,15 +9,14 @@ use super::canvas::Picture;
 use crate::files::Draft;
 use drystone::{Error, Result};
 
-/// A place for pictures that is known to be writable; nothing is under its name until [`Output::finish`].
+/// An open file or folder for pictures, which appears under its name with [`Output::finish`].
 pub struct Output {
     path: PathBuf,
-    /// Before the draft: what writes into it ends first.
+    /// Dropped before the draft: the writer ends first.
     kind: Kind,
-    /// Where the pictures are until then.
     draft: Draft,
     size: (u32, u32),
-    /// Hundredths of a second that a frame of a GIF is shown.
+    /// Duration of a GIF frame (1/100 s).
     delay: u16,
 }
 
@@ -28,26 +27,26 @@ enum Kind {
     Mp4(Ffmpeg),
 }
 
-/// A process that ends with its pictures, or with the output if they were not finished.
+/// A process that is killed if the output is dropped.
 struct Ffmpeg(Child);
 
 impl Drop for Ffmpeg {
     fn drop(&mut self) {
-        // Fails if it has ended, which is as well.
+        // Fails if the process has ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
 impl Output {
-    /// Refuses a name whose ending says no form, before anything is made for it.
+    /// Refuses a path without a known extension.
     pub fn check(path: &Path) -> Result<()> {
         let known = path.extension().is_some_and(|e| e == "png" || e == "gif" || e == "mp4");
         if path.file_name().is_some() && (known || is_folder(path)) { Ok(()) } else { Err(unknown(path)) }
     }
 
-    /// Opens `path` for pictures of `size`, `rate` of them a second; its ending says in which form: `.png`, `.gif`, `.mp4`, or a
-    /// slash for a folder of numbered PNGs.
+    /// Opens `path` for pictures of `size` with `rate` pictures per second. The path ends in `.png`, `.gif`, `.mp4`, or a slash for a
+    /// folder of numbered PNGs.
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
         Self::check(path)?;
         let draft = Draft::of(path)?;
@@ -66,7 +65,7 @@ impl Output {
                 Kind::Gif(Box::new(encoder))
             }
             Some("mp4") => {
-                // That the place can be written shows before ffmpeg starts.
+                // A path that cannot be written is an error before ffmpeg starts.
                 drop(draft.create()?);
                 Kind::Mp4(ffmpeg(draft.place(), size, rate)?)
             }
@@ -76,7 +75,6 @@ impl Output {
         Ok(Self { path: path.into(), draft, kind, size, delay })
     }
 
-    /// Adds a picture.
     pub fn add(&mut self, picture: &Picture) -> Result<()> {
         let path = &self.path;
         match &mut self.kind {
@@ -101,7 +99,6 @@ impl Output {
         }
     }
 
-    /// Ends the file and gives it its name.
     pub fn finish(self) -> Result<()> {
         let Self { path, draft, kind, .. } = self;
         match kind {
@@ -117,7 +114,7 @@ impl Output {
                 }
             }
             Kind::Frames(_) if path.is_dir() => {
-                // A folder that is there keeps what else is in it.
+                // An existing folder keeps its other files.
                 for entry in std::fs::read_dir(draft.place()).map_err(Error::file(&path))? {
                     let entry = entry.map_err(Error::file(&path))?;
                     std::fs::rename(entry.path(), path.join(entry.file_name())).map_err(Error::file(&path))?;
@@ -135,10 +132,8 @@ fn is_folder(path: &Path) -> bool {
 }
 
 fn unknown(path: &Path) -> Error {
-    Error::input(format!(
-        "{}: pictures are written as .png, .gif, .mp4 or to a folder, with a slash at the end",
-        path.display()
-    ))
+    let path = path.display();
+    Error::input(format!("{path}: pictures are written as .png, .gif, .mp4 or to a folder, with a slash at the end"))
 }
 
 fn failed(path: &Path, e: impl std::fmt::Display) -> Error {
@@ -156,12 +151,12 @@ fn write_png(file: &File, picture: &Picture) -> std::result::Result<(), png::Enc
     writer.finish()
 }
 
-/// An ffmpeg that takes rows of pixels and writes H.264.
+/// An ffmpeg process that reads rows of pixels and writes H.264.
 fn ffmpeg(to: &Path, (width, height): (u32, u32), rate: f64) -> Result<Ffmpeg> {
     let mut command = Command::new("ffmpeg");
     command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
     command.args(["-s", &format!("{width}x{height}"), "-r", &format!("{rate:.4}"), "-i", "-"]);
-    // Players want even sides.
+    // Players require even sides.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-c:v", "libx264", "-f", "mp4"]);
     command.arg(to).stdin(Stdio::piped()).spawn().map(Ffmpeg).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {

@@ -1,14 +1,13 @@
-//! Lines over the picture: what the solver knows of a scene.
+//! Lines over the picture: contacts, joints and boxes.
 
 use glam::Vec3;
 
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::world::{BallJoint, BodyKind, World};
-use drystone::{Simulation, SolvedManifold};
+use drystone::{BallJoint, BodyKind, Simulation, SolvedManifold, World};
 
-/// One end of a line, as the shader takes it.
+/// An end of a line, in the layout of the shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct LineEnd {
@@ -16,14 +15,12 @@ pub struct LineEnd {
     color: Rgba,
 }
 
-/// Which lines are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Overlay {
-    /// A cross at every contact point, and its normal, in the color of the batch.
+    /// A cross and the normal at every contact point, in the color of the batch.
     pub contacts: bool,
-    /// From each body's center to its joints, and the gap between the anchors.
+    /// Lines from the center of each body to its joints, and between the anchors.
     pub joints: bool,
-    /// The box along the world's axes around every collider.
     pub boxes: bool,
 }
 
@@ -31,7 +28,7 @@ const JOINT: Rgba = [30, 90, 200, 255];
 const GAP: Rgba = [220, 30, 30, 255];
 const BOX: Rgba = [90, 90, 90, 255];
 
-/// From the bodies that hang from the world to where they hang, as pairs of line ends.
+/// Lines from bodies to their anchors in the world, as pairs of ends.
 pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     let hung = world.joints.iter().filter(|j| j.body_b.is_none());
     let rope = |j: &BallJoint| {
@@ -42,7 +39,7 @@ pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     hung.flat_map(rope).collect()
 }
 
-/// Pairs of line ends, `size` long where a length has no other measure (m).
+/// Lines as pairs of ends; crosses and normals have the length `size` (m).
 pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<LineEnd> {
     let manifolds: Vec<SolvedManifold> = if overlay.contacts { simulation.manifolds().collect() } else { Vec::new() };
     let world = &simulation.world;
@@ -76,7 +73,7 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
             for collider in &body.colliders {
                 let (low, high) = collider.bounds(body.position, body.rotation);
                 let corners = Bounds { low, high }.corners();
-                // Corners whose numbers differ in one bit share an edge.
+                // Corners with numbers that differ in one bit share an edge.
                 let edges = (0..8).flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit))).filter(|(k, n)| k != n);
                 edges.for_each(|(k, n)| line(corners[k], corners[n], BOX));
             }
@@ -88,9 +85,7 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::backend::cpu::Reference;
-    use drystone::config::SolverConfig;
-    use drystone::scenes::Scene;
+    use drystone::{Reference, Scene, SolverConfig};
 
     #[test]
     fn every_contact_joint_and_box_has_its_lines() {

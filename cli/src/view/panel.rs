@@ -1,4 +1,4 @@
-//! The panel of a live scene: what it does, and what can be changed while it runs.
+//! The panel of a live scene: measurements, controls and settings.
 
 use clap::ValueEnum;
 
@@ -7,7 +7,6 @@ use super::live::Live;
 use drystone::backend::BackendChoice;
 use drystone::config::Friction;
 
-/// Fills `ui`.
 pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
     numbers(live, ui);
     ui.separator();
@@ -30,7 +29,7 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
 fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let asleep = live.stats.asleep;
     let depth = live.simulation.solved_penetration();
-    // With those of sleepers, which the last step does not count.
+    // The manifolds of sleeping bodies are not in the statistics of the step.
     let (manifolds, points, colors) = live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
         (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
     });
@@ -95,11 +94,7 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
             ui.selectable_value(&mut config.friction, rule, name);
         }
     });
-    let changed = config.substeps != before.substeps
-        || config.iterations != before.iterations
-        || config.relax != before.relax
-        || config.friction != before.friction;
-    if changed {
+    if config != before {
         live.set_config(config);
     }
     let mut backend = live.choice;
@@ -112,7 +107,6 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
     }
 }
 
-/// One of the values that the command line knows too.
 fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str, all: &[T], value: &mut T) {
     ui.horizontal(|ui| {
         ui.label(what);
@@ -123,7 +117,6 @@ fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str
 }
 
 impl ColorBy {
-    /// The one after this, in turn.
     pub fn next(self) -> Self {
         let all = Self::value_variants();
         let at = all.iter().position(|&c| c == self).map_or(0, |i| i + 1);

@@ -1,13 +1,11 @@
 //! Textures, bindings and pipelines of the renderer.
 
-/// How much work goes into a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quality {
-    /// Samples of a pixel, 1 or 4.
+    /// Samples per pixel, 1 or 4.
     pub(super) samples: u32,
-    /// Side of the shadow map in texels.
     pub(super) shadow_size: u32,
-    /// Places of the shadow map that are compared on either side of a point.
+    /// Texels of the shadow map that are compared on each side of a point.
     pub(super) shadow_reach: u32,
 }
 
@@ -18,16 +16,16 @@ impl Quality {
     pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
 }
 
-/// Format of depth, and of the shadow map.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 pub(super) fn texture(
     device: &wgpu::Device,
     (width, height): (u32, u32),
     format: wgpu::TextureFormat,
     sample_count: u32,
     usage: wgpu::TextureUsages,
-) -> wgpu::TextureView {
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
+) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         mip_level_count: 1,
@@ -36,8 +34,7 @@ pub(super) fn texture(
         format,
         usage,
         view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    })
 }
 
 pub(super) fn cleared_depth(
@@ -53,18 +50,13 @@ pub(super) fn bind(
     kinds: &[wgpu::BindingType],
     resources: &[wgpu::BindingResource],
 ) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
-    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty,
-        count: None,
-    };
+    let visibility = wgpu::ShaderStages::VERTEX_FRAGMENT;
+    let entry = |(binding, &ty)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
     let entries: Vec<_> = (0..).zip(kinds).map(entry).collect();
     let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
     let bound = (0..).zip(resources).map(|(binding, r)| wgpu::BindGroupEntry { binding, resource: r.clone() });
-    let entries: Vec<_> = bound.collect();
-    let group =
-        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    let descriptor = wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &bound.collect::<Vec<_>>() };
+    let group = device.create_bind_group(&descriptor);
     (layout, group)
 }
 
@@ -75,12 +67,11 @@ pub(super) fn layout_of<T>(
     wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
 }
 
-/// What tells one pipeline from another.
 pub(super) struct Drawing<'a> {
     pub(super) layout: &'a wgpu::BindGroupLayout,
     pub(super) module: &'a wgpu::ShaderModule,
     pub(super) vertex: &'a str,
-    /// None draws depth only.
+    /// A pipeline without a fragment shader draws depth only.
     pub(super) fragment: Option<&'a str>,
     pub(super) buffers: &'a [wgpu::VertexBufferLayout<'a>],
     pub(super) topology: wgpu::PrimitiveTopology,

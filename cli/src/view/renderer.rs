@@ -1,6 +1,4 @@
-//! Draws the bodies of a world with wgpu: one instanced draw for each mesh, a shadow map, lines on top.
-//!
-//! Runs on any adapter, the software one included, into any texture: a window's or one that is read back.
+//! Draws the bodies of a world with wgpu on any adapter: an instanced draw for each mesh, a shadow map, lines on top.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -13,25 +11,18 @@ use super::colors::Rgba;
 use super::mesh::{Instance, Meshes, Poses, Vertex};
 use super::overlay::LineEnd;
 use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
-use drystone::world::World;
+use drystone::World;
 
-/// The background, as sRGB.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
-/// What one picture shows.
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
-    /// Where the bodies are.
     pub poses: &'a Poses,
-    /// The color of each body.
     pub colors: &'a [Rgba],
-    /// Where it is seen from.
     pub camera: &'a Camera,
-    /// What casts shadows and is drawn with depth: the scene.
     pub bounds: Bounds,
-    /// A space whose near walls are left out, so that one sees what is inside.
+    /// The near walls of this space are hidden.
     pub container: Option<Bounds>,
-    /// Lines on top.
     pub lines: &'a [LineEnd],
 }
 
@@ -47,7 +38,6 @@ struct View {
     background: [f32; 4],
 }
 
-/// Draws one world.
 pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -62,7 +52,7 @@ pub struct Renderer {
     lines: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
     quality: Quality,
-    /// Depth, and color where there are several samples, as large as the picture.
+    /// Textures of the size of the picture: depth, and color with several samples.
     targets: Option<Targets>,
 }
 
@@ -73,7 +63,7 @@ struct Targets {
 }
 
 impl Renderer {
-    /// A renderer for the bodies of `world` into textures of `format`, which is not one that encodes sRGB by itself.
+    /// A renderer for the bodies of `world` into textures of `format`, which must not be an sRGB format.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -94,7 +84,8 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let shadow_map = texture(device, (quality.shadow_size, quality.shadow_size), DEPTH, 1, usage);
+        let shadow_map = texture(device, (quality.shadow_size, quality.shadow_size), DEPTH, 1, usage)
+            .create_view(&Default::default());
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -103,33 +94,30 @@ impl Renderer {
             ..Default::default()
         });
 
-        let uniform = wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let depth_texture = wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Depth,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
+        let ty = wgpu::BufferBindingType::Uniform;
+        let uniform = wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+        let (sample_type, view_dimension) = (wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
+        let depth_texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
         let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
         let resources = [
             view.as_entire_binding(),
             wgpu::BindingResource::TextureView(&shadow_map),
             wgpu::BindingResource::Sampler(&sampler),
         ];
-        // The shadow pass writes the map, so it cannot have it bound.
+        // The shadow pass writes the map and therefore must not bind it.
         let (shadow_layout, shadow_group) = bind(device, &[uniform], &resources[..1]);
         let (main_layout, main_group) = bind(device, &[uniform, depth_texture, comparison], &resources);
 
         let module = |label: &str, source: &str| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
-                source: wgpu::ShaderSource::Wgsl([VIEW_WGSL, source].concat().into()),
+                source: wgpu::ShaderSource::Wgsl(
+                    [include_str!("../../shaders/view/view.wgsl"), source].concat().into(),
+                ),
             })
         };
-        let (mesh, line) = (module("mesh", MESH_WGSL), module("line", LINE_WGSL));
+        let mesh = module("mesh", include_str!("../../shaders/view/mesh.wgsl"));
+        let line = module("line", include_str!("../../shaders/view/line.wgsl"));
         let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
         let row = wgpu::vertex_attr_array![2 => Float32x3, 3 => Unorm8x4, 4 => Float32x4, 5 => Float32x3, 6 => Uint32];
         let end = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
@@ -146,7 +134,7 @@ impl Renderer {
         Self {
             shadow: make(&shadow_layout, &mesh, "cast_shadow", None, &rows, TriangleList, Less),
             bodies: make(&main_layout, &mesh, "transform", Some("shade"), &rows, TriangleList, Less),
-            // Contacts lie inside of bodies: lines are never hidden.
+            // Contacts lie inside bodies; lines are drawn on top.
             lines: make(&shadow_layout, &line, "end_of_line", Some("paint_line"), &ends, LineList, Always),
             device: device.clone(),
             queue: queue.clone(),
@@ -162,7 +150,7 @@ impl Renderer {
         }
     }
 
-    /// Draws `shot` into `target`, which is `size` in pixels: width, height.
+    /// Draws `shot` into `target` of width and height `size` (pixels).
     pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), shot: &Shot) {
         self.write_view(shot, size.0 as f32 / size.1 as f32);
         let eye = shot.camera.eye();
@@ -179,7 +167,8 @@ impl Renderer {
 
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
             let samples = self.quality.samples;
-            let of = |format| texture(&self.device, size, format, samples, wgpu::TextureUsages::RENDER_ATTACHMENT);
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
+            let of = |format| texture(&self.device, size, format, samples, usage).create_view(&Default::default());
             self.targets = Some(Targets { size, color: (samples > 1).then(|| of(self.format)), depth: of(DEPTH) });
         }
         let Some(Targets { color, depth, .. }) = &self.targets else { return };
@@ -228,10 +217,10 @@ impl Renderer {
     fn write_view(&self, shot: &Shot, aspect: f32) {
         let (camera, bounds) = (shot.camera, shot.bounds);
         let (center, radius) = (bounds.center(), bounds.radius());
-        // From behind the camera's left shoulder, so that the sides that are seen differ in brightness.
+        // The light comes from the left behind the camera, so that visible sides differ in brightness.
         let [right, _, back] = camera.axes();
         let level = |v: Vec3| (v - camera.up * v.dot(camera.up)).normalize_or_zero();
-        let light = (1.0 * camera.up + 0.35 * level(back) - 0.55 * level(right)).normalize();
+        let light = (camera.up + 0.35 * level(back) - 0.55 * level(right)).normalize();
         let from = look_at_mat4(center + 3.0 * radius * light, center, camera.axes()[1]);
         let around = directx::orthographic(-radius, radius, -radius, radius, radius, 5.0 * radius);
         let view = View {
@@ -239,24 +228,16 @@ impl Renderer {
             light_projection: (around * from).to_cols_array_2d(),
             eye: camera.eye().extend(camera.distance + 2.0 * radius).to_array(),
             light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
-            up: camera.up.extend(pattern_edge(radius)).to_array(),
+            // The side of the squares on the ground is a power of ten (m).
+            up: camera.up.extend(10.0_f32.powf((radius.log10() - 0.5).round())).to_array(),
             background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
         };
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
     }
 }
 
-const VIEW_WGSL: &str = include_str!("../../shaders/view/view.wgsl");
-const MESH_WGSL: &str = include_str!("../../shaders/view/mesh.wgsl");
-const LINE_WGSL: &str = include_str!("../../shaders/view/line.wgsl");
-
-/// Edge of the squares on the ground for a scene of this radius: a power of ten (m).
-fn pattern_edge(radius: f32) -> f32 {
-    10.0_f32.powf((radius.log10() - 0.5).round())
-}
-
-/// Whether something outside of `container` is on the side of it that the eye is on, and covers more than half of its length and
-/// of its height there: a wall.
+/// Whether a body is a near wall of `container`: it lies outside on the side of the eye and covers more than half of both lengths of
+/// this side.
 fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
     let slack = 1e-3 * container.radius();
     let covered = b.high.min(container.high) - b.low.max(container.low);

@@ -1,4 +1,4 @@
-//! A window: events in, pictures out. What it shows, and what keys and mouse do to it, is a [`Show`].
+//! The event loop of a window with a [`Show`].
 
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, KeyEvent, MouseScrollDelta, WindowEvent};
@@ -10,7 +10,6 @@ use super::open::{Open, no_display};
 use super::show::Show;
 use drystone::{Error, Result};
 
-/// Opens a window and shows `show` until it is closed.
 pub fn run(show: Box<dyn Show>) -> Result<()> {
     let events = EventLoop::new().map_err(|_| no_display())?;
     events.set_control_flow(ControlFlow::Poll);
@@ -49,7 +48,11 @@ impl ApplicationHandler for App {
             },
             WindowEvent::KeyboardInput { event: KeyEvent { logical_key, state, repeat, .. }, .. } if !taken => {
                 let down = state == ElementState::Pressed;
-                let logical_key = in_lower_case(logical_key);
+                // Keys are independent of shift and caps lock.
+                let logical_key = match logical_key {
+                    Key::Character(text) => Key::Character(text.to_lowercase().into()),
+                    other => other,
+                };
                 if logical_key == Key::Named(NamedKey::Escape) {
                     return events.exit();
                 }
@@ -78,21 +81,12 @@ impl ApplicationHandler for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // Before the event loop, whose display it is on.
+        // The window must be dropped before the event loop.
         self.open = None;
     }
 }
 
-/// Shift and caps lock make no difference.
-fn in_lower_case(key: Key) -> Key {
-    match key {
-        Key::Character(text) => Key::Character(text.to_lowercase().into()),
-        other => other,
-    }
-}
-
 impl App {
-    /// Closes the window if something failed.
     fn end(&mut self, events: &ActiveEventLoop, result: Result<()>) {
         if let Err(e) = result {
             self.failed = Some(e);

@@ -1,25 +1,24 @@
-//! A bench beside an earlier one.
+//! Comparison of a bench with an earlier one.
 
-use super::{Bench, BenchRow};
+use super::{Bench, StagesRow};
 use drystone::{Error, Result};
 
-/// What became of one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
     /// The earlier bench has no such row.
     New,
-    /// The scene of that name is another one now, so that its times say nothing.
+    /// The scene has other contents; the times cannot be compared.
     OtherScene,
-    /// Ratio of the times, now to then; within the spread of the two.
+    /// Ratio of the new time to the earlier one; within the spread of both.
     Same(f64),
-    /// Slower than then: the lower quartile is above what was the upper one.
+    /// The lower quartile is above the earlier upper one.
     Slower(f64),
-    /// Faster than then: the upper quartile is below what was the lower one.
+    /// The upper quartile is below the earlier lower one.
     Faster(f64),
 }
 
 impl Bench {
-    /// Reads what `drystone bench --json` printed.
+    /// Reads the output of `drystone bench --json`.
     pub fn read(path: &std::path::Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
         serde_json::from_str(&text).map_err(|e| {
@@ -29,9 +28,8 @@ impl Bench {
     }
 }
 
-/// What became of each row of `now` since `then`.
 pub fn compare_with(now: &Bench, then: &Bench) -> Vec<Change> {
-    let change = |row: &BenchRow| {
+    let change = |row: &StagesRow| {
         let Some(old) = then.rows.iter().find(|old| old.key() == row.key()) else { return Change::New };
         let ratio = row.ms / old.ms;
         match () {
@@ -48,8 +46,7 @@ pub fn compare_with(now: &Bench, then: &Bench) -> Vec<Change> {
 mod tests {
     use super::*;
     use crate::report::bench::bench;
-    use drystone::backend::Backend;
-    use drystone::config::SolverConfig;
+    use drystone::{Backend, SolverConfig};
 
     fn measured() -> Bench {
         let open = || Ok(vec![Box::new(drystone::Cpu::new()) as Box<dyn Backend>]);
@@ -82,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_says_what_was_measured_and_what_is_wrong_with_it() {
+    fn a_row_has_counts_times_and_errors() {
         let bench = measured();
         let [tower, piles] = &bench.rows[..] else { panic!("two rows") };
         assert_eq!((tower.bodies, tower.worlds, piles.bodies, piles.worlds), (3, 1, 16, 2));

@@ -1,26 +1,22 @@
-//! What a bench ran on.
+//! The machine that a bench ran on.
 
 use serde::{Deserialize, Serialize};
 
-/// The machine and the build, as far as they say anything about times.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
-    /// Model of the processor; empty where the system does not say.
+    /// Model of the processor; empty if unknown.
     pub processor: String,
-    /// Cores that this process may use.
     pub cores: usize,
-    /// Memory of the machine (MiB); 0 where the system does not say.
+    /// Memory (MiB); 0 if unknown.
     pub memory: u64,
-    /// Operating system and instruction set.
     pub system: String,
-    /// Version of drystone, and whether it is a build for speed.
+    /// Version of drystone, and `debug` or `release`.
     pub build: String,
 }
 
 impl Machine {
-    /// The one that this runs on.
     pub fn this() -> Self {
-        // Linux says it in files; nobody else is asked.
+        // Only Linux has these files.
         let said = |file: &str, key: &str| {
             let text = std::fs::read_to_string(file).unwrap_or_default();
             let line = text.lines().find(|line| line.starts_with(key)).unwrap_or_default();
@@ -37,7 +33,6 @@ impl Machine {
         }
     }
 
-    /// One line for people.
     pub fn line(&self) -> String {
         let Self { processor, cores, memory, system, build } = self;
         format!("{processor}, {cores} cores, {memory} MiB, {system}; drystone {build}")

@@ -1,8 +1,8 @@
-//! `drystone bench`: what the stages of a step cost on standard scenes, and what they get wrong.
+//! `drystone bench`: times of the stages of a step, and errors, on standard scenes.
 //!
-//! All scenes are settled first. Then they step in turns, a few steps each, over and over, so that whatever slows the machine
-//! down meets all of them; a time is the median over the turns, its spread their quartiles. On one scene all backends and
-//! numbers of threads take turns at one simulation, so that they have the same to do.
+//! All scenes are settled first. Then they take turns of a few steps, so that a slow phase of the machine affects all of them. A time
+//! is the median over the turns, its spread the quartiles. All backends and numbers of threads share one simulation of a scene, so that
+//! they do the same work.
 
 mod baseline;
 mod limits;
@@ -17,18 +17,13 @@ use serde::{Deserialize, Serialize};
 use crate::report::rounds::{interleave, quartiles};
 use crate::report::scene_hash::content_hash;
 use crate::settings;
-use drystone::Simulation;
-use drystone::backend::Backend;
-use drystone::backend::cpu::Reference;
-use drystone::config::SolverConfig;
 use drystone::metrics::rms_speed;
 use drystone::residuals::Residuals;
-use drystone::scenes::Scene;
 use drystone::stages::plan::Kernel;
-use drystone::stats::{StageTimes, median};
-use drystone::{Error, Result};
+use drystone::stats::median;
+use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig};
 
-/// The scenes of a whole bench: `name:key=value,...`, see [`Scene::find_spec`].
+/// The scenes of a full bench, as in [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [
     "pile:n=1000",
     "pile:n=5000",
@@ -41,96 +36,71 @@ pub const STANDARD: [&str; 9] = [
     "pile:n=100,worlds=256",
 ];
 
-/// The scenes of a quick one.
 pub const QUICK: [&str; 5] = ["pile:n=1000", "many-pyramids:n=10", "drum", "joint-grid", "pile:n=100,worlds=8"];
 
-/// Steps of a turn.
 const TURN: usize = 10;
-/// Steps in which what falls into a container settles, at one substep.
+/// Steps of one substep in which bodies fall into a container.
 const COARSE: usize = 240;
-/// Steps at the settings that are measured, before they are.
+/// Steps with the measured settings before the measurement.
 const FINE: usize = 60;
 
-/// One scene on one backend with so many threads. Times are wall milliseconds of a step.
+/// Wall times of the stages of a step (ms), counts and errors: one scene on one backend with one number of threads. Counts and errors
+/// are of the last step. [`comparison::Row`](crate::report::comparison::Row) compares engines, which have no stages.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BenchRow {
-    /// The scene, with its parameters.
+pub struct StagesRow {
     pub scene: String,
-    /// Hash of what is in it.
     pub hash: String,
-    /// `reference`, `cpu` or `gpu`.
     pub backend: String,
-    /// What it ran on.
     pub adapter: String,
-    /// Threads.
     pub threads: usize,
-    /// Settings that are not at their defaults.
     pub settings: String,
-    /// Worlds.
     pub worlds: usize,
-    /// Dynamic bodies.
     pub bodies: usize,
-    /// Manifolds at the end.
     pub manifolds: usize,
-    /// Contact points at the end.
     pub points: usize,
-    /// Joints.
     pub joints: usize,
-    /// Colors of the contacts at the end.
     pub colors: usize,
-    /// Share of the pairs whose manifolds were reused, at the end.
+    /// Share of the pairs that reused their manifolds.
     pub reused: f64,
-    /// All stages together, median over the turns (ms).
+    /// All stages together: median over the turns, and quartiles.
     pub ms: f64,
-    /// Its lower quartile.
     pub ms_low: f64,
-    /// Its upper quartile.
     pub ms_high: f64,
-    /// Finding contacts (ms).
     pub detect: f64,
-    /// Coloring them (ms).
     pub color: f64,
-    /// Writing rows (ms).
     pub prepare: f64,
-    /// Sweeping, transfers included (ms).
+    /// Sweeps and transfers.
     pub run: f64,
-    /// Reading the rows back (ms).
     pub store: f64,
-    /// Deepest overlap at the end (m).
+    /// Overlaps (m).
     pub penetration_max: f64,
-    /// Mean overlap at the end (m).
     pub penetration_mean: f64,
-    /// Root mean square speed at the end (m/s).
+    /// Root mean square speed (m/s).
     pub speed_rms: f64,
-    /// How far the impulses at the end of a substep are from solving its contact problem without springs:
-    /// [`Residuals::e_vel`]. None where there are joints.
+    /// [`Residuals::e_vel`] of the impulses after a substep in its contact problem without springs; none with joints.
     pub residual: Option<f64>,
 }
 
-impl BenchRow {
-    /// What tells the row from others of a bench.
+impl StagesRow {
+    /// The values that identify a row in a bench.
     pub fn key(&self) -> (&str, &str, usize, &str) {
         (&self.scene, &self.backend, self.threads, &self.settings)
     }
 }
 
-/// A whole bench.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bench {
-    /// Where it ran.
     pub machine: Machine,
-    /// Scene by scene, backend by backend, thread count by thread count.
-    pub rows: Vec<BenchRow>,
+    pub rows: Vec<StagesRow>,
 }
 
-/// A backend with a pool of threads, and what it took.
+/// A backend with a pool of threads, and the medians of its turns: the five stages and their sum (ms).
 struct Way {
     backend: Option<Box<dyn Backend>>,
     pool: rayon::ThreadPool,
     turns: Vec<[f64; 6]>,
 }
 
-/// One scene that is measured.
 struct Case {
     spec: String,
     hash: String,
@@ -140,8 +110,8 @@ struct Case {
     last: drystone::StepStats,
 }
 
-/// Measures `specs` over `turns` turns on each of the backends that `open` makes, with each number of `threads`. `after_turn` is
-/// called after each turn of each scene, those to settle included.
+/// Measures the scenes `specs` on each of the backends that `open` makes, with each number of `threads`. `after_turn` is called after
+/// each scene has settled and after each of its turns.
 pub fn bench(
     specs: &[String],
     config: &SolverConfig,
@@ -152,7 +122,14 @@ pub fn bench(
 ) -> Result<Bench> {
     let mut cases = Vec::new();
     for spec in specs {
-        cases.push(Case::new(spec, config, threads, open)?);
+        let mut ways = Vec::new();
+        for &threads in threads {
+            for backend in open()? {
+                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
+            }
+        }
+        let (simulation, hash, dt) = settled(spec, config)?;
+        cases.push(Case { spec: spec.clone(), hash, dt, simulation, ways, last: drystone::StepStats::default() });
         after_turn();
     }
     interleave(turns, &mut cases, |_, case| {
@@ -164,21 +141,16 @@ pub fn bench(
     Ok(Bench { machine: Machine::this(), rows })
 }
 
-/// A simulation of a scene at rest, the hash of the scene and the length of its steps. What falls into a container does so at
-/// one substep: contacts are found as always, and it lies where it would. Then all is stepped at the settings that are measured,
-/// until preloads and warm starts have come to rest, too.
+/// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container at one
+/// substep. Then preloads and warm starts settle at the measured settings.
 fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32)> {
     let scene = Scene::find_spec(spec)?;
     let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());
     let coarse = config.clone().with(|c| c.substeps = 1);
     let mut simulation = Simulation::new(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
-    for _ in 0..if falls { COARSE } else { 0 } {
-        simulation.step(dt)?;
-    }
+    (0..if falls { COARSE } else { 0 }).try_for_each(|_| simulation.step(dt).map(drop))?;
     simulation.set_config(config.clone())?;
-    for _ in 0..FINE {
-        simulation.step(dt)?;
-    }
+    (0..FINE).try_for_each(|_| simulation.step(dt).map(drop))?;
     Ok((simulation, hash, dt))
 }
 
@@ -188,23 +160,6 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 }
 
 impl Case {
-    fn new(
-        spec: &str,
-        config: &SolverConfig,
-        threads: &[usize],
-        open: &dyn Fn() -> Result<Vec<Box<dyn Backend>>>,
-    ) -> Result<Self> {
-        let mut ways = Vec::new();
-        for &threads in threads {
-            for backend in open()? {
-                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
-            }
-        }
-        let (simulation, hash, dt) = settled(spec, config)?;
-        Ok(Self { spec: spec.into(), hash, dt, simulation, ways, last: drystone::StepStats::default() })
-    }
-
-    /// Some steps on each way.
     fn turn(&mut self) -> Result<()> {
         let Self { simulation, ways, dt, last, .. } = self;
         for way in ways {
@@ -212,11 +167,12 @@ impl Case {
             let before = simulation.set_backend(backend);
             let mut steps = Vec::with_capacity(TURN);
             let stepped: Result<()> = way.pool.install(|| {
-                for _ in 0..TURN {
+                (0..TURN).try_for_each(|_| {
                     *last = simulation.step(*dt)?;
-                    steps.push(milliseconds(&last.times));
-                }
-                Ok(())
+                    let [detect, color, prepare, run, store] = last.times.stages().map(|s| s.1.as_secs_f64() * 1e3);
+                    steps.push([detect, color, prepare, run, store, last.times.total().as_secs_f64() * 1e3]);
+                    Ok(())
+                })
             });
             way.backend = Some(simulation.set_backend(before));
             stepped?;
@@ -225,7 +181,7 @@ impl Case {
         Ok(())
     }
 
-    fn rows(self, config: &SolverConfig) -> Vec<BenchRow> {
+    fn rows(self, config: &SolverConfig) -> Vec<StagesRow> {
         let Self { spec, hash, dt, mut simulation, ways, last: stats } = self;
         let penetration = simulation.penetration();
         let residual = residual(&mut simulation, dt);
@@ -235,7 +191,7 @@ impl Case {
             let [ms_low, ms, ms_high] = quartiles(&column(&way.turns, 5));
             let backend = way.backend.take().expect("given back after each turn");
             let name = backend.name().into();
-            BenchRow {
+            StagesRow {
                 scene: spec.clone(),
                 hash: hash.clone(),
                 backend: name,
@@ -267,17 +223,11 @@ impl Case {
     }
 }
 
-/// Each stage, and all together.
-fn milliseconds(times: &StageTimes) -> [f64; 6] {
-    let [detect, color, prepare, run, store] = times.stages().map(|s| s.1.as_secs_f64() * 1e3);
-    [detect, color, prepare, run, store, times.total().as_secs_f64() * 1e3]
-}
-
 fn column(rows: &[[f64; 6]], column: usize) -> Vec<f64> {
     rows.iter().map(|row| row[column]).collect()
 }
 
-/// How far the impulses of the next step are from solving its first substep when that ends; takes that step.
+/// The error of the impulses after the first substep of the next step, which this function makes.
 fn residual(simulation: &mut Simulation, dt: f32) -> Option<f64> {
     let (mut problem, plan) = simulation.next_problem(dt).ok()?;
     let begins = |p: &drystone::stages::plan::Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });

@@ -1,61 +1,50 @@
-//! What takes part in a comparison: an engine with its settings.
-
-use serde::{Deserialize, Serialize};
+//! Contenders of a comparison: engines with their settings.
 
 use crate::settings;
-use drystone::Result;
-use drystone::Simulation;
 use drystone::backend::BackendKind;
-use drystone::config::{Friction, Method, SolverConfig};
-use drystone::scenes::Scene;
-use drystone::world::World;
+use drystone::config::{Friction, Method};
+use drystone::{Result, Scene, Simulation, SolverConfig, World};
 
 /// An engine with its settings, stepping one scene.
 pub trait Contender {
-    /// What it is.
     fn setting(&self) -> Setting;
 
-    /// One step of the scene's length; the only call that is timed.
+    /// Makes one step of the scene's length; only this call is timed.
     fn step(&mut self) -> Result<()>;
 
-    /// The world after the last step: the bodies of the scene in their order, with their poses and velocities.
+    /// The bodies of the scene after the last step, in their order.
     fn world(&mut self) -> &World;
 }
 
-/// Who takes part in a scene, with each of their settings.
+/// Makes the contenders of an engine for a scene, one for each setting.
 pub type Team<'a> = dyn Fn(&Scene, Extent) -> Result<Vec<Box<dyn Contender>>> + 'a;
 
-/// How much is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// The main settings.
     Quick,
-    /// All of them.
     Full,
 }
 
-/// An engine and its settings, as text and numbers.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Name of the engine.
     pub engine: String,
-    /// What it runs on: `reference`, `cpu`, `gpu`.
+    /// `reference`, `cpu` or `gpu`.
     pub backend: String,
-    /// Substeps of a step.
+    /// Substeps per step, and sweeps per substep.
     pub substeps: u32,
-    /// Sweeps of a substep.
     pub sweeps: u32,
-    /// What is done with the sweeps.
     pub method: String,
-    /// Friction rule.
     pub friction: String,
-    /// What else is not at its default.
+    /// Other settings that are not at their defaults.
     pub more: String,
 }
 
 impl Setting {
-    /// A point of drystone's own grid.
     pub fn drystone(backend: &str, config: &SolverConfig) -> Self {
+        let mut more =
+            settings::unusual(config, &["substeps", "iterations", "method", "friction", "sleep_after", "relax"]);
+        // The usual number of relax sweeps is that of the biased ones.
+        more.extend((config.relax != config.iterations).then(|| format!("relax={}", config.relax)));
         Self {
             engine: "drystone".into(),
             backend: backend.into(),
@@ -63,42 +52,25 @@ impl Setting {
             sweeps: config.iterations,
             method: if config.method == Method::Plain { "plain" } else { "accelerated" }.into(),
             friction: if config.friction == Friction::Box { "box" } else { "disc" }.into(),
-            more: unusual(config).join(" "),
+            more: more.join(" "),
         }
     }
 
-    /// One line for people.
     pub fn label(&self) -> String {
         let Self { engine, backend, substeps, sweeps, method, friction, more } = self;
-        let mut label = format!("{engine} {backend} {substeps}x{sweeps}");
-        for (word, usual) in [(method, "plain"), (friction, "disc"), (more, "")] {
-            if word != usual {
-                label = format!("{label} {word}");
-            }
-        }
-        label
+        let words =
+            [(method, "plain"), (friction, "disc"), (more, "")].into_iter().filter(|(word, usual)| word != usual);
+        let words: String = words.map(|(word, _)| format!(" {word}")).collect();
+        format!("{engine} {backend} {substeps}x{sweeps}{words}")
     }
 }
 
-/// What a setting has no place for. As many relax sweeps as biased ones are what is expected.
-fn unusual(config: &SolverConfig) -> Vec<String> {
-    let said = ["substeps", "iterations", "method", "friction", "sleep_after"];
-    let mut more = settings::unusual(config, &said);
-    more.retain(|text| !text.starts_with("relax="));
-    if config.relax != config.iterations {
-        more.push(format!("relax={}", config.relax));
-    }
-    more
-}
-
-/// Drystone itself.
 pub struct Drystone {
     simulation: Simulation,
     dt: f32,
 }
 
 impl Drystone {
-    /// On a backend by its name.
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
         let backend = backend.parse::<BackendKind>()?.open(false)?;
         Ok(Self { simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?, dt: scene.dt })
@@ -124,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_label_says_what_is_not_at_its_default() {
+    fn a_label_names_the_settings_that_are_not_at_their_defaults() {
         let mut config = SolverConfig::default().without_sleep().with(|c| {
             c.substeps = 4;
             c.friction = Friction::Box;

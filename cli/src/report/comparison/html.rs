@@ -1,4 +1,4 @@
-//! Parts of a page: tables, cells, numbers, pictures.
+//! Parts of an HTML page.
 
 use std::fmt::{Display, Write as _};
 
@@ -6,7 +6,6 @@ use super::pareto::profile;
 use crate::report::plot::Scale::{Decades, Share};
 use crate::report::plot::{Frame, Series, svg};
 
-/// A table: the headings, and the cells of each row with their marks.
 pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoIterator<Item = Vec<String>>) {
     let headings = headings.iter().map(|heading| format!("<th>{heading}</th>")).collect::<String>();
     let _ = writeln!(html, "<div class=\"wide\"><table><tr>{headings}</tr>");
@@ -16,12 +15,11 @@ pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoItera
     html.push_str("</table></div>\n");
 }
 
-/// A cell, marked with a class if that is not empty.
 pub(super) fn cell(class: &str, text: impl Display) -> String {
     if class.is_empty() { format!("<td>{text}</td>") } else { format!("<td class=\"{class}\">{text}</td>") }
 }
 
-/// A profile of what each of some solvers costs on each of `count` problems.
+/// Performance profiles of the solvers `names` over `count` problems.
 pub(super) fn profile_picture(
     title: &str,
     y: &str,
@@ -39,7 +37,6 @@ pub(super) fn profile_picture(
     svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 
-/// Three digits.
 pub(super) fn number(x: f64) -> String {
     if !x.is_finite() || x == 0.0 {
         return if x.is_nan() { "-".into() } else { x.to_string() };
@@ -52,12 +49,12 @@ pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A picture as part of a page: it needs no name space there.
+/// An SVG picture inside HTML, where it needs no name space.
 pub(super) fn inline(svg: &str) -> String {
     svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
 }
 
-/// Pictures of one size in rows of so many.
+/// Pictures of one size in rows of `columns`.
 pub(super) fn grid(pictures: &[String], columns: usize) -> String {
     let size = |name: &str| {
         let of = |p: &String| p.split(&format!(" {name}=\"")).nth(1)?.split('"').next()?.parse::<usize>().ok();

@@ -1,100 +1,74 @@
-//! Contenders step one scene in turns, so that whatever slows the machine down meets all of them, and are scored by what
-//! they get wrong.
+//! Times and errors of contenders that step one scene in turns, so that a slow phase of the machine affects all of them.
 
 use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
+use crate::hard::energy;
 use crate::report::rounds::{Clock, interleave, quartiles};
 use crate::report::scene_hash::content_hash;
-use drystone::config::SolverConfig;
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
-use drystone::scenes::Scene;
 use drystone::stats::quantile;
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Result, Scene, SolverConfig, World};
 
-/// Steps of one contender before it is the next one's turn.
+/// Steps of a contender in each of its turns.
 const BLOCK: u32 = 10;
 
-/// One contender on one scene: what it cost and what it got wrong. Everything is of the second half of the run.
+/// Time and errors of one contender on one scene, over the second half of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Name of the scene.
     pub scene: String,
-    /// Hash of what is in it: rows may be compared only if it is the same.
     pub hash: String,
-    /// Names the run by when it began: rows may be put in a ratio only if it is the same.
+    /// Start of the run; only rows of one run have time ratios.
     pub run: String,
-    /// Fingerprint of the program that ran.
+    /// As in [`Origin`].
     pub build: String,
-    /// Commit that it was built from.
     pub commit: String,
-    /// What it ran on.
     pub machine: String,
-    /// Threads.
     pub threads: usize,
-    /// Dynamic bodies.
     pub bodies: usize,
-    /// Steps of the whole run.
     pub steps: u32,
-    /// Name of the engine.
+    /// As in [`Setting`]; CSV has no nested fields.
     pub engine: String,
-    /// What it runs on.
     pub backend: String,
-    /// Substeps of a step.
     pub substeps: u32,
-    /// Sweeps of a substep.
     pub sweeps: u32,
-    /// What is done with the sweeps.
     pub method: String,
-    /// Friction rule.
     pub friction: String,
-    /// What else is not at its default.
     pub more: String,
-    /// What times are of: `processor` time of the process where one thread does everything, `wall` time with several threads and
-    /// on a GPU.
+    /// `processor` or `wall` time, as in [`Clock`].
     pub clock: String,
-    /// Time of a step, median over the blocks (ms).
+    /// Time of a step: median and quartiles over the blocks (ms).
     pub ms: f64,
-    /// Its lower and upper quartile (ms).
     pub ms_low: f64,
-    /// Upper quartile.
     pub ms_high: f64,
-    /// Ratio to the first contender of the run in the same blocks, median.
+    /// Ratio to the first contender in the same blocks: median and quartiles.
     pub ratio: f64,
-    /// Its lower quartile.
     pub ratio_low: f64,
-    /// Its upper quartile.
     pub ratio_high: f64,
-    /// Deepest overlap (m).
+    /// Deepest overlap, the overlap that 95 % of the contacts do not exceed, and the mean: medians over the blocks, but for the first (m).
     pub penetration_max: f64,
-    /// Overlap that 95 % of the contacts do not exceed, median over the blocks (m).
     pub penetration_p95: f64,
-    /// Mean overlap, median over the blocks (m).
     pub penetration_mean: f64,
     /// Root mean square speed, median over the blocks (m/s).
     pub speed_rms: f64,
-    /// Largest horizontal distance of a body from where it began, at the end (m).
+    /// Largest horizontal distance of a body from its first position, at the end (m).
     pub drift: f64,
-    /// Bodies that are in place at the end; none if the scene does not stand.
+    /// Bodies in place at the end; none if the scene does not stand.
     pub in_place: Option<usize>,
     /// Largest distance between the anchors of a joint (m); none without joints.
     pub joint_gap: Option<f64>,
     /// Kinetic and potential energy gained over the whole run (J).
     pub energy_gained: f64,
-    /// Whether all numbers stayed finite.
     pub finite: bool,
 }
 
 impl Row {
-    /// What the row is of.
     pub fn setting(&self) -> Setting {
         let Self { engine, backend, substeps, sweeps, method, friction, more, .. } = self.clone();
         Setting { engine, backend, substeps, sweeps, method, friction, more }
     }
 
-    /// How long it took relative to another row.
     pub fn time_ratio(&self, other: &Self) -> Result<f64> {
         for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
             if own != others {
@@ -105,13 +79,13 @@ impl Row {
         Ok(self.ratio / other.ratio)
     }
 
-    /// Whether everything that should stand does, and all numbers are finite.
+    /// Whether all bodies of a scene that stands are in place, and all numbers are finite.
     pub fn holds(&self) -> bool {
         self.finite && self.in_place.is_none_or(|n| n == self.bodies)
     }
 }
 
-/// Times and errors of one contender while it is measured.
+/// Measurements of one contender, one for each block.
 #[derive(Default)]
 struct Lane {
     ms: Vec<f64>,
@@ -121,8 +95,7 @@ struct Lane {
     finite: bool,
 }
 
-/// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called after
-/// every block of every contender, [`blocks`] times a contender.
+/// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called [`blocks`] times per contender.
 pub fn measure(
     scene: &Scene,
     contenders: &mut [Box<dyn Contender + '_>],
@@ -157,12 +130,11 @@ pub fn measure(
     Ok(lanes.iter_mut().map(|(c, lane)| row(scene, c.setting(), c.world(), lane, &first, origin, &run)).collect())
 }
 
-/// Blocks of a run of so many steps.
+/// Blocks of a run with this number of steps.
 pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(2)
 }
 
-/// Steps that each contender takes on the scene.
 pub(super) fn steps(scene: &Scene) -> u32 {
     blocks(scene.steps) * BLOCK
 }
@@ -172,7 +144,6 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
     let [ms_low, ms, ms_high] = quartiles(&lane.ms);
     let [ratio_low, ratio, ratio_high] = quartiles(&ratios);
     let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
-    let energy = |w: &World| w.kinetic_energy() + w.potential_energy();
     let clock = Clock::of(&setting.backend).name().into();
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {

@@ -10,7 +10,6 @@ mod points;
 mod problems;
 mod solves;
 mod survey;
-mod table;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
 pub use measure::{Row, blocks, measure};

@@ -1,4 +1,4 @@
-//! Where rows come from: rows of another program, machine or number of threads are not gone on with.
+//! The origin of rows: a report continues only rows of the same program, machine and number of threads.
 
 use std::hash::Hasher;
 use std::process::Command;
@@ -8,38 +8,37 @@ use fnv::FnvHasher;
 
 use crate::report::bench::Machine;
 
-/// The program that runs, and what it runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// Hash of the program's file, 16 hexadecimal digits.
+    /// Hash of the program file, 16 hexadecimal digits.
     pub build: String,
-    /// Commit of the sources that the program was built from, with a `+` if they were changed since; `unknown` without them.
+    /// Commit of the sources, with a `+` if they are changed; `unknown` without sources.
     pub commit: String,
     /// Processor, cores, adapter, operating system.
     pub machine: String,
-    /// Threads of the pool.
     pub threads: usize,
 }
 
 impl Origin {
-    /// Of this program, here. `adapter` is the one that shaders run on.
+    /// The origin of rows of this process; `adapter` runs the shaders.
     pub fn here(adapter: Option<String>) -> Self {
         let Machine { processor, cores, system, .. } = Machine::this();
         let facts = [Some(processor), Some(format!("{cores} cores")), Some(system), adapter];
         let machine = facts.into_iter().flatten().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(", ");
-        Self { build: build(), commit: commit(), machine, threads: rayon::current_num_threads() }
+        let build = fnv(&std::env::current_exe().and_then(std::fs::read).unwrap_or_default());
+        Self { build, commit: commit(), machine, threads: rayon::current_num_threads() }
     }
 
-    /// The moment, as text that sorts.
+    /// The time as text that sorts.
     pub(super) fn now() -> String {
         humantime::format_rfc3339_micros(SystemTime::now()).to_string()
     }
 }
 
-fn build() -> String {
+/// 64-bit FNV-1a hash, as 16 hexadecimal digits.
+pub(super) fn fnv(bytes: &[u8]) -> String {
     let mut hasher = FnvHasher::default();
-    let program = std::env::current_exe().and_then(std::fs::read);
-    hasher.write(&program.unwrap_or_default());
+    hasher.write(bytes);
     format!("{:016x}", hasher.finish())
 }
 

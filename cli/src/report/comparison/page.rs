@@ -1,4 +1,4 @@
-//! The page: pictures and tables of what was measured, one HTML file that needs nothing else.
+//! The page: one HTML file with all pictures and tables.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -12,24 +12,21 @@ use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Series, svg};
 use drystone::Result;
 
-/// The HTML, and the picture that stands for all of it.
 pub struct Page {
-    /// The page.
     pub html: String,
     /// Time against error on every scene, as SVG.
     pub main: String,
 }
 
-/// Whose rows the other sides are compared with.
 const OWN: &str = "drystone";
 
-/// Errors that the profiles over the scenes are made at (m).
+/// Errors of the profiles over the scenes (m).
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
-/// Makes the page; each element of `results` has the rows of one scene.
+/// Makes the page; an element of `results` holds the rows of one scene.
 pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     let sides = sides(results);
-    // One setting is a row of a table and no line of a picture: shaders on a software adapter are far off.
+    // A side with one setting, such as shaders on a software adapter, has a row in tables and no line in pictures.
     let has_line = |side: &&String| results.iter().any(|rows| of_side(rows, side).len() > 1);
     let drawn: Vec<_> = sides.iter().filter(has_line).cloned().collect();
     let main =
@@ -51,12 +48,12 @@ pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     Ok(Page { html, main })
 }
 
-/// What is compared: an engine, apart where it ran on a GPU.
+/// The side of a comparison: an engine, on a GPU or not.
 fn side(row: &Row) -> String {
     if row.backend == "gpu" { format!("{} gpu", row.engine) } else { row.engine.clone() }
 }
 
-/// All sides; those of [`OWN`] first.
+/// All sides: [`OWN`], the other engines, then the other sides of [`OWN`].
 fn sides(results: &[Vec<Row>]) -> Vec<String> {
     let all: BTreeSet<_> = results.iter().flatten().map(side).collect();
     let (own, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|s| s == OWN);
@@ -66,6 +63,10 @@ fn sides(results: &[Vec<Row>]) -> Vec<String> {
 
 fn of_side<'a>(rows: &'a [Row], wanted: &str) -> Vec<&'a Row> {
     rows.iter().filter(|row| side(row) == wanted).collect()
+}
+
+fn present<'a>(rows: &'a [Row], sides: &'a [String]) -> impl Iterator<Item = (&'a String, Vec<&'a Row>)> {
+    sides.iter().map(|name| (name, of_side(rows, name))).filter(|(_, rows)| !rows.is_empty())
 }
 
 fn faults(rows: &[Row]) -> &'static [Fault] {
@@ -94,21 +95,15 @@ fn head(html: &mut String, results: &[Vec<Row>]) {
     );
 }
 
-/// Time against one error in one scene.
 fn picture(rows: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> String {
     let place = |row: &Row| (row.ms, fault.of(row) * 1e3);
-    let series: Vec<_> = sides
-        .iter()
-        .enumerate()
-        .map(|(look, name)| (look, name, of_side(rows, name)))
-        .filter(|(.., rows)| !rows.is_empty())
-        .map(|(look, name, rows)| Series {
-            name: name.clone(),
-            look,
-            points: rows.iter().filter(|r| r.holds()).map(|r| (place(r).0, place(r).1, point_label(r))).collect(),
-            line: front(&rows, fault).into_iter().map(place).collect(),
-        })
-        .collect();
+    let series = |(name, rows): (&String, Vec<&Row>)| Series {
+        name: name.clone(),
+        look: sides.iter().position(|side| side == name).unwrap_or(0),
+        points: rows.iter().filter(|r| r.holds()).map(|r| (place(r).0, place(r).1, point_label(r))).collect(),
+        line: front(&rows, fault).into_iter().map(place).collect(),
+    };
+    let series: Vec<_> = present(rows, sides).map(series).collect();
     let title = rows.first().map_or(String::new(), |row| row.scene.clone());
     let y = format!("{} [{}]", fault.name(), fault.unit());
     svg(&Frame { title: &title, x: "time of a step [ms]", y: &y, scales: (Decades, Decades), size }, &series)
@@ -136,13 +131,11 @@ fn duels(html: &mut String, results: &[Vec<Row>], sides: &[String]) -> Result<()
         let theirs: Vec<_> = rows.iter().filter(|row| !row.engine.starts_with(OWN)).collect();
         for &fault in faults(rows) {
             let duel = Duel::new(&of_side(rows, OWN), &theirs, fault)?;
-            let [own, other] = [duel.own, duel.others]
-                .map(|error| if error.is_finite() { shown(fault, error) } else { "none holds".into() });
-            let [low, high] = match duel.others.is_finite() {
-                true => [duel.best, duel.worst]
-                    .map(|r| if r.is_finite() { format!("{r:.2}") } else { "not reached".into() }),
-                false => [const { String::new() }; 2],
-            };
+            let shown = |error: f64| format!("{} {}", number(error * 1e3), fault.unit());
+            let error = |error: f64| if error.is_finite() { shown(error) } else { "none holds".into() };
+            let time = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "not reached".into() };
+            let time = |ratio| if duel.others.is_finite() { time(ratio) } else { String::new() };
+            let (own, other, low, high) = (error(duel.own), error(duel.others), time(duel.best), time(duel.worst));
             let mut row: Vec<_> =
                 [&*escape(&rows[0].scene), fault.name(), &own, &other, &low].map(|text| cell("", text)).into();
             row.push(cell(if duel.worst <= 1.0 { "best" } else { "" }, high));
@@ -190,31 +183,21 @@ fn scene(html: &mut String, rows: &[Row], sides: &[String], drawn: &[String]) {
     all_rows(html, rows);
 }
 
-/// 1, 2, 4 and 8 ms; in scenes that take a power of ten less or more, that power of ten times as much.
-fn fixed_times(rows: &[Row]) -> [f64; 4] {
-    let scale = 10_f64.powf(rows.first().map_or(0.0, |row| (row.ms / 2.0).log10().round()));
-    [1.0, 2.0, 4.0, 8.0].map(|t| t * scale)
-}
-
 fn at_fixed_times(html: &mut String, rows: &[Row], sides: &[String]) {
-    let times = fixed_times(rows);
+    // 1, 2, 4 and 8 ms, times the power of ten nearest to half the time of the first row.
+    let scale = 10_f64.powf(rows.first().map_or(0.0, |row| (row.ms / 2.0).log10().round()));
+    let times = [1.0, 2.0, 4.0, 8.0].map(|t| t * scale);
     html.push_str("<h3>Least error in a given time</h3>\n");
     let mut headings = vec!["error".to_owned(), "engine".to_owned()];
     headings.extend(times.map(|ms| format!("{} ms", number(ms))));
     let mut table_rows = Vec::new();
     for &fault in faults(rows) {
-        for name in sides {
-            let rows = of_side(rows, name);
-            if rows.is_empty() {
-                continue;
-            }
+        for (name, rows) in present(rows, sides) {
             let own = if name == OWN { "own" } else { "" };
             let mut cells =
                 vec![cell(own, format_args!("{} [{}]", fault.name(), fault.unit())), cell(own, escape(name))];
             cells.extend(times.map(|ms| match least(&rows, fault, ms) {
-                Some(row) => {
-                    cell(own, format_args!("{} <small>{}</small>", number(fault.of(row) * 1e3), point_label(row)))
-                }
+                Some(row) => cell(own, number(fault.of(row) * 1e3) + &format!(" <small>{}</small>", point_label(row))),
                 None => cell(own, "-"),
             }));
             table_rows.push(cells);
@@ -247,9 +230,4 @@ fn all_rows(html: &mut String, rows: &[Row]) {
     };
     table(html, &headings, rows.iter().map(cells));
     html.push_str("</details>\n");
-}
-
-/// An error in the unit for people, with the unit.
-fn shown(fault: Fault, error: f64) -> String {
-    format!("{} {}", number(error * 1e3), fault.unit())
 }

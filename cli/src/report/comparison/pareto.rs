@@ -1,30 +1,26 @@
-//! What the rows of one run say: who is fastest at an error, and who errs least in a time.
+//! Fronts, comparisons and profiles of time and error over the rows of a run.
 
 use super::measure::Row;
 use drystone::Result;
 
-/// Errors below this are taken as this (m), (m/s): poses in f32 some ten meters from the origin say no more.
+/// Smallest error (m), (m/s): the resolution of f32 poses some ten meters from the origin.
 pub const FLOOR: f64 = 1e-6;
 
-/// What a row is judged by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Deepest overlap.
     Deepest,
-    /// Overlap that 95 % of the contacts do not exceed.
+    /// The overlap that 95 % of the contacts do not exceed.
     P95,
-    /// Mean overlap.
     Mean,
-    /// Speed of what should be at rest.
+    /// The speed of bodies that should be at rest.
     Speed,
-    /// How far what should stand moved aside.
+    /// The horizontal motion of bodies that should stand.
     Drift,
-    /// Largest gap in a joint.
     Gap,
 }
 
 impl Fault {
-    /// Those that count in the scene of a row: gaps where there are joints; else overlaps and speed, and drift of what stands.
+    /// The errors for the scene of a row: the gap with joints; else overlaps, speed, and drift if the scene stands.
     pub fn of_scene(row: &Row) -> &'static [Self] {
         use Fault::{Deepest, Drift, Gap, Mean, P95, Speed};
         match (row.joint_gap, row.in_place) {
@@ -34,7 +30,6 @@ impl Fault {
         }
     }
 
-    /// What it is, for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Deepest => "deepest overlap",
@@ -46,12 +41,12 @@ impl Fault {
         }
     }
 
-    /// The unit that people read it in: a thousandth of what rows have.
+    /// The unit on pages: a thousandth of the unit in rows.
     pub fn unit(self) -> &'static str {
         if self == Self::Speed { "mm/s" } else { "mm" }
     }
 
-    /// Of a row (m), (m/s); at least [`FLOOR`].
+    /// The error of a row (m), (m/s); at least [`FLOOR`].
     pub fn of(self, row: &Row) -> f64 {
         let error = match self {
             Self::Deepest => row.penetration_max,
@@ -61,24 +56,24 @@ impl Fault {
             Self::Drift => row.drift,
             Self::Gap => row.joint_gap.unwrap_or(f64::NAN),
         };
-        // Not `max`, which would take a NaN away.
+        // `max` would remove a NaN.
         if error < FLOOR { FLOOR } else { error }
     }
 }
 
-/// The least time of those with an error of at most `most`; none if nobody holds that.
+/// The fastest row with an error of at most `most`.
 pub fn fastest<'a>(rows: &[&'a Row], fault: Fault, most: f64) -> Option<&'a Row> {
     let fit = rows.iter().filter(|row| row.holds() && fault.of(row) <= most);
     fit.copied().min_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }
 
-/// The least error of those that take at most `ms` a step; none if nobody is as fast.
+/// The row with the least error that takes at most `ms` per step.
 pub fn least<'a>(rows: &[&'a Row], fault: Fault, ms: f64) -> Option<&'a Row> {
     let fit = rows.iter().filter(|row| row.holds() && row.ms <= ms && fault.of(row).is_finite());
     fit.copied().min_by(|a, b| fault.of(a).total_cmp(&fault.of(b)))
 }
 
-/// Rows that nobody beats in both time and error, the fastest first.
+/// The Pareto front of time and error, the fastest row first.
 pub fn front<'a>(rows: &[&'a Row], fault: Fault) -> Vec<&'a Row> {
     let mut sorted: Vec<_> = rows.iter().copied().filter(|row| row.holds() && fault.of(row).is_finite()).collect();
     sorted.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(fault.of(a).total_cmp(&fault.of(b))));
@@ -91,21 +86,18 @@ pub fn front<'a>(rows: &[&'a Row], fault: Fault) -> Vec<&'a Row> {
     sorted
 }
 
-/// How the rows of one side compare with those of the other, at each error on the other's front.
+/// Comparison of one side with the front of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Duel {
-    /// Time at equal error relative to the other side, where that is most; infinite where own rows never reach the error.
+    /// Largest relative time at equal error; infinite if no own row reaches an error.
     pub worst: f64,
-    /// Where it is least.
     pub best: f64,
-    /// Least error of the own side.
     pub own: f64,
-    /// Least error of the other side; infinite if it has no row that holds.
+    /// Least error of the other side; infinite if none of its rows holds.
     pub others: f64,
 }
 
 impl Duel {
-    /// Of two sides of one run.
     pub fn new(own: &[&Row], others: &[&Row], fault: Fault) -> Result<Self> {
         let mut duel = Self { worst: 0.0, best: f64::INFINITY, own: f64::INFINITY, others: f64::INFINITY };
         for theirs in front(others, fault) {
@@ -122,9 +114,8 @@ impl Duel {
     }
 }
 
-/// Performance profile (Dolan and Moré 2002): for each of some solvers, the cost of each problem over the least of all solvers',
-/// sorted; the share of problems that are within a factor is how many of these are at most that factor. A problem that a solver
-/// does not solve has no cost and is not there; one that none solves is left out.
+/// Performance profiles (Dolan and Moré 2002): for each solver the sorted ratios of its costs to the least cost of any solver. The
+/// profile at a factor is the share of problems with a ratio of at most that factor. An unsolved problem has no cost and no ratio.
 pub fn profile(costs: &[Vec<Option<f64>>]) -> Vec<Vec<f64>> {
     let problems = costs.first().map_or(0, Vec::len);
     let mut ratios = vec![Vec::new(); costs.len()];
@@ -144,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_front_has_what_nobody_beats() {
+    fn a_front_has_the_rows_that_no_other_row_beats_in_time_and_error() {
         let rows =
             [row("a", 1.0, 4e-3), row("b", 2.0, 5e-3), row("c", 3.0, 1e-3), row("d", 3.0, 2e-3), row("e", 4.0, 1e-9)];
         let fallen = Row { in_place: Some(0), ..row("f", 0.5, 1e-4) };
@@ -179,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_counts_what_is_within_a_factor_of_the_best() {
+    fn a_profile_has_the_ratios_to_the_best_solver() {
         let costs = [vec![Some(1.0), Some(4.0), None, None], vec![Some(2.0), Some(1.0), Some(5.0), None]];
         assert_eq!(profile(&costs), [vec![1.0, 4.0], vec![1.0, 1.0, 2.0]]);
     }

@@ -1,13 +1,10 @@
-//! The scenes of the report, and the settings with which drystone runs them.
+//! The scenes of the report, and drystone's settings.
 
 use super::contender::{Contender, Drystone, Extent};
 use crate::settings;
-use drystone::Result;
 use drystone::backend::gpu::adapters;
-use drystone::config::SolverConfig;
-use drystone::scenes::Scene;
+use drystone::{Result, Scene, SolverConfig};
 
-/// Scenes of the whole report.
 const FULL: [&str; 9] = [
     "tower:n=20",
     "tower:n=10,top_ratio=1000",
@@ -20,16 +17,14 @@ const FULL: [&str; 9] = [
     "pile:n=5000",
 ];
 
-/// Those of them that two minutes are enough for.
 const QUICK: [&str; 5] = ["tower:n=20", "tower:n=10,top_ratio=1000", "mass-ratio", "chain", "wall:rows=10,columns=10"];
 
-/// Bodies from which on a scene is large: run for fewer steps, with fewer settings, and not on an adapter that is software.
+/// A scene with this many bodies has fewer steps and settings, and does not run on a software adapter.
 const LARGE: usize = 2000;
 
-/// Steps of a large scene: the pile is at rest after half of them.
+/// Steps of a large scene; the pile is at rest after half of them.
 const LARGE_STEPS: u32 = 300;
 
-/// The scenes of the report.
 pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
     let named = |name: &&str| {
@@ -40,7 +35,7 @@ pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     names.iter().map(named).collect()
 }
 
-/// A scene by one word as [`Scene::find_spec`] has it, which is its name then too.
+/// A scene by [`Scene::find_spec`], with the specification as its name.
 pub fn scene(word: &str) -> Result<Scene> {
     Ok(Scene { name: word.to_owned(), ..Scene::find_spec(word)? })
 }
@@ -49,7 +44,7 @@ fn is_large(scene: &Scene) -> bool {
     scene.world.dynamic_count() >= LARGE
 }
 
-/// The line of substeps along which everything else is at its default: up to 128 where there are a few bodies, 32 where there are many.
+/// The substeps of settings that are otherwise at their defaults: up to 128 for few bodies, 32 for many.
 pub fn substeps(scene: &Scene, extent: Extent) -> impl Iterator<Item = u32> + use<> {
     let most = match (extent, scene.world.dynamic_count()) {
         (_, LARGE..) | (Extent::Quick, 100..) => 32,
@@ -59,18 +54,16 @@ pub fn substeps(scene: &Scene, extent: Extent) -> impl Iterator<Item = u32> + us
     [2, 4, 8, 16, 32, 64, 128].into_iter().filter(move |&n| n <= most)
 }
 
-/// Substeps and sweeps of each off that line: sweeps where substeps could be.
+/// Settings with sweeps instead of substeps: substeps, and sweeps per substep.
 const SWEEPS: [(u32, u32); 8] = [(1, 16), (4, 4), (1, 4), (2, 4), (2, 16), (4, 2), (4, 16), (8, 4)];
 
-/// Drystone with the settings of the report.
-///
-/// Not the product of all axes, which is some hundred settings a scene: the line of substeps, and from it one step along each
-/// other axis. The reference gives the bits of the CPU's lanes, so its errors are theirs: it stands for itself at the defaults
-/// only, to show its time. Shaders on a software adapter run at the defaults only, for the same reason.
+/// Drystone with the settings of the report: the line of substeps, and from it one step along each other axis. The product of all axes
+/// would be some hundred settings per scene. The reference and the shaders on a software adapter give the errors of the CPU lanes;
+/// they run at the defaults only, for their time.
 pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>> {
     let few = is_large(scene) || extent == Extent::Quick;
     let default = SolverConfig::default().substeps;
-    // First of all the defaults, which times are related to.
+    // Times are relative to the first setting, the defaults.
     let mut points: Vec<(&str, String)> = vec![("cpu", String::new())];
     points.extend(substeps(scene, extent).filter(|&n| n != default).map(|n| ("cpu", format!("substeps={n}"))));
     for (substeps, sweeps) in SWEEPS.into_iter().take(if few { 2 } else { SWEEPS.len() }) {
@@ -99,9 +92,8 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
         Some(_) if !is_large(scene) => points.push(("gpu", String::new())),
         _ => {}
     }
-    points.into_iter().map(|(backend, settings)| contender(scene, backend, &settings)).collect()
-}
-
-fn contender(scene: &Scene, backend: &str, settings: &str) -> Result<Box<dyn Contender>> {
-    Ok(Box::new(Drystone::new(scene, backend, &settings::awake(settings.split_whitespace())?)?))
+    let contender = |(backend, settings): (&str, String)| -> Result<Box<dyn Contender>> {
+        Ok(Box::new(Drystone::new(scene, backend, &settings::awake(settings.split_whitespace())?)?))
+    };
+    points.into_iter().map(contender).collect()
 }

@@ -1,4 +1,4 @@
-//! The part of the page on contact problems.
+//! The section of the page on contact problems.
 
 use std::fmt::Write as _;
 
@@ -7,14 +7,13 @@ use super::solves::SolveRow;
 use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Series, svg};
 
-/// Errors that contact problems are solved to.
 const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     if solves.is_empty() {
         return;
     }
-    // In the order of the rows.
+    // The solvers in the order of the rows.
     let mut solvers: Vec<String> = Vec::new();
     for solver in solves.iter().flatten().map(SolveRow::solver) {
         if !solvers.contains(&solver) {
@@ -51,7 +50,7 @@ pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     html.push_str("</div></details>\n");
 }
 
-/// A row a problem, and in it for each of some values a column a solver.
+/// A table with a row for each problem and a column for each value and solver.
 fn grid_table<const N: usize>(
     html: &mut String,
     solves: &[Vec<SolveRow>],
@@ -70,13 +69,12 @@ fn grid_table<const N: usize>(
     table(html, &headings, solves.iter().map(row));
 }
 
-/// Least time in which a solver had an error of at most `level` (ms).
+/// Least time in which a solver reaches an error (ms).
 fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)
 }
 
-/// Time against error in one problem.
 fn curves(rows: &[SolveRow], solvers: &[String]) -> String {
     let series = solvers.iter().enumerate().map(|(look, name)| {
         let of = rows.iter().filter(|row| row.solver() == *name && row.e_vel > 0.0);

@@ -1,79 +1,58 @@
-//! Contact problems: time against what the sweeps leave of the error, for each way to sweep.
+//! Contact problems: time against error for each solver.
 
 use std::fmt::Debug;
-use std::hash::Hasher;
 
-use fnv::FnvHasher;
 use serde::{Deserialize, Serialize};
 
-use super::origin::Origin;
+use super::origin::{Origin, fnv};
 use crate::report::rounds::interleave;
 use crate::report::solve::{SolveReport, SolveSettings};
-use drystone::Result;
-use drystone::backend::Backend;
-use drystone::backend::cpu::Cpu;
 use drystone::config::Method;
-use drystone::contacts::ContactProblem;
-use drystone::solver::Order;
 use drystone::stats::quantile;
+use drystone::{Backend, ContactProblem, Cpu, Result};
 
-/// Who solves: a method, in f64 or on the CPU's lanes.
+/// The solvers: a method, in f64 or on the CPU lanes.
 const SOLVERS: [(Method, &str); 4] =
     [(Method::Plain, "f64"), (Method::Accelerated, "f64"), (Method::Plain, "cpu"), (Method::Accelerated, "cpu")];
 
-/// How often each solves each problem, in turns.
 const TURNS: usize = 3;
 
-/// Most sweeps.
 const MOST: u32 = 2000;
 
-/// What one solver left of the error of one problem after some sweeps.
+/// Time and error of one solver on one problem after a number of sweeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolveRow {
-    /// Name of the problem.
     pub problem: String,
-    /// Hash of what is in it.
     pub hash: String,
-    /// Names the run by when it began.
     pub run: String,
-    /// Fingerprint of the program that ran.
+    /// As in [`Origin`].
     pub build: String,
-    /// Commit that it was built from.
     pub commit: String,
-    /// What it ran on.
     pub machine: String,
-    /// Contacts.
     pub contacts: usize,
-    /// What was done with the sweeps.
     pub method: String,
     /// `f64`, or `cpu`, which is in f32.
     pub backend: String,
-    /// Sweeps from zero impulses.
     pub sweeps: u32,
-    /// Their time, median over the turns (ms).
+    /// Time of the sweeps: median, least and largest over the turns (ms).
     pub ms: f64,
-    /// The least of them (ms).
     pub ms_low: f64,
-    /// The largest of them (ms).
     pub ms_high: f64,
-    /// The error then, or the round number that it fell below there.
+    /// The error after the sweeps, or the round number that it fell below in the last one.
     pub e_vel: f64,
 }
 
 impl SolveRow {
-    /// Who solved.
     pub fn solver(&self) -> String {
         format!("{} {}", self.method, self.backend)
     }
 }
 
-/// Solves a problem with all solvers in turns.
 pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>> {
     let run = Origin::now();
     let mut solvers = SOLVERS.map(|solver| (solver, Vec::new()));
     interleave(TURNS, &mut solvers, |_, ((method, backend), reports)| {
-        let settings =
-            SolveSettings { method: *method, order: Order::Manifolds, passes: 1, sweeps: MOST, tolerance: 1e-4 };
+        let settings = SolveSettings::by_manifolds(*method, 1, MOST, 1e-4);
         let backend = (*backend == "cpu").then(|| Box::new(Cpu::new()) as Box<dyn Backend>);
         reports.push(SolveReport::new(problem, &settings, backend)?);
         Ok(())
@@ -96,7 +75,7 @@ pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>
     };
     let mut rows = Vec::new();
     for (_, of) in &solvers {
-        // Every turn does the same sweeps to the last bit; only times differ.
+        // Turns differ only in their times.
         let all: Vec<_> = of.iter().map(points).collect();
         for (i, &(sweeps, e_vel, _)) in all[0].iter().enumerate() {
             let ms: Vec<_> = all.iter().map(|points| points[i].2).collect();
@@ -106,7 +85,7 @@ pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>
     Ok(rows)
 }
 
-/// Sweeps, error and time at powers of two of sweeps, and where the error first fell below round numbers.
+/// Sweeps, error and time at powers of two of sweeps, and where the error falls below round numbers.
 fn points(report: &SolveReport) -> Vec<(u32, f64, f64)> {
     let curve = report.curve.iter().map(|row| (row.sweeps, row.residuals.e_vel, row.ms));
     let reached = report.reached.iter().filter_map(|r| Some((r.sweeps?, r.e_vel, r.ms?)));
@@ -115,9 +94,6 @@ fn points(report: &SolveReport) -> Vec<(u32, f64, f64)> {
     points
 }
 
-/// 64-bit FNV-1a hash of all that a problem is, as 16 hexadecimal digits.
 pub fn hash(problem: &impl Debug) -> String {
-    let mut hasher = FnvHasher::default();
-    hasher.write(format!("{problem:?}").as_bytes());
-    format!("{:016x}", hasher.finish())
+    fnv(format!("{problem:?}").as_bytes())
 }

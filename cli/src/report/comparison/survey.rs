@@ -1,110 +1,84 @@
-//! Runs all contenders on one scene after another; what is finished is kept and not run again.
+//! Runs all contenders on one scene after another and keeps the rows of finished scenes.
 
 use std::path::{Path, PathBuf};
 
-use super::contender::{Contender, Extent, Setting, Team};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::contender::{Extent, Setting, Team};
 use super::measure::{Row, blocks, measure};
 use super::origin::Origin;
 use super::page;
 use super::solves::{self, SolveRow, solves};
-use super::table::Table;
 use crate::files;
 use crate::report::scene_hash::content_hash;
-use drystone::contacts::ContactProblem;
-use drystone::scenes::Scene;
-use drystone::{Error, Result};
+use drystone::{ContactProblem, Error, Result, Scene};
 
-/// What is run, and where it is written.
+// Files of rows in the folder of a report.
+const SCENES: &str = "scenes.csv";
+const PROBLEMS: &str = "problems.csv";
+
 pub struct Survey<'a> {
-    /// The scenes.
     pub scenes: Vec<Scene>,
-    /// Who takes part. The first contender of the first team is what times are related to.
+    /// Times are relative to the first contender of the first team.
     pub teams: Vec<&'a Team<'a>>,
-    /// How much is run.
     pub extent: Extent,
-    /// Contact problems that drystone's ways to sweep are compared on.
     pub problems: Vec<ContactProblem>,
-    /// Folder that everything is written into; made if need be.
+    /// Folder of all files; made if needed.
     pub out: PathBuf,
 }
 
-/// Rows of one survey, ready to be drawn.
 pub struct Report {
     results: Vec<Vec<Row>>,
     solves: Vec<Vec<SolveRow>>,
 }
 
 impl Survey<'_> {
-    /// Runs what is not in the folder's `scenes.csv` already, and adds it there after each scene. `progress` is told what runs, how much is done, and how much
-    /// there is in all.
+    /// Runs the scenes and problems without rows in the folder, and adds their rows after each. `progress` gets the name, the work done
+    /// and the total work.
     ///
-    /// A scene counts as finished if one run has rows of every contender, on the same scene for as many steps, by the same program
-    /// on the same machine with as many threads.
+    /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and threads.
     pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
-        let mut table = Table::<Row>::open(scenes_path(&self.out))?;
+        let mut table = Table::<Row>::open(self.out.join(SCENES))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
         let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
         let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
         let (mut before, mut results) = (0, Vec::new());
         for scene in &self.scenes {
-            let mut contenders = self.contenders(scene)?;
+            let teams = self.teams.iter().map(|team| team(scene, self.extent)).collect::<Result<Vec<_>>>()?;
+            let mut contenders: Vec<_> = teams.into_iter().flatten().collect();
             let settings: Vec<_> = contenders.iter().map(|c| c.setting()).collect();
             progress(&scene.name, before, total);
-            let rows = match finished(table.rows(), scene, origin, &settings) {
-                Some(rows) => rows,
-                None => {
-                    let turns = u64::from(blocks(scene.steps)) * contenders.len() as u64;
-                    let mut turn = 0;
-                    let mut after_block = || {
-                        turn += 1;
-                        let done = before + weight(scene) * turn / turns;
-                        progress(&scene.name, done, total);
-                    };
-                    let rows = measure(scene, &mut contenders, origin, &mut after_block)?;
-                    table.add(rows.clone())?;
-                    rows
-                }
-            };
-            results.push(rows);
+            let known = finished(table.rows(), scene, origin, &settings);
+            results.push(table.add_unless(known, || {
+                let turns = u64::from(blocks(scene.steps)) * contenders.len() as u64;
+                let mut turn = 0;
+                measure(scene, &mut contenders, origin, &mut || {
+                    turn += 1;
+                    progress(&scene.name, before + weight(scene) * turn / turns, total);
+                })
+            })?);
             before += weight(scene);
         }
-        let mut table = Table::<SolveRow>::open(problems_path(&self.out))?;
+        let mut table = Table::<SolveRow>::open(self.out.join(PROBLEMS))?;
         let mut all = Vec::new();
         for problem in &self.problems {
             progress(&problem.name, before, total);
-            let rows = match solved(table.rows(), &solves::hash(problem), origin) {
-                Some(rows) => rows,
-                None => {
-                    let rows = solves(problem, origin)?;
-                    table.add(rows.clone())?;
-                    rows
-                }
-            };
-            all.push(rows);
+            let known = solved(table.rows(), &solves::hash(problem), origin);
+            all.push(table.add_unless(known, || solves(problem, origin))?);
             before += problem_weight(problem);
         }
         Ok(Report { results, solves: all })
     }
-
-    fn contenders(&self, scene: &Scene) -> Result<Vec<Box<dyn Contender>>> {
-        let of_each = self.teams.iter().map(|team| team(scene, self.extent)).collect::<Result<Vec<_>>>()?;
-        Ok(of_each.into_iter().flatten().collect())
-    }
 }
 
-/// The rows of `settings`, in their order, of the last run that has all of them.
+/// The rows of `settings`, in their order, from the last run that has all of them.
 fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) -> Option<Vec<Row>> {
     let (hash, steps) = (content_hash(scene), super::measure::steps(scene));
-    let fit = |row: &&Row| {
-        let Origin { build, commit: _, machine, threads } = origin;
-        row.hash == hash
-            && row.steps == steps
-            && row.build == *build
-            && row.machine == *machine
-            && row.threads == *threads
-    };
-    let fit: Vec<_> = rows.iter().filter(fit).collect();
+    let Origin { build, commit: _, machine, threads } = origin;
+    let of_origin = |row: &&Row| (&row.build, &row.machine, &row.threads) == (build, machine, threads);
+    let fit: Vec<_> = rows.iter().filter(of_origin).filter(|row| row.hash == hash && row.steps == steps).collect();
     let of_run = |run: &str| -> Option<Vec<Row>> {
         let of = |setting: &Setting| {
             fit.iter().find(|row| row.run == run && row.setting() == *setting).map(|&row| row.clone())
@@ -114,35 +88,65 @@ fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) 
     fit.iter().rev().find_map(|row| of_run(&row.run))
 }
 
-/// The rows of the last run on a problem; all solvers of a program are in each.
+/// The rows of the last run on a problem; every run has all solvers of its program.
 fn solved(rows: &[SolveRow], hash: &str, origin: &Origin) -> Option<Vec<SolveRow>> {
     let fit = |row: &&SolveRow| row.hash == hash && row.build == origin.build && row.machine == origin.machine;
     let last = rows.iter().rfind(fit)?;
     Some(rows.iter().filter(|row| row.run == last.run && row.hash == hash).cloned().collect())
 }
 
-fn problems_path(folder: &Path) -> PathBuf {
-    folder.join("problems.csv")
+/// Rows in a CSV file that grows by blocks.
+struct Table<R> {
+    path: PathBuf,
+    rows: Vec<R>,
 }
 
-fn scenes_path(folder: &Path) -> PathBuf {
-    folder.join("scenes.csv")
+impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
+    /// Reads the rows of a file; a missing file has none.
+    fn open(path: PathBuf) -> Result<Self> {
+        if !path.exists() {
+            return Ok(Self { path, rows: Vec::new() });
+        }
+        let bytes = std::fs::read(&path).map_err(Error::file(&path))?;
+        let parsed: std::result::Result<Vec<R>, _> = csv::Reader::from_reader(&bytes[..]).deserialize().collect();
+        let rows = parsed.map_err(|e| {
+            let line = e.position().map_or(1, csv::Position::line);
+            let path = path.display();
+            Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
+        })?;
+        Ok(Self { path, rows })
+    }
+
+    /// Returns the block `known`, or makes a block and adds it to the rows and to the file.
+    fn add_unless(&mut self, known: Option<Vec<R>>, make: impl FnOnce() -> Result<Vec<R>>) -> Result<Vec<R>> {
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let block = make()?;
+        self.rows.extend_from_slice(&block);
+        files::write(&self.path, &files::csv(&self.rows)?)?;
+        Ok(block)
+    }
+
+    fn rows(&self) -> &[R] {
+        &self.rows
+    }
 }
 
 impl Report {
-    /// The last run of each scene that the folder has.
+    /// The rows of the last run of each scene in the folder.
     pub fn read(folder: &Path) -> Result<Self> {
         let (rows, solved) =
-            (Table::<Row>::open(scenes_path(folder))?, Table::<SolveRow>::open(problems_path(folder))?);
+            (Table::<Row>::open(folder.join(SCENES))?, Table::<SolveRow>::open(folder.join(PROBLEMS))?);
         if rows.rows().is_empty() && solved.rows().is_empty() {
-            return Err(Error::input(format!("{}: no rows to draw", scenes_path(folder).display())));
+            return Err(Error::input(format!("{}: no rows to draw", folder.join(SCENES).display())));
         }
         let results = last_of_each(rows.rows(), |row| (&row.scene, &row.run));
         let solves = last_of_each(solved.rows(), |row| (&row.problem, &row.run));
         Ok(Self { results, solves })
     }
 
-    /// Writes `index.html` and `speed-against-error.svg` into the folder, and says where the page is.
+    /// Writes `index.html` and `speed-against-error.svg` into the folder and returns the path of the page.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let page = page::page(&self.results, &self.solves)?;
         let path = folder.join("index.html");
@@ -152,7 +156,7 @@ impl Report {
     }
 }
 
-/// Rows of one run after another, of which the last of each name is kept, where the first was. `key` is name and run.
+/// The rows of the last run of each name, in the order of the first runs. `key` is name and run.
 fn last_of_each<R: Clone>(rows: &[R], key: impl Fn(&R) -> (&String, &String)) -> Vec<Vec<R>> {
     let mut kept: Vec<Vec<R>> = Vec::new();
     for run in rows.chunk_by(|a, b| key(a) == key(b)) {

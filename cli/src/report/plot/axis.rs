@@ -1,39 +1,35 @@
-//! Axes: over decades, straight, or from 0 to 1.
+//! Axes: linear, logarithmic, or from 0 to 1.
 
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
 
-/// How an axis is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Every unit is as long.
     Linear,
-    /// Every power of ten is as long.
     Decades,
     /// From 0 to 1.
     Share,
 }
 
-/// An axis that holds some values.
 pub(super) struct Axis {
     scale: Scale,
     ends: Range<f64>,
 }
 
-/// Most decades that have a key point each.
+/// Largest number of decades with a key point each.
 const MOST_DECADES: usize = 12;
 
 impl Axis {
-    /// From the least to the largest of the values, over decades from a little below to a little above.
+    /// The axis from the least to the largest value, with some margin.
     pub(super) fn of(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
         let fits = |v: &f64| v.is_finite() && (scale != Scale::Decades || *v > 0.0);
         let ends =
             values.filter(fits).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         let ends = match (scale, ends) {
             (Scale::Share, _) => 0.0..1.0,
-            // Both ends stay numbers that have a logarithm: 1.8e308 times 1.3 is infinite, and 1e-323 has lost its digits.
+            // Both ends must have a logarithm: 1.8e308 times 1.3 is infinite, and 1e-323 has lost its digits.
             (Scale::Decades, (low, high)) if low <= high => {
                 (low / 1.3).max(f64::MIN_POSITIVE)..(high * 1.3).min(f64::MAX)
             }
@@ -51,7 +47,7 @@ impl Ranged for Axis {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        // What lies beyond the axis, such as infinity, is drawn at its end: pixels have no room for more.
+        // Values beyond the axis, such as infinity, are drawn at its end.
         let value = value.clamp(self.ends.start, self.ends.end);
         let place = |x: f64| if self.scale == Scale::Decades { x.log10() } else { x };
         let (low, high) = (place(self.ends.start), place(self.ends.end));
@@ -65,7 +61,7 @@ impl Ranged for Axis {
             Scale::Decades => {}
         }
         let (low, high) = (self.ends.start.log10().floor() as i32, self.ends.end.log10().ceil() as i32);
-        // Between decades only where there are few of them, and some decades only where there are many.
+        // Few decades have key points between them; many decades have key points at every nth.
         let steps: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let every = ((high - low) as usize).div_ceil(MOST_DECADES).max(1);
         let all = (low..=high).step_by(every).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
@@ -77,7 +73,7 @@ impl Ranged for Axis {
     }
 }
 
-/// A number as people write it: 0.001, 0.5, 20, 1e12.
+/// A number as a label: 0.001, 0.5, 20, 1e12.
 pub(super) fn plain(x: &f64) -> String {
     if (1e-9..1e9).contains(x) || *x == 0.0 { format!("{}", (x * 1e9).round() / 1e9) } else { format!("{x:.0e}") }
 }
@@ -89,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn axes_are_labelled_with_what_lies_between_their_ends() {
+    fn the_labels_of_an_axis_lie_between_its_ends() {
         let decades = |ends: Range<f64>| Axis { scale: Scale::Decades, ends };
         let keys = |ends| decades(ends).key_points(BoldPoints(10)).iter().map(plain).collect::<Vec<_>>();
         assert_eq!(keys(0.015..0.6), ["0.02", "0.05", "0.1", "0.2", "0.5"]);

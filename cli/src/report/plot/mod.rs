@@ -1,4 +1,4 @@
-//! Pictures of points and lines as SVG text.
+//! Plots of points and lines as SVG text.
 
 mod axis;
 
@@ -19,39 +19,31 @@ const COLORS: [RGBColor; 6] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Points of one kind, and a line.
 pub struct Series {
-    /// What the legend calls it.
     pub name: String,
-    /// Which color and marker.
+    /// Number of color and marker.
     pub look: usize,
-    /// All points, with what is written beside them.
     pub points: Vec<(f64, f64, String)>,
-    /// Corners of the line: straight from one to the next where x is linear, else in stairs.
+    /// Corners of the line: straight from one to the next if x is linear, else in stairs.
     pub line: Vec<(f64, f64)>,
 }
 
-/// What a picture is of.
 pub struct Frame<'a> {
-    /// Title.
     pub title: &'a str,
-    /// What x is, with its unit.
+    /// Quantities of the axes, with units.
     pub x: &'a str,
-    /// What y is, with its unit.
     pub y: &'a str,
-    /// How x and y are divided.
     pub scales: (Scale, Scale),
     /// Width and height (pixels).
     pub size: (u32, u32),
 }
 
-/// Draws the series into one picture.
 pub fn svg(frame: &Frame, series: &[Series]) -> String {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, frame.size).into_drawing_area();
     let points = || series.iter().flat_map(|s| s.points.iter().map(|p| (p.0, p.1)).chain(s.line.iter().copied()));
     let (x, y) = (Axis::of(frame.scales.0, points().map(|p| p.0)), Axis::of(frame.scales.1, points().map(|p| p.1)));
-    // Writing to memory does not fail.
+    // Writing to memory cannot fail.
     let drawn = draw(&root, frame, series, x, y);
     debug_assert!(drawn.is_ok(), "{drawn:?}");
     drop(root);
@@ -81,7 +73,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
         .label_style(("sans-serif", 12))
         .axis_desc_style(("sans-serif", 13))
         .draw()?;
-    // Where labels stand already.
+    // Positions of the labels so far.
     let mut taken: Vec<(i32, i32)> = Vec::new();
     for Series { name, look, points, line } in series {
         let color = COLORS[look % COLORS.len()];
@@ -125,7 +117,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
     Ok(())
 }
 
-/// The corner for the legend in which the fewest of these places are, the upper right before others.
+/// The corner with the fewest of these places for the legend; the upper right before others.
 fn emptiest((width, height): (u32, u32), places: &[(i32, i32)]) -> SeriesLabelPosition {
     use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
     let (right, left) = ((width * 3 / 5) as i32, (width / 2) as i32);
@@ -141,7 +133,7 @@ fn emptiest((width, height): (u32, u32), places: &[(i32, i32)]) -> SeriesLabelPo
     corners.into_iter().min_by_key(count).unwrap_or(UpperRight)
 }
 
-/// From corner to corner along the axes: at an error, nothing faster is known. It goes on to the right end.
+/// Stairs through the corners along the axes, continued to the right end.
 fn stairs(line: &[(f64, f64)], right: f64, rising: bool) -> Vec<(f64, f64)> {
     let mut stairs = Vec::new();
     for (i, &(x, y)) in line.iter().enumerate() {
@@ -156,7 +148,7 @@ fn stairs(line: &[(f64, f64)], right: f64, rising: bool) -> Vec<(f64, f64)> {
     stairs
 }
 
-/// A circle, a triangle, a square, a diamond, an X, a cross, of some 8 pixels.
+/// A circle, triangle, square, diamond, X or inverted triangle of some 8 pixels.
 fn marker<'a>(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     let around = |corners: &[(i32, i32)]| corners.iter().map(|c| (at.0 + c.0, at.1 + c.1)).collect::<Vec<_>>();
     let closed = |corners: &[(i32, i32)]| {
@@ -190,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_names_its_axes_and_series_and_survives_what_is_not_a_number() {
+    fn a_picture_names_its_axes_and_series_and_skips_nan() {
         use Scale::{Decades, Linear, Share};
         for scales in [(Decades, Decades), (Decades, Share), (Linear, Linear), (Linear, Decades)] {
             let frame = Frame { title: "T & t", x: "time ms", y: "depth mm", scales, size: (400, 300) };

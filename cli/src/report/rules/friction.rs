@@ -1,22 +1,20 @@
-//! Friction rules: sliding, creeping, spinning, and a hit.
+//! Friction rules: sliding, creep, spinning, and a hit.
 
 use std::fmt::Write as _;
 
-use super::{DT, RulesReport, simulate};
+use super::{DT, Line, RulesReport, simulate};
 use crate::report::plot::Scale;
-use drystone::Result;
 use drystone::metrics::{fastest, in_place, in_place_count};
-use drystone::scenes::Scene;
-use drystone::world::{Body, Shape, World};
+use drystone::{Body, Result, Scene, Shape, World};
 use glam::{Quat, Vec3};
 
-/// Settings of a rule, with enough substeps that the rule and not the step decides.
+/// Settings of a rule, with 8 substeps, so that the rule and not the length of the substep determines the motion.
 fn friction_settings(rule: &str) -> String {
     let setting = if rule == "slip" { "rules.slip_friction=true".into() } else { format!("friction={rule}") };
     format!("substeps=8 {setting}")
 }
 
-/// A block of 1 x 0.4 x 1 m on a floor, with the direction of its edges along the axes.
+/// A block of 1 x 0.4 x 1 m on a floor, with edges along the axes.
 fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(mu));
@@ -54,20 +52,18 @@ pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
 /// Distance from the origin of a block in `world` after some steps (m).
 fn distance(world: World, rule: &str, steps: u32) -> Result<f64> {
     let mut simulation = simulate(world, &friction_settings(rule))?;
-    for _ in 0..steps {
-        simulation.step(DT)?;
-    }
+    (0..steps).try_for_each(|_| simulation.step(DT).map(drop))?;
     let p = simulation.world.bodies[1].position;
     Ok(f64::from(p.x.hypot(p.z)))
 }
 
-/// Distance that a block with mu 0.4 slides which starts at 4 m/s, so many degrees off its edges (m).
+/// Sliding distance of a block with mu 0.4 that starts at 4 m/s in a direction at `degrees` to its edges (m).
 fn sliding_distance(rule: &str, degrees: f32) -> Result<f64> {
     let direction = Quat::from_rotation_y(degrees.to_radians()) * Vec3::X;
     distance(block_on_floor(direction * 4.0, 0.0, 0.4), rule, 240)
 }
 
-/// Distance that a block with mu 0.5 on a slope of 20 degrees moves in 10 s (m); gravity has the slope.
+/// Distance that a block with mu 0.5 on a slope of 20 degrees moves in 10 s (m). Gravity is inclined instead of the floor.
 fn creep(rule: &str) -> Result<f64> {
     let mut world = block_on_floor(Vec3::ZERO, 0.0, 0.5);
     world.gravity = Quat::from_rotation_y(0.5) * Quat::from_rotation_z(20_f32.to_radians()) * world.gravity;
@@ -83,20 +79,7 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     let mut lines = Vec::new();
     let cases = [("slip", ""), ("box", ""), ("disc", ""), ("disc", "friction_at=manifold")];
     for (rule, more) in cases {
-        let text = format!("{} {more}", friction_settings(rule));
-        let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
-        let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
-        let mut points = Vec::new();
-        for step in 1..=60_u32 {
-            simulation.step(DT)?;
-            let time = f64::from(step) * f64::from(DT);
-            let body = &simulation.world.bodies[1];
-            let (v, w) = (f64::from(body.linear_velocity.length()), f64::from(body.angular_velocity.length()));
-            slides = if v > 0.02 { time } else { slides };
-            spins = if w > 0.05 { time } else { spins };
-            aside = aside.max(f64::from(body.position.z.abs()));
-            points.push((time, v));
-        }
+        let ([slides, spins, aside], points) = sliding_spin(rule, more)?;
         let name = if more.is_empty() { rule.to_owned() } else { format!("{rule}, per manifold") };
         let end = |t: f64| if t > 0.99 { "1 s and more".into() } else { format!("{t:.3} s") };
         let _ = writeln!(report.page, "| {name} | {} | {} | {:.1} mm |", end(slides), end(spins), aside * 1e3);
@@ -105,6 +88,26 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     }
     report.picture("spinning-block.svg", "Speed of a block that slides and spins", ("speed m/s", Scale::Linear), lines);
     Ok(())
+}
+
+/// Times (s) for which a block slides and spins that starts at 2 m/s and 5 rad/s, its largest distance from the straight line (m), and its
+/// speed over time.
+fn sliding_spin(rule: &str, more: &str) -> Result<([f64; 3], Line)> {
+    let text = format!("{} {more}", friction_settings(rule));
+    let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
+    let (mut slides, mut spins, mut aside) = (0.0, 0.0, 0.0_f64);
+    let mut points = Vec::new();
+    for step in 1..=60_u32 {
+        simulation.step(DT)?;
+        let time = f64::from(step) * f64::from(DT);
+        let body = &simulation.world.bodies[1];
+        let (v, w) = (f64::from(body.linear_velocity.length()), f64::from(body.angular_velocity.length()));
+        slides = if v > 0.02 { time } else { slides };
+        spins = if w > 0.05 { time } else { spins };
+        aside = aside.max(f64::from(body.position.z.abs()));
+        points.push((time, v));
+    }
+    Ok(([slides, spins, aside], points))
 }
 
 fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
@@ -119,7 +122,7 @@ fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<
         let thrown = fastest(&scene.world).1;
         let boxes = scene.world.dynamic_count() - 1;
         let speed = scene.world.bodies[thrown].linear_velocity.x;
-        // The ball has hit when it lost a tenth of its speed along its way.
+        // The hit has happened when the ball has lost a tenth of its speed.
         let (mut before, mut hit) = (boxes, false);
         for _ in 0..scene.steps {
             simulation.step(scene.dt)?;
@@ -135,7 +138,6 @@ fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<
     Ok(())
 }
 
-/// Dynamic bodies that are still in place.
 fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
     in_place_count(was, is) - usize::from(in_place(&was.bodies[thrown], &is.bodies[thrown]))
 }
@@ -144,7 +146,7 @@ fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// The numbers that docs/rules.md prints: v²/(2 mu g) = 2.039 m in every direction under the disc only.
+    /// docs/rules.md has these numbers: v²/(2 mu g) = 2.039 m in every direction under the disc only.
     #[test]
     fn a_block_slides_as_far_in_every_direction_under_the_disc_only() {
         let slid = |rule, degrees| sliding_distance(rule, degrees).expect("a run") / (16.0 / (2.0 * 0.4 * 9.81));
@@ -156,6 +158,15 @@ mod tests {
             );
         }
         assert!((slid("box", 0.0) - 1.0).abs() < 0.01 && slid("box", 45.0) < 0.75);
+    }
+
+    #[test]
+    fn sliding_and_spinning_end_together_under_the_disc_at_points_only() {
+        let ends = |rule, more| sliding_spin(rule, more).map(|([slides, spins, aside], _)| (slides - spins, aside));
+        let (disc, boxed) = (ends("disc", "").expect("a run"), ends("box", "").expect("a run"));
+        let manifold = ends("disc", "friction_at=manifold").expect("a run");
+        assert!(disc.0 < 0.06 && boxed.0 > 0.15 && manifold.0 > 0.2, "{disc:?} {boxed:?} {manifold:?}");
+        assert!(disc.1 > 0.02 && manifold.1 < 1e-4, "{disc:?} {manifold:?}");
     }
 
     #[test]

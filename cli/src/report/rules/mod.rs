@@ -1,4 +1,4 @@
-//! `drystone report rules`: what each rule of the course sheet does, from runs.
+//! `drystone report rules`: effects of each rule of the course sheet, measured in runs.
 
 mod friction;
 mod stacks;
@@ -9,24 +9,18 @@ use std::path::Path;
 
 use crate::files;
 use crate::settings;
-use drystone::Simulation;
-use drystone::backend::cpu::Reference;
 use drystone::metrics::{drift, in_place_count, rms_speed};
-use drystone::world::World;
-use drystone::{Error, Result};
+use drystone::{Error, Reference, Result, Scene, Simulation, World};
 
 use super::plot::{Frame, Scale, Series, svg};
 
-/// The page and its pictures.
 pub struct RulesReport {
-    /// Markdown.
     pub page: String,
-    /// Name and SVG text of each picture.
     pub pictures: Vec<(&'static str, String)>,
 }
 
 impl RulesReport {
-    /// Writes `rules.md` and the pictures into a directory, which is made if need be.
+    /// Writes `rules.md` and the pictures into a directory, which is made if needed.
     pub fn write(&self, directory: &Path) -> Result<()> {
         let pictures = directory.join("rules");
         std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
@@ -37,10 +31,12 @@ impl RulesReport {
     }
 }
 
-/// Length of every step here (s).
+/// Length of a step (s).
 const DT: f32 = 1.0 / 60.0;
+/// Times (s) and values of a line in a plot.
+type Line = Vec<(f64, f64)>;
 
-/// Runs everything and makes the page; `after_run` is called as often as [`RUNS`] says.
+/// Runs everything and makes the page; calls `after_run` [`RUNS`] times.
 pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     let mut report = RulesReport { page: include_str!("../rules_head.md").to_owned(), pictures: Vec::new() };
     stacks::clamping(&mut report, &mut after_run)?;
@@ -56,50 +52,40 @@ fn simulate(world: World, settings_text: &str) -> Result<Simulation> {
     Simulation::new(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
 }
 
-/// How a standing scene fared.
 struct Standing {
-    /// Until some body was out of its place, or the run was over (s).
-    seconds: f64,
-    /// Largest horizontal distance of a body from where it began (m).
+    /// Time until a body left its place; none if all bodies stood for 20 s (s).
+    fell: Option<f64>,
+    /// Largest horizontal distance of a body from its first position (m).
     drift: f64,
-    /// Speed at the end (m/s).
+    /// Root mean square speed at the end (m/s).
     rms_speed: f64,
     /// Deepest overlap at the end (m).
     penetration: f64,
 }
 
-/// Runs until a body left its place, or for `seconds`.
-fn stand(world: &World, settings_text: &str, seconds: f64) -> Result<Standing> {
+/// Runs a scene for 20 s or until a body leaves its place.
+fn stand(spec: &str, settings_text: &str) -> Result<Standing> {
+    let world = Scene::find_spec(spec)?.world;
     let mut simulation = simulate(world.clone(), settings_text)?;
-    let steps = (seconds / f64::from(DT)).round() as u32;
-    let mut time = 0.0;
-    for step in 1..=steps {
+    let (mut step, mut stands) = (0, true);
+    while stands && step < 1200 {
+        step += 1;
         simulation.step(DT)?;
-        time = f64::from(step) * f64::from(DT);
-        if in_place_count(world, &simulation.world) < world.dynamic_count() {
-            break;
-        }
+        stands = in_place_count(&world, &simulation.world) == world.dynamic_count();
     }
     Ok(Standing {
-        seconds: time,
-        drift: drift(world, &simulation.world),
+        fell: (!stands).then(|| f64::from(step) * f64::from(DT)),
+        drift: drift(&world, &simulation.world),
         rms_speed: rms_speed(&simulation.world),
         penetration: simulation.penetration().max,
     })
 }
 
-/// How often `after_run` is called.
 pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
 
 impl RulesReport {
-    /// Adds a picture of lines over time, each with its name. A scale over decades leaves out what is not above 0.
-    fn picture(
-        &mut self,
-        file: &'static str,
-        title: &str,
-        (y, scale): (&str, Scale),
-        lines: Vec<(String, Vec<(f64, f64)>)>,
-    ) {
+    /// Adds a plot of named lines over time. A logarithmic scale leaves out values that are not above 0.
+    fn picture(&mut self, file: &'static str, title: &str, (y, scale): (&str, Scale), lines: Vec<(String, Line)>) {
         let _ = writeln!(self.page, "\n![{file}](rules/{file})");
         let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {
             line.retain(|p| scale != Scale::Decades || p.1 > 0.0);

@@ -1,10 +1,9 @@
-//! The report of a run as a table for people.
+//! The report of a run as a table.
 
 use super::RunReport;
 use drystone::stats::median;
 
 impl RunReport {
-    /// The report as names and values for people.
     pub fn rows(&self) -> Vec<(String, String)> {
         let mut rows = Vec::new();
         let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
@@ -15,10 +14,8 @@ impl RunReport {
             row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
         }
         row("backend", format!("{}: {}", self.backend, self.adapter));
-        row(
-            "steps",
-            format!("{} of {:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps", self.steps, self.dt * 1e3),
-        );
+        let (steps, dt) = (self.steps, self.dt * 1e3);
+        row("steps", format!("{steps} of {dt:.3} ms; {substeps} substeps of {iterations} + {relax} sweeps"));
         let (manifolds, points) = (self.manifolds, self.points);
         if self.asleep == 0 {
             let (colors, reused) = (self.colors, 100.0 * self.reused);
@@ -26,16 +23,10 @@ impl RunReport {
         } else {
             row("contacts", format!("{manifolds} manifolds, {points} points, with those that bodies sleep on"));
             let after = |step: u32| format!("after {:.2} s", f64::from(step) * f64::from(self.dt));
-            let first =
-                self.first_asleep_step.map_or_else(String::new, |first| format!(", the first {}", after(first)));
-            row(
-                "asleep",
-                match self.all_asleep_step {
-                    Some(all) if self.first_asleep_step == Some(all) => format!("all bodies {}", after(all)),
-                    Some(all) => format!("all bodies {}{first}", after(all)),
-                    None => format!("{} of {} bodies{first}", self.asleep, self.bodies),
-                },
-            );
+            let first = self.first_asleep_step.filter(|_| self.first_asleep_step != self.all_asleep_step);
+            let first = first.map_or_else(String::new, |first| format!(", the first {}", after(first)));
+            let all = self.all_asleep_step.map(|all| format!("all bodies {}", after(all)));
+            row("asleep", all.unwrap_or_else(|| format!("{} of {} bodies", self.asleep, self.bodies)) + &first);
         }
         if self.most_substeps > substeps {
             let each: Vec<_> = self.efforts.iter().map(|row| format!("{} with {}", row.bodies, row.substeps)).collect();
@@ -59,10 +50,8 @@ impl RunReport {
             row("overflow", format!("up to {} manifolds found no color and were swept alone", self.overflow));
         }
         if let Some(times) = self.awake_ms {
-            let which = match self.steps - self.awake_steps {
-                0 => String::new(),
-                _ => format!(", of {} steps with a body awake", self.awake_steps),
-            };
+            let (all, awake) = (self.steps, self.awake_steps);
+            let which = if awake == all { String::new() } else { format!(", of {awake} steps with a body awake") };
             row("ms a step", format!("{times}{which}"));
         }
         for stage in &self.stage_ms {
@@ -77,23 +66,11 @@ impl RunReport {
             let (up, down) = (kb(self.bytes_up), kb(self.bytes_down));
             row("last step", format!("{up:.1} kB to the device, {down:.1} kB back, {} dispatches", self.dispatches));
         }
-        row(
-            "penetration",
-            format!(
-                "{:.3} mm deepest, 95 % within {:.3}, mean {:.3}",
-                self.penetration_max * 1e3,
-                self.penetration_p95 * 1e3,
-                self.penetration_mean * 1e3
-            ),
-        );
+        let [max, p95, mean] = [self.penetration_max, self.penetration_p95, self.penetration_mean].map(|x| x * 1e3);
+        row("penetration", format!("{max:.3} mm deepest, 95 % within {p95:.3}, mean {mean:.3}"));
         let (rms, most) = (self.speed_rms * 1e3, self.speed_max * 1e3);
-        row(
-            "speed",
-            match &self.fastest {
-                Some(body) => format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})"),
-                None => "0 mm/s: nothing moves".into(),
-            },
-        );
+        let speed = |body| format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})");
+        row("speed", self.fastest.as_ref().map_or("0 mm/s: nothing moves".into(), speed));
         row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
         if let Some(escaped) = self.escaped {
             row("container", format!("{escaped} bodies outside"));
