@@ -1,4 +1,4 @@
-//! Reads contacts and impulses after a step: who touches whom, how deep, how hard.
+//! Reads contacts and impulses after a step: bodies, depths, forces.
 //!
 //!     cargo run --release --example read_contacts
 
@@ -6,16 +6,15 @@ use drystone::{Reference, Result, Scene, Simulation, SolverConfig};
 
 fn main() -> Result<()> {
     let scene = Scene::find("tower", &["n=3".into()])?;
-    let config = SolverConfig::default();
-    let substep = scene.dt / config.substeps as f32;
-    let mut simulation = Simulation::new(scene.world, config, Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     for _ in 0..300 {
         simulation.step(scene.dt)?;
     }
     for manifold in simulation.manifolds() {
         println!("body {} on body {}, normal {:.2}", manifold.body_b, manifold.body_a, manifold.normal);
+        // Impulses are those of the last substep: over its length they are forces.
+        let substep = scene.dt / manifold.substeps as f32;
         for point in manifold.points() {
-            // Impulses are those of the last substep: over its length they are forces.
             let force = point.normal_impulse / substep;
             println!("    {:.3} mm apart, {force:.0} N", point.separation * 1e3);
         }

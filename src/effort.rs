@@ -8,7 +8,7 @@
 //! A class rises as soon as a load lasts, and falls only after a second in which half of the lower class's promise was kept: a load that is as
 //! large as before never changes a class. The power of two makes the change exact: impulses and preloads scale without rounding.
 
-use crate::config::{Method, SolverConfig};
+use crate::config::{Method, SolverConfig, Stabilization};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
 use crate::stats::{EFFORT_CLASSES, HardestContact};
@@ -98,7 +98,8 @@ fn sag_factor(class: u8) -> f32 {
 impl Effort {
     /// The highest class that the settings allow. Sweeps that end by what all bodies do have one class for all.
     fn highest(config: &SolverConfig) -> u8 {
-        if config.method == Method::Accelerated || config.tolerance > 0.0 {
+        let is_soft = config.stabilization == Stabilization::Soft;
+        if config.method == Method::Accelerated || config.tolerance > 0.0 || !is_soft {
             return 0;
         }
         (config.max_substeps / config.substeps).checked_ilog2().unwrap_or(0) as u8
@@ -132,6 +133,7 @@ impl Effort {
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
         let loads = Load::all(world, config);
         let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+        let touches = |load: &&Load| load.gap < 0.1 * f64::from(world.bodies[load.upper].smallest_half_extent());
         let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
             let sag = load.overlap(config.substeps, dt, config);
@@ -139,7 +141,7 @@ impl Effort {
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
             Interface { a, b, need: need as f32 }
         };
-        self.follow_islands(world, &[], loads.iter().map(interface));
+        self.follow_islands(world, &[], loads.iter().filter(touches).map(interface));
     }
 
     fn follow_islands(
@@ -225,7 +227,7 @@ impl Effort {
         if self.used.len() < 2 {
             return 0;
         }
-        self.used.iter().position(|&class| class == self.classes[body]).unwrap_or(0)
+        self.used.iter().position(|&class| class == self.class_of(body)).unwrap_or(0)
     }
 
     /// The class of the bodies of a block.

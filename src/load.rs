@@ -31,6 +31,8 @@ pub struct Load {
     pub force: f64,
     /// Overlap times the square of w (m/s²): the force on one point over the mass that the point feels.
     pub stress: f64,
+    /// Distance between the boxes around the two, along gravity (m).
+    pub gap: f64,
 }
 
 impl Load {
@@ -61,7 +63,8 @@ impl Load {
                 let force = borne[upper] * area / total;
                 borne[lower] += force;
                 let stress = stress(world, &boxes, upper, lower, force, config);
-                all.push(Self { upper, lower, force, stress });
+                let gap = boxes[upper].low.y - boxes[lower].high.y;
+                all.push(Self { upper, lower, force, stress, gap });
             }
         }
         all

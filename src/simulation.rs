@@ -201,7 +201,8 @@ impl Simulation {
     /// The manifolds of the last step, with their impulses.
     pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
         self.fetch();
-        manifolds::of(&self.stages.detector, &self.stages.contacts, &self.stages.problem)
+        let Stages { detector, contacts, problem, .. } = &self.stages;
+        manifolds::of(detector, contacts, problem, self.stages.least_substeps())
     }
 
     /// Overlap when the last step began, from the contacts that it went by.
@@ -210,7 +211,7 @@ impl Simulation {
         Penetration::of(self.manifolds().map(separations))
     }
 
-    /// Impulse of each joint of the world on its body b, in the last substep, world axes (N s).
+    /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
         self.stages.problem.joint_impulses.iter().map(|row| row.linear.into()).collect()
     }

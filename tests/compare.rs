@@ -94,13 +94,22 @@ fn the_pass_that_goes_wrong_is_found_whichever_it_is() {
 
 #[test]
 fn whatever_a_backend_gives_back_is_compared() {
-    let (mut problem, plan) = lying();
+    let (mut problem, mut plan) = lying();
     // A joint that no pass goes over.
     problem.joints.push(JointRow { body_a: 30, body_b: 31, ..JointRow::default() });
     problem.joint_impulses.push(JointImpulseRow::default());
     problem.params.joint_count = 1;
-    problem.order.push(0);
+    let contacts = problem.rows_of(&problem.contact_colors()).to_vec();
+    let colors = problem.contact_colors().len();
+    problem.order = contacts.into_iter().chain([0]).collect();
+    problem.colors.truncate(colors + 1);
     problem.colors.push(problem.order.len() as u32);
+    let block = problem.blocks[0];
+    problem.in_one_block(colors as u32, block.substep);
+    // The colors of the bodies stand after the new one.
+    for pass in plan.passes.iter_mut().filter(|pass| pass.kernel.is_over_bodies()) {
+        pass.colors = pass.colors.start + 1..pass.colors.end + 1;
+    }
     let spoils: [fn(&mut StepProblem); 5] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
         |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),

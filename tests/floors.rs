@@ -8,16 +8,17 @@ const LIBRARY: &[&[&str]] = &[
     &["math", "random", "error", "memory", "names", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
+    &["effort"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "sleep"],
     &["backend", "solver"],
     &["simulation"],
+    &["compare"],
     &["stages"],
 ];
 
 /// The modules of the command, above the library.
-const COMMAND: &[&[&str]] =
-    &[&["files", "settings", "compare"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
+const COMMAND: &[&[&str]] = &[&["files", "settings"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
 
 const LIB: &str = include_str!("../src/lib.rs");
 const CLI: &str = include_str!("../cli/src/lib.rs");

@@ -2,6 +2,8 @@
 
 #[macro_use]
 mod common;
+#[path = "common/efforts.rs"]
+mod efforts;
 #[path = "common/settings.rs"]
 mod settings;
 
@@ -23,6 +25,7 @@ tests! {
     exact_gpu {
         a_falling_pile_has_the_bits_of_the_reference_in_exact_mode,
         every_rule_has_the_bits_of_the_reference_in_exact_mode,
+        several_efforts_have_the_bits_of_the_reference_in_exact_mode,
         friction_per_manifold_without_friction_has_the_bits_of_the_reference,
         a_small_world_in_one_dispatch_has_the_bits_of_the_reference,
     }
@@ -127,6 +130,10 @@ fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
     }
 }
 
+fn several_efforts_have_the_bits_of_the_reference_in_exact_mode() {
+    assert_same(&efforts::islands(), &SolverConfig::default().without_sleep(), 20, "islands of several efforts");
+}
+
 fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
     let config =
         SolverConfig::default().without_sleep().with(|c| c.friction_at = drystone::config::FrictionAt::Manifold);
@@ -196,6 +203,7 @@ fn a_problem_too_large_for_the_adapter_is_refused_by_name() {
     // Zeros that nobody touches cost no memory.
     let colors = vec![0; (summary.buffer_limit / 4 + 1) as usize];
     let mut problem = StepProblem { colors, ..StepProblem::default() };
+    problem.in_one_block(problem.colors.len() as u32 - 1, Default::default());
     let Err(Error::TooLarge(line)) = gpu.run(&mut problem, &[]) else { panic!("{summary} took it") };
     assert!(line.starts_with("the colors of this problem take "), "{line}");
     assert!(line.contains(&summary.name) && line.ends_with("use --backend cpu"), "{line}");

@@ -134,7 +134,7 @@ const REFUSED: &[(&[&str], &[&str])] = &[
     (&["run", "pile", "-p", "n=1.5"], &["n = \"1.5\"", "whole"]),
     (&["run", "pile", "-p", "jitter=nan"], &["jitter", "nan"]),
     (&["run", "drop", "--set", "substeps"], &["--set substeps", "key=value"]),
-    (&["run", "drop", "--set", "step=1"], &["--set step=1", "unknown", "substeps"]),
+    (&["run", "drop", "--set", "substep=1"], &["--set substep=1", "unknown", "substeps"]),
     (&["run", "drop", "--set", "substeps=x"], &["--set substeps=x", "u32"]),
     (&["run", "drop", "--set", "substeps=0"], &["substeps = 0", "1 to 4096"]),
     (&["run", "drop", "--set", "contact_frequency=nan"], &["contact_frequency = NaN"]),

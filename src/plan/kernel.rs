@@ -68,6 +68,11 @@ impl Kernel {
         }
     }
 
+    /// Whether the color that it goes over is that of the bodies of a block, or of their rows of inertia.
+    pub fn is_over_bodies(self) -> bool {
+        matches!(self, Self::IntegrateVelocities { .. } | Self::IntegrateGyroscopic | Self::IntegratePositions)
+    }
+
     /// Rules of a kernel that sweeps constraints, or none.
     pub fn rules(self) -> Option<Rules> {
         match self {

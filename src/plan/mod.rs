@@ -222,7 +222,8 @@ impl fmt::Display for StepPlan {
                 write!(f, "block {}: ", run[0].block)?;
             }
             write!(f, "{}", run[0].kernel)?;
-            let colors: Vec<_> = run.iter().filter(|p| !p.colors.is_empty()).map(|p| group_name(&p.colors)).collect();
+            let named = |p: &&Pass| !p.colors.is_empty() && !p.kernel.is_over_bodies();
+            let colors: Vec<_> = run.iter().filter(named).map(|p| group_name(&p.colors)).collect();
             if !colors.is_empty() {
                 write!(f, " over colors {}", colors.join(", "))?;
             }

@@ -22,6 +22,8 @@ pub struct SolvedManifold {
     pub twist_impulse: f32,
     /// Friction impulse on b in the last substep, with friction per manifold, world axes (N s).
     pub friction_impulse: Vec3,
+    /// Substeps that the step had: an impulse over the length of one is a force.
+    pub substeps: u32,
     points: [SolvedPoint; MAX_POINTS],
     count: usize,
 }
@@ -62,10 +64,14 @@ pub(super) fn of(
     detector: &Detector,
     contacts: &ContactRows,
     problem: &StepProblem,
+    substeps: u32,
 ) -> impl Iterator<Item = SolvedManifold> + Clone {
     let all = detector.pairs().flat_map(|pair| pair.manifolds.iter().map(move |manifold| (pair, manifold)));
     let written = all.filter(|(_, manifold)| manifold.slot != NO_SLOT && !manifold.has_ended());
-    written.map(|(pair, manifold)| solved(pair, manifold, contacts, problem))
+    written.map(move |(pair, manifold)| {
+        let solved = solved(pair, manifold, contacts, problem);
+        SolvedManifold { substeps: substeps * solved.substeps, ..solved }
+    })
 }
 
 fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &StepProblem) -> SolvedManifold {
@@ -89,6 +95,7 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
     // With friction per manifold the row after the points is the patch's.
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
     SolvedManifold {
+        substeps: (1.0 / contact.substep_share) as u32,
         body_a: pair.body_a as usize,
         body_b: pair.body_b as usize,
         normal: manifold.normal,

@@ -97,6 +97,11 @@ impl Stages {
         Ok(Changes { settings: self.key.config != *config, surfaces, joints, step })
     }
 
+    /// Substeps of class 0 in the last step.
+    pub fn least_substeps(&self) -> u32 {
+        self.key.config.substeps
+    }
+
     /// Brings all that lasts to what the caller changed.
     pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: Changes) {
         if changes.settings {

@@ -12,7 +12,7 @@ use crate::problem::{JointRow, StepProblem};
 fn moving_pile() -> StepProblem {
     let mut problem = pile(if cfg!(miri) { 4 } else { 7 });
     let starts = problem.colors.clone();
-    let [first, last] = [0, starts.len() - 3].map(|color| starts[color]..starts[color + 1]);
+    let [first, last] = [0, problem.contact_colors().len() - 2].map(|color| starts[color]..starts[color + 1]);
     for (i, body) in (0_u16..).zip(&mut problem.bodies) {
         body.v = [f32::from(i % 3), f32::from(i % 5), f32::from(i % 7)].map(|v| 0.1 * v - 0.2);
     }
