@@ -133,7 +133,8 @@ impl Effort {
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
         let loads = Load::all(world, config);
         let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
-        let touches = |load: &&Load| load.gap < 0.1 * f64::from(world.bodies[load.upper].smallest_half_extent());
+        // Boxes of bodies beside each other may overlap.
+        let touches = |load: &&Load| load.gap.abs() < 0.1 * f64::from(world.bodies[load.upper].smallest_half_extent());
         let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
             let sag = load.overlap(config.substeps, dt, config);
@@ -238,5 +239,51 @@ impl Effort {
     /// The length of the substeps of a body over that of class 0.
     pub fn share(&self, body: usize) -> f32 {
         1.0 / (1_u32 << self.class_of(body)) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_is_the_lowest_that_keeps_the_promise() {
+        for (need, class) in [(0.0, 0), (1.0, 0), (1.01, 1), (4.0, 1), (4.1, 2), (16.0, 2), (1e30, HIGHEST)] {
+            assert_eq!(class_for(need), class, "{need}");
+        }
+    }
+
+    #[test]
+    fn a_hit_of_one_step_never_counts_and_a_load_does_soon() {
+        assert!(lasting(1e9, 0.0) < 1.0);
+        let mut need = 0.0;
+        let steps = (1..).find(|_| {
+            need = lasting(1000.0, need);
+            need == 1000.0
+        });
+        assert_eq!(steps, Some(7));
+        assert_eq!(lasting(0.0, 1000.0), 0.0);
+    }
+
+    fn island(need: f32, class: u8, calm_for: u8) -> Island {
+        Island { need, contacts: 2, bodies: 2, class, calm_for }
+    }
+
+    #[test]
+    fn a_class_rises_at_once_and_falls_after_a_second_of_calm() {
+        let effort = Effort { highest: 3, ..Effort::default() };
+        assert_eq!(effort.next(&island(20.0, 0, 0)), (3, 0));
+        assert_eq!(effort.next(&island(1e9, 0, 0)), (3, 0), "no higher than the settings allow");
+        assert_eq!(effort.next(&island(2.1, 2, 30)), (2, 0), "class 1 would be near its limit");
+        assert_eq!(effort.next(&island(1.9, 2, 30)), (2, 31));
+        assert_eq!(effort.next(&island(1.9, 2, CALM_STEPS - 1)), (1, 0));
+        assert_eq!(effort.next(&island(0.0, 0, 9)), (0, 0));
+    }
+
+    #[test]
+    fn a_heap_needs_less_than_a_column() {
+        assert_eq!(island(8.0, 0, 0).counted_need(), 8.0);
+        assert_eq!(Island { contacts: 8, ..island(8.0, 0, 0) }.counted_need(), 2.0);
+        assert_eq!(Island { contacts: 1, ..island(8.0, 0, 0) }.counted_need(), 8.0);
     }
 }

@@ -15,6 +15,8 @@ pub enum ColorBy {
     Impulse,
     /// Sleeping bodies are dark, awake bodies light.
     Sleeping,
+    /// Substeps that the island of the body takes, dark to light: doubled with each shade.
+    Effort,
 }
 
 impl std::fmt::Display for ColorBy {
@@ -47,10 +49,17 @@ const MATERIALS: [Rgba; 8] = [
 const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
+/// Substeps that are doubled this often have the lightest shade.
+const MOST_DOUBLED: f32 = 6.0;
+
 impl ColorBy {
-    /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), or 1 for sleep; NaN without a
-    /// contact.
+    /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), 1 for sleep, or how often the substeps
+    /// are doubled; NaN without a contact.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
+        if self == Self::Effort {
+            let doubled = |body| (simulation.substeps_of(body) / simulation.config().substeps).ilog2() as f32;
+            return (0..simulation.world.bodies.len()).map(doubled).collect();
+        }
         let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();
         let manifolds: Vec<SolvedManifold> = simulation.manifolds().collect();
         self.values_of(&simulation.world, &manifolds, &asleep)
@@ -60,6 +69,7 @@ impl ColorBy {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
+            Self::Effort => vec![f32::NAN; world.bodies.len()],
             Self::Speed => world.bodies.iter().map(|b| b.linear_velocity.length()).collect(),
             Self::Batch => {
                 // Impulse and color of the contact with the largest impulse.
@@ -101,6 +111,7 @@ impl ColorBy {
             (_, Self::Material) => shaded(MATERIALS[value as usize % MATERIALS.len()], i),
             (_, Self::Batch) => batch_color(value as u32),
             (_, Self::Sleeping) => shaded(if value > 0.0 { ASLEEP } else { AWAKE }, i),
+            (_, Self::Effort) => on_scale((value / MOST_DOUBLED).min(1.0).powi(2)),
             (_, Self::Speed | Self::Impulse) => on_scale(value / scale.max(f32::MIN_POSITIVE)),
         };
         world.bodies.iter().zip(values).enumerate().map(color).collect()

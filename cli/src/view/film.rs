@@ -63,7 +63,7 @@ impl Film {
     }
 
     pub fn read(scene: Scene, color: ColorBy, path: &Path) -> Result<Self> {
-        if matches!(color, ColorBy::Batch | ColorBy::Impulse | ColorBy::Sleeping) {
+        if matches!(color, ColorBy::Batch | ColorBy::Impulse | ColorBy::Sleeping | ColorBy::Effort) {
             let refusal = "--from: a recorded motion has neither contacts nor sleep; color by material or speed";
             return Err(Error::input(refusal));
         }
