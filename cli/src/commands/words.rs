@@ -71,6 +71,30 @@ pub(super) fn method() -> impl TypedValueParser<Value = Method> {
     one_of(&METHODS)
 }
 
+/// A method of sweeps, or `newton`: none of them.
+pub(super) fn solve_method() -> impl TypedValueParser<Value = SolveMethod> {
+    let newton = ("newton", "Newton's method on the central path, with sweeps before it while they pay; in f64");
+    one_of(&[&METHODS[..], &[newton]].concat())
+}
+
+/// How `drystone solve` solves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SolveMethod {
+    Sweeps(Method),
+    Newton,
+}
+
+impl FromStr for SolveMethod {
+    type Err = drystone::Error;
+
+    fn from_str(name: &str) -> drystone::Result<Self> {
+        match name {
+            "newton" => Ok(Self::Newton),
+            _ => name.parse().map(Self::Sweeps),
+        }
+    }
+}
+
 pub(super) fn order() -> impl TypedValueParser<Value = Order> {
     one_of(&ORDERS)
 }

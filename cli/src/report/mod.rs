@@ -14,5 +14,5 @@ mod trajectory;
 pub use convergence::{convergence, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
-pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};
+pub use solve::{CurveRow, NewtonReport, Reached, SolveReport, SolveSettings};
 pub use trajectory::Trajectory;

@@ -305,8 +305,9 @@ fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
     jointed.push(("G/m", Whole(vec![18])));
     let refused = |bytes: Vec<u8>| ContactProblem::from_fclib(bytes).expect_err("refused").to_string();
     assert_eq!(refused(bytes(&jointed, "fclib_global")), "fclib_global/G: joints cannot be read");
-    assert_eq!(refused(bytes(&good, "fclib_local")), "fclib_local: only fclib_global can be read");
-    assert_eq!(refused(bytes(&good, "other")), "no group fclib_global: not an FCLIB file");
+    assert_eq!(refused(bytes(&good, "fclib_global_rolling")), "fclib_global_rolling: rolling friction cannot be read");
+    assert_eq!(refused(bytes(&good, "fclib_local")), "fclib_local/W/m: dataset not found");
+    assert_eq!(refused(bytes(&good, "other")), "no group fclib_global or fclib_local: not an FCLIB file");
 }
 
 #[test]
