@@ -261,3 +261,65 @@ fn left_divide<const N: usize>(b: &mut Block<N>, lu: &Block<N>, rows: &[u8; N]) 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::SplitMix64;
+
+    /// A grid of 4 x 3 nodes, entry by entry with no order, and its dense double.
+    fn matrix(stiffness: f64) -> (Factor<3>, Vec<Vec<f64>>) {
+        let ties: Vec<[u32; 2]> = (0..12)
+            .flat_map(|i| [(i % 4 < 3).then_some([i, i + 1]), (i < 8).then_some([i + 4, i])])
+            .flatten()
+            .collect();
+        let mut random = SplitMix64::new(7);
+        let mut number = || (random.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+        let mut factor = Factor::new(12, ties.iter().copied());
+        factor.clear();
+        let mut dense: Vec<Vec<f64>> =
+            (0..36).map(|i| (0..36).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+        for [a, b] in ties {
+            for (row, column, sign) in [(a, a, 1.0), (a, b, -1.0), (b, a, -0.9), (b, b, 1.1)] {
+                let block = factor.block_mut(row, column);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let x = sign * stiffness * (f64::from(u8::from(i == j)) + 0.2 * number());
+                        block[i][j] += x;
+                        dense[3 * row as usize + i][3 * column as usize + j] += x;
+                    }
+                }
+            }
+        }
+        (factor, dense)
+    }
+
+    #[test]
+    fn the_factors_solve_an_unsymmetric_matrix() {
+        for stiffness in [1.0, 1e8] {
+            let (mut factor, dense) = matrix(stiffness);
+            factor.factor().expect("it is regular");
+            let right: Vec<[f64; 3]> = (0..12).map(|i| [1.0, f64::from(i), -0.5]).collect();
+            let mut x = right.clone();
+            factor.solve(&mut x);
+            let (x, right) = (x.into_flattened(), right.into_flattened());
+            for (row, right) in dense.iter().zip(right) {
+                let sum: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+                assert!((sum - right).abs() < 1e-12, "{stiffness}: {sum}, not {right}");
+            }
+            assert!(x.iter().any(|x| x.abs() > 1e-12), "all zero");
+        }
+    }
+
+    #[test]
+    fn a_singular_matrix_has_no_factors() {
+        let (mut factor, _) = matrix(1.0);
+        *factor.block_mut(5, 5) = [[0.0; 3]; 3];
+        for j in [1, 4, 6, 9] {
+            *factor.block_mut(5, j) = [[0.0; 3]; 3];
+        }
+        assert!(factor.factor().is_none());
+        let (mut factor, _) = matrix(f64::NAN);
+        assert!(factor.factor().is_none());
+    }
+}

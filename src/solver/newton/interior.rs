@@ -31,6 +31,8 @@ pub(super) struct Interior {
     u: Vec<DVec3>,
     /// `e_vel` of r.
     pub error: f64,
+    /// Whether the second order of a step counts as much as the predicted step was long.
+    careful: bool,
 }
 
 /// What a step is made of, at each contact.
@@ -45,15 +47,16 @@ struct Point {
 }
 
 impl Interior {
-    /// The start: every contact pushes, and parts with the mean of the free velocities.
-    pub fn new(system: &impl System) -> Self {
+    /// The start: every contact pushes, and parts with the mean of the free velocities. A careful one takes more steps, and comes
+    /// through where the way is blocked for others.
+    pub fn new(system: &impl System, careful: bool) -> Self {
         let cones = system.cones();
         let free = cones.iter().map(|c| c.q.length_squared()).sum::<f64>();
         let speed = (free / cones.len() as f64).sqrt();
         let scale: Vec<_> = cones.iter().map(|c| DVec3::new(if c.mu > 0.0 { c.mu } else { 1.0 }, 1.0, 1.0)).collect();
         let r: Vec<_> = cones.iter().map(|c| DVec3::X * (c.rho * speed)).collect();
         let z = scale.iter().map(|t| DVec3::X * (speed / t.x)).collect();
-        let mut start = Self { r, z, scale, u: Vec::new(), error: f64::INFINITY };
+        let mut start = Self { r, z, scale, u: Vec::new(), error: f64::INFINITY, careful };
         start.measure(system);
         start
     }
@@ -98,10 +101,11 @@ impl Interior {
         // No less than what the error asks for: below that rounding is all that grows.
         let centering = left.powi(3).max(LEAST_CENTERING).max((0.2 * tolerance / self.error).min(1.0));
 
+        let trust = if self.careful { length } else { 1.0 };
         let corrected = points.iter().enumerate().map(|(i, p)| {
             let (dx, dz) = (self.scale[i] * predicted.0[i], predicted.1[i]);
             let second = product(p.scaling.apply(|e| e, dx), p.scaling.apply(|e| 1.0 / e, dz));
-            square(p) + DVec3::X * (centering * before) - second
+            square(p) + DVec3::X * (centering * before) - second * trust
         });
         let direction = self.direction(system, &points, corrected);
         let mut length = (FRACTION * self.longest(&direction)).min(1.0);
@@ -133,6 +137,7 @@ impl Interior {
             scale: self.scale.clone(),
             u: Vec::new(),
             error: f64::INFINITY,
+            careful: self.careful,
         }
     }
 

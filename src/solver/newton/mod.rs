@@ -36,6 +36,9 @@ const MOST_STEPS: u32 = 100;
 /// Steps in which the least error must fall by a tenth.
 const PATIENCE: u32 = 12;
 
+/// Error, in tolerances, below which sweeps go on where Newton's method ended.
+const LAST_DIGITS: f64 = 100.0;
+
 /// What ended a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
@@ -133,27 +136,17 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
         return best;
     }
 
-    let mut interior = Interior::new(system);
-    let (mut milestone, mut since) = (f64::INFINITY, 0);
-    best.newton = loop {
-        if interior.step(system, tolerance).is_none() {
-            break NewtonEnded::Blocked;
-        }
-        best.steps += 1;
-        best.keep(&interior.r, interior.error);
-        if interior.error <= tolerance {
+    for careful in [false, true] {
+        best.newton = follow(&mut Interior::new(system, careful), system, tolerance, &mut best);
+        if best.newton == NewtonEnded::Reached {
             best.ended = Ended::Newton;
-            best.newton = NewtonEnded::Reached;
             return best;
         }
-        since += 1;
-        if interior.error < 0.9 * milestone {
-            (milestone, since) = (interior.error, 0);
+        // What is left are the last digits, which sweeps find.
+        if best.e_vel <= LAST_DIGITS * tolerance {
+            break;
         }
-        if since > PATIENCE || best.steps >= MOST_STEPS {
-            break NewtonEnded::Stalled;
-        }
-    };
+    }
 
     let mut sweeps = Sweeps::new(system, Method::Accelerated, best.impulses.clone());
     while best.e_vel > tolerance && best.sweeps + sweeps.count < most {
@@ -163,4 +156,27 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
     best.sweeps += sweeps.count;
     best.ended = if best.e_vel <= tolerance { Ended::LastSweeps } else { Ended::Limit };
     best
+}
+
+/// Steps of Newton's method until something ends them.
+fn follow(interior: &mut Interior, system: &mut impl System, tolerance: f64, best: &mut Outcome) -> NewtonEnded {
+    let (mut milestone, mut since) = (f64::INFINITY, 0);
+    for _ in 0..MOST_STEPS {
+        if interior.step(system, tolerance).is_none() {
+            return NewtonEnded::Blocked;
+        }
+        best.steps += 1;
+        best.keep(&interior.r, interior.error);
+        if interior.error <= tolerance {
+            return NewtonEnded::Reached;
+        }
+        since += 1;
+        if interior.error < 0.9 * milestone {
+            (milestone, since) = (interior.error, 0);
+        }
+        if since > PATIENCE {
+            break;
+        }
+    }
+    NewtonEnded::Stalled
 }
