@@ -209,6 +209,8 @@ pub struct NewtonReport {
     pub ms: f64,
     /// Errors of the impulses.
     pub residuals: Residuals,
+    /// The impulse of each contact: normal, first and second tangent (N s).
+    pub impulses: Vec<[f64; 3]>,
 }
 
 impl NewtonReport {
@@ -239,6 +241,7 @@ impl NewtonReport {
             newton,
             ms,
             residuals,
+            impulses: impulses.iter().map(DVec3::to_array).collect(),
         }
     }
 }
