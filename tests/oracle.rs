@@ -15,6 +15,7 @@ use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverSt
 use common::contacts::tower;
 use drystone::contacts::{ContactProblem, FreeBody, Operator, Velocity};
 use drystone::residuals::Residuals;
+use drystone::solver::newton::{Bodies, newton};
 use drystone::solver::{Solution, solution};
 use drystone::{Cpu, Scene, Simulation, SolverConfig};
 use glam::{DVec2, DVec3};
@@ -165,6 +166,21 @@ fn where_it_slips_it_is_the_convex_program_of_its_own_slip() {
         }
         let pushed = &problems(friction)[1];
         assert!(slip(pushed, &exact(pushed).velocities).iter().any(|&speed| speed > 1e-3), "nothing slips");
+    }
+}
+
+#[test]
+fn newtons_method_finds_what_the_convex_program_of_its_slip_finds() {
+    for friction in [0.0, 0.05, 0.2, 0.7] {
+        for problem in problems(friction) {
+            // No sweep before it or after it.
+            let found = newton(&mut Bodies::new(&problem), 1e-9, 0);
+            assert!(found.e_vel < 1e-7 && found.sweeps == 0, "{}, {friction}: {:e}", problem.name, found.e_vel);
+            let velocities = Operator::new(&problem).velocities(&found.impulses);
+            let difference = from_own_program(&problem, &velocities);
+            println!("{}, {friction}: {difference:.1e} apart after {} steps", problem.name, found.steps);
+            assert!(difference < SAME, "{}, {friction}: {difference:e}", problem.name);
+        }
     }
 }
 
