@@ -9,10 +9,12 @@ pub mod rounds;
 mod rules;
 mod run;
 mod solve;
+mod solvers;
 mod trajectory;
 
 pub use convergence::{convergence, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
 pub use solve::{CurveRow, NewtonReport, Reached, SolveReport, SolveSettings};
+pub use solvers::{Solvers, solvers};
 pub use trajectory::Trajectory;
