@@ -156,7 +156,7 @@ fn a_problem_without_bodies_is_the_same_problem() {
         let [r, s] = [Residuals::of(&problem, one.impulses()), Residuals::of_blocks(&local, one.impulses())];
         assert!((r.e_vel / s.e_vel - 1.0).abs() < 1e-9 && (r.vmax / s.vmax - 1.0).abs() < 1e-9, "{r:?}, {s:?}");
     }
-    for system in [&mut bodies as &mut dyn FnMutNewton, &mut blocks] {
+    for system in [&mut bodies as &mut dyn Solved, &mut blocks] {
         let outcome = system.solved();
         let e_vel = Residuals::of_blocks(&local, &outcome.impulses).e_vel;
         assert!(e_vel <= TOLERANCE && outcome.steps <= 30, "{} steps, {e_vel:e}", outcome.steps);
@@ -164,11 +164,11 @@ fn a_problem_without_bodies_is_the_same_problem() {
 }
 
 /// Newton's method alone on either form.
-trait FnMutNewton {
+trait Solved {
     fn solved(&mut self) -> Outcome;
 }
 
-impl<S: System> FnMutNewton for S {
+impl<S: System> Solved for S {
     fn solved(&mut self) -> Outcome {
         newton(self, TOLERANCE, 0)
     }
@@ -209,7 +209,7 @@ fn what_ended_a_solve_is_said() {
     let mut fast = problem.clone();
     fast.bodies[0].free.linear = DVec3::NEG_Z * 1e300;
     let outcome = newton(&mut Bodies::new(&fast), TOLERANCE, 100);
-    assert!(outcome.ended == Ended::Limit && !(outcome.e_vel <= TOLERANCE), "{outcome:?}");
+    assert!(outcome.ended == Ended::Limit && (outcome.e_vel.is_nan() || outcome.e_vel > TOLERANCE), "{outcome:?}");
 }
 
 #[test]

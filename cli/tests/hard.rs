@@ -32,7 +32,8 @@ fn what_passes_passes_and_what_fails_is_known_to() {
     let known = |case: &str, what: &str| FAILS.iter().any(|(c, w)| *c == case && what.starts_with(w));
     let surprises: Vec<_> = failed.iter().filter(|(case, check)| !known(case, &check.what)).collect();
     assert!(surprises.is_empty(), "{surprises:#?}");
-    let passes = |(case, what): &&(&str, &str)| !failed.iter().any(|(c, check)| c == case && check.what.starts_with(what));
+    let passes =
+        |(case, what): &&(&str, &str)| !failed.iter().any(|(c, check)| c == case && check.what.starts_with(what));
     let passing: Vec<_> = FAILS.iter().filter(passes).collect();
     assert!(passing.is_empty(), "pass now, take them off the list: {passing:?}");
 }

@@ -115,6 +115,9 @@ impl SolveArgs {
             return Err(Error::input(format!("--backend {}: --method newton runs in f64", self.backend)));
         }
         let r = NewtonReport::new(problem, self.tolerance.unwrap_or(TOLERANCE), MOST_SWEEPS);
+        if r.residuals.e_vel.is_nan() {
+            return Err(Error::input(format!("{}: impulses left the finite range", self.file.display())));
+        }
         if self.json {
             return print_json(&r);
         }
