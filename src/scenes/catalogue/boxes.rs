@@ -13,23 +13,17 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64, ratio: f32) -> Scene {
     heap("pile", n, jitter, seed, |i, _| bodies[i % 2].clone())
 }
 
-/// The same heap of boxes whose edges are 0.4 to 1 m long and whose densities are 200 to 5000 kg/m³, at random.
+/// The same heap of boxes whose edges are 0.2 to 1 m long and whose densities are 200 to 5000 kg/m³, at random.
 pub(super) fn pile_mixed(n: usize, jitter: f64, seed: u64) -> Scene {
     heap("pile-mixed", n, jitter, seed, |_, random| {
-        let [x, y, z, density] = [(0.2, 0.5), (0.2, 0.5), (0.2, 0.5), (200.0, 5000.0)]
+        let [x, y, z, density] = [(0.1, 0.5), (0.1, 0.5), (0.1, 0.5), (200.0, 5000.0)]
             .map(|(least, most)| (least + (most - least) * 0.5 * (1.0 + random.symmetric())) as f32);
         Body::dynamic().shape(Shape::cuboid(x, y, z)).density(density)
     })
 }
 
 /// `n` bodies of at most 1 m on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
-fn heap(
-    name: &str,
-    n: usize,
-    jitter: f64,
-    seed: u64,
-    mut body: impl FnMut(usize, &mut SplitMix64) -> Body,
-) -> Scene {
+fn heap(name: &str, n: usize, jitter: f64, seed: u64, mut body: impl FnMut(usize, &mut SplitMix64) -> Body) -> Scene {
     const PITCH: f64 = 1.2;
     const CLEARANCE: f64 = 0.7;
     const LOWEST: f64 = 0.65;
@@ -157,7 +151,14 @@ mod tests {
 
     #[test]
     fn no_two_bodies_overlap_at_the_start() {
-        for scene in [pile(1000, 0.03, 1, 1.0), pile(500, 0.04, 7, 1.0), pile_mixed(500, 0.04, 2), pyramid(6), many_pyramids(5, 3), wall(6, 4)] {
+        for scene in [
+            pile(1000, 0.03, 1, 1.0),
+            pile(500, 0.04, 7, 1.0),
+            pile_mixed(500, 0.04, 2),
+            pyramid(6),
+            many_pyramids(5, 3),
+            wall(6, 4),
+        ] {
             no_two_overlap(&scene);
         }
     }
@@ -214,7 +215,7 @@ mod tests {
             assert!(low < least + margin && high > most - margin, "{low} to {high}");
         };
         let half = |b: &Body| b.colliders[0].shape.as_cuboid().expect("a cuboid");
-        (0..3).for_each(|axis| spans(&|b: &Body| half(b)[axis], 0.2, 0.5));
+        (0..3).for_each(|axis| spans(&|b: &Body| half(b)[axis], 0.1, 0.5));
         spans(&|b: &Body| b.mass.mass / (8.0 * half(b).element_product()), 199.99, 5000.01);
     }
 
