@@ -4,7 +4,7 @@ use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::{Pass, StepPlan};
-use crate::problem::StepProblem;
+use crate::problem::{JointSystems, StepProblem};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::world::World;
@@ -181,7 +181,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 14] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -194,6 +194,9 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 14] {
         order,
         colors,
         first_joint_color,
+        direct_colors,
+        systems: JointSystems { active, begins, softness, nodes, blocks, terms },
+        turning,
         joints,
         joint_impulses,
         convergence,
@@ -210,6 +213,14 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 14] {
         ("order", bytemuck::cast_slice(order)),
         ("colors", bytemuck::cast_slice(colors)),
         ("first_joint_color", bytemuck::bytes_of(first_joint_color)),
+        ("direct_colors", bytemuck::bytes_of(direct_colors)),
+        ("systems.active", bytemuck::cast_slice(active)),
+        ("systems.begins", bytemuck::cast_slice(begins)),
+        ("systems.softness", bytemuck::cast_slice(softness)),
+        ("systems.nodes", bytemuck::cast_slice(nodes)),
+        ("systems.blocks", bytemuck::cast_slice(blocks)),
+        ("systems.terms", bytemuck::cast_slice(terms)),
+        ("turning", bytemuck::cast_slice(turning)),
         ("joints", bytemuck::cast_slice(joints)),
         ("joint_impulses", bytemuck::cast_slice(joint_impulses)),
         ("convergence", bytemuck::bytes_of(convergence)),

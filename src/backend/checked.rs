@@ -43,12 +43,16 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
     let (contacts, joints) = (problem.contact_colors(), problem.joint_colors());
     for (i, Pass { kernel, colors }) in passes.iter().enumerate() {
         let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));
+        let direct = problem.direct_joint_colors();
+        let active = 0..problem.systems.active.len() as u32;
         let (known, patch) = match kernel {
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 (&contacts, Some(rules.patch))
             }
             Kernel::ClearImpulses => (&contacts, None),
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (&joints, None),
+            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (&direct, None),
+            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => (&active, None),
             _ => (&(0..0), None),
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {

@@ -21,7 +21,8 @@ use crate::problem::StepProblem;
 pub struct Pass {
     /// The kernel.
     pub kernel: Kernel,
-    /// The colors that the kernel goes over; empty for a kernel over bodies. More than one are swept by one workgroup.
+    /// The colors that the kernel goes over; empty for a kernel over bodies. More than one are swept by one workgroup. For a kernel
+    /// over systems of joints, places in `JointSystems::active`.
     pub colors: Range<u32>,
 }
 
@@ -32,6 +33,9 @@ struct Sweeps<'a> {
     /// Whether others may follow the last.
     go_on: bool,
     joints: &'a [Range<u32>],
+    /// Joints that are solved at once: the systems that take part, and the groups of colors.
+    systems: Range<u32>,
+    direct: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
 }
 
@@ -47,6 +51,8 @@ pub struct StepPlan {
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     first_joint_color: u32,
+    direct_colors: u32,
+    active_systems: usize,
     has_inertias: bool,
     is_long_enough: bool,
 }
@@ -55,7 +61,10 @@ impl PlanKey {
     /// Whether it is that of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         let others = (problem.first_joint_color, !problem.inertias.is_empty(), is_long_enough(problem));
-        others == (self.first_joint_color, self.has_inertias, self.is_long_enough) && self.colors == problem.colors
+        let direct = (problem.direct_colors, problem.systems.active.len());
+        others == (self.first_joint_color, self.has_inertias, self.is_long_enough)
+            && direct == (self.direct_colors, self.active_systems)
+            && self.colors == problem.colors
     }
 
     /// That of the plan of a problem.
@@ -63,6 +72,8 @@ impl PlanKey {
         Self {
             colors: problem.colors.clone(),
             first_joint_color: problem.first_joint_color,
+            direct_colors: problem.direct_colors,
+            active_systems: problem.systems.active.len(),
             has_inertias: !problem.inertias.is_empty(),
             is_long_enough: is_long_enough(problem),
         }
@@ -84,7 +95,9 @@ impl StepPlan {
     /// sweeps; bounces at the end.
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
         let groups = |colors| color_groups(&problem.colors, colors, config.fuse_colors_below);
-        let (contacts, joints) = (groups(problem.contact_colors()), groups(problem.joint_colors()));
+        let (contacts, joints) = (groups(problem.contact_colors()), groups(problem.swept_joint_colors()));
+        let direct = groups(problem.direct_joint_colors());
+        let systems = 0..problem.systems.active.len() as u32;
         let friction = if problem.has_friction() { config.friction_rule() } else { FrictionRule::None };
         let shared = Rules {
             friction,
@@ -104,6 +117,8 @@ impl StepPlan {
             range: 0..count,
             go_on: false,
             joints: &joints,
+            systems: systems.clone(),
+            direct: &direct,
             contacts: &contacts,
         };
         // Friction needs some sweep to happen in.
@@ -114,7 +129,8 @@ impl StepPlan {
         let mut plan = Self::default();
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
-        let carried = shared.accumulated && joints.is_empty() && is_long_enough(problem);
+        let carried = shared.accumulated && problem.joint_colors().is_empty() && is_long_enough(problem);
+        plan.over_systems(Kernel::FactorJoints, &systems);
         for substep in 0..config.substeps {
             let carry = carried && substep > 0;
             plan.over_bodies(Kernel::IntegrateVelocities { carry });
@@ -122,6 +138,7 @@ impl StepPlan {
                 plan.over_bodies(Kernel::IntegrateGyroscopic);
             }
             plan.over_colors(Kernel::WarmStartJoints, &joints);
+            plan.over_colors(Kernel::WarmStartJoints, &direct);
             if carry {
                 // Done already.
             } else if shared.accumulated {
@@ -131,6 +148,10 @@ impl StepPlan {
             }
             plan.sweeps(sweeps(config.iterations), biased);
             plan.over_bodies(Kernel::IntegratePositions);
+            if !systems.is_empty() {
+                plan.over_bodies(Kernel::TurnInertias);
+            }
+            plan.over_systems(Kernel::FactorJoints, &systems);
             plan.sweeps(sweeps(config.relax), shared);
         }
         if problem.has_restitution() {
@@ -154,7 +175,8 @@ impl StepPlan {
         let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
         let joints = color_groups(&problem.colors, problem.joint_colors(), FUSE_BELOW);
         let mut plan = Self::default();
-        plan.sweeps(Sweeps { method, range, go_on: true, joints: &joints, contacts: &contacts }, rules);
+        let (go_on, systems, direct) = (true, 0..0, &[][..]);
+        plan.sweeps(Sweeps { method, range, go_on, joints: &joints, systems, direct, contacts: &contacts }, rules);
         plan
     }
 
@@ -179,6 +201,13 @@ impl StepPlan {
                 self.over_bodies(Kernel::Extrapolate { first, measured });
             }
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), sweeps.joints);
+            if let Some(first) = sweeps.direct.first() {
+                let rules = rules.of_joints();
+                let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
+                self.over_colors(Kernel::MeasureJoints(rules), &[all]);
+                self.over_systems(Kernel::SolveJointSystems(rules), &sweeps.systems);
+                self.over_colors(Kernel::ApplyJointChanges(rules), sweeps.direct);
+            }
             self.over_colors(Kernel::SolveContacts(rules), sweeps.contacts);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
                 self.over_bodies(Kernel::MeasureStep);
@@ -189,6 +218,12 @@ impl StepPlan {
 
     fn over_bodies(&mut self, kernel: Kernel) {
         self.passes.push(Pass { kernel, colors: 0..0 });
+    }
+
+    fn over_systems(&mut self, kernel: Kernel, systems: &Range<u32>) {
+        if !systems.is_empty() {
+            self.passes.push(Pass { kernel, colors: systems.clone() });
+        }
     }
 
     fn over_colors(&mut self, kernel: Kernel, groups: &[Range<u32>]) {

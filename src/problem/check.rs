@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use super::StepProblem;
+use super::{JointSystems, StepProblem};
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 
@@ -21,7 +21,8 @@ impl StepProblem {
         self.check_order()?;
         self.check_bodies()?;
         self.check_points()?;
-        self.check_colors()
+        self.check_colors()?;
+        self.check_systems()
     }
 
     fn check_counts(&self) -> Result<()> {
@@ -116,6 +117,79 @@ impl StepProblem {
                     None => return refuse(format_args!("order: {name} {row}, but there are {count}")),
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// The joints of the direct colors are those of the systems that take part, each once; blocks and products are those of their system,
+    /// and products come before the block that they are subtracted from.
+    fn check_systems(&self) -> Result<()> {
+        let JointSystems { active, begins, softness, nodes, blocks, terms } = &self.systems;
+        if self.direct_colors as usize > self.joint_colors().len() {
+            return refuse(format_args!(
+                "direct_colors = {}, but {} of joints",
+                self.direct_colors,
+                self.joint_colors().len()
+            ));
+        }
+        let ends = begins.first().zip(begins.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
+        let count = begins.len().saturating_sub(1);
+        if ends != [0, nodes.len()] || !begins.is_sorted_by(|a, b| a < b) || softness.len() != count {
+            return refuse(format_args!(
+                "systems: {count} with {} softnesses, over {} nodes",
+                softness.len(),
+                nodes.len()
+            ));
+        }
+        let mut end = 0;
+        for (node, row) in nodes.iter().enumerate() {
+            let own = blocks.get(row.first_block as usize..row.end_block as usize).unwrap_or_default();
+            if row.first_block as usize != end || own.first().is_none_or(|pivot| pivot.node as usize != node) {
+                return refuse(format_args!(
+                    "systems.nodes[{node}]: blocks from {} to {}",
+                    row.first_block, row.end_block
+                ));
+            }
+            end = row.end_block as usize;
+        }
+        for system in 0..count {
+            let own = self.systems.nodes_of(system);
+            let first = nodes[own.start].first_block;
+            for node in own.clone() {
+                for at in self.systems.blocks_of(node) {
+                    let row = &blocks[at];
+                    let products = terms.get(row.first_term as usize..row.end_term as usize);
+                    let is_own = |term: &u32| (first..at as u32).contains(term);
+                    let is_after = (node..own.end).contains(&(row.node as usize));
+                    if !is_after || !products.is_some_and(|products| products.iter().flatten().all(is_own)) {
+                        return refuse(format_args!(
+                            "systems.blocks[{at}]: node {}, or a product, is of none before",
+                            row.node
+                        ));
+                    }
+                }
+            }
+        }
+        let mut direct = self.rows_of(&self.direct_joint_colors()).to_vec();
+        direct.sort_unstable();
+        let mut solved = Vec::with_capacity(direct.len());
+        for &system in active {
+            if system as usize >= count {
+                return refuse(format_args!("systems.active: {system}, but there are {count}"));
+            }
+            solved.extend(nodes[self.systems.nodes_of(system as usize)].iter().map(|node| node.joint));
+        }
+        solved.sort_unstable();
+        if solved != direct {
+            return refuse("systems: their joints are not those of the direct colors");
+        }
+        let mut next = 0;
+        for (row, turning) in self.turning.iter().enumerate() {
+            let (body, bodies) = (turning.body as usize, self.bodies.len());
+            if body >= bodies || body < next {
+                return refuse(format_args!("turning[{row}]: body {body}: must be less than {bodies}, and ascending"));
+            }
+            next = body + 1;
         }
         Ok(())
     }

@@ -5,6 +5,8 @@ pub mod carry;
 mod check;
 mod contacts;
 pub mod effective;
+mod joint_loads;
+mod joint_systems;
 mod joints;
 mod rescale;
 mod rows;
@@ -14,11 +16,12 @@ mod write;
 
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
+pub use joint_systems::{BlockRow, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassColors, PointRow, Softness,
+    MomentumRow, Params, PassColors, PointRow, Softness, TurningRow,
 };
 
 use std::ops::Range;
@@ -51,6 +54,12 @@ pub struct StepProblem {
     pub colors: Vec<u32>,
     /// Which of `colors` is the first of the joints.
     pub first_joint_color: u32,
+    /// How many of `colors`, the last ones, are of joints that are solved at once and not swept.
+    pub direct_colors: u32,
+    /// Joints that are solved at once.
+    pub systems: JointSystems,
+    /// Bodies of joints that are solved at once, ascending.
+    pub turning: Vec<TurningRow>,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
@@ -66,6 +75,17 @@ impl StepProblem {
     /// Colors of the joints.
     pub fn joint_colors(&self) -> Range<u32> {
         self.first_joint_color..(self.colors.len() as u32).saturating_sub(1).max(self.first_joint_color)
+    }
+
+    /// Colors of the joints that are swept.
+    pub fn swept_joint_colors(&self) -> Range<u32> {
+        let Range { start, end } = self.joint_colors();
+        start..end.saturating_sub(self.direct_colors).max(start)
+    }
+
+    /// Colors of the joints that are solved at once.
+    pub fn direct_joint_colors(&self) -> Range<u32> {
+        self.swept_joint_colors().end..self.joint_colors().end
     }
 
     /// The contacts, or joints, of some neighboring colors, by their rows.

@@ -118,6 +118,7 @@ impl Stages {
             scale.rescale(&before, world, &mut self.problem);
         }
         if changes.settings || changes.surfaces {
+            self.joints.forget_systems();
             self.contacts.write_again();
             self.plan_key = None;
         }
@@ -156,6 +157,7 @@ impl Stages {
                     contacts.sort(detector, problem);
                 }
             }
+            joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
         });
         timed(&mut times.prepare, || {
@@ -176,6 +178,8 @@ impl Stages {
         stats.manifolds = contacts.coloring.order.len();
         stats.points = self.points;
         stats.joints = problem.rows_of(&problem.joint_colors()).len();
+        stats.direct_joints = problem.rows_of(&problem.direct_joint_colors()).len();
+        stats.swept_joint_gap = joints.swept_gap();
         stats.colors = contacts.coloring.color_count();
         stats.overflow = contacts.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();

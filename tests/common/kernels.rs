@@ -51,6 +51,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::MeasureStep,
         Kernel::UpdateMomentum,
         Kernel::WarmStartJoints,
+        Kernel::TurnInertias,
+        Kernel::FactorJoints,
     ];
     for (first, measured) in [(true, true), (true, false), (false, true), (false, false)] {
         all.push(Kernel::Extrapolate { first, measured });
@@ -58,6 +60,9 @@ pub fn every_kernel() -> Vec<Kernel> {
     for rules in every_rules() {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
+        all.push(Kernel::MeasureJoints(rules.of_joints()));
+        all.push(Kernel::SolveJointSystems(rules.of_joints()));
+        all.push(Kernel::ApplyJointChanges(rules.of_joints()));
         all.push(Kernel::SolveContacts(rules));
         all.push(Kernel::ApplyRestitution(Rules { patch: rules.patch, ..Rules::default() }));
     }
@@ -80,6 +85,8 @@ pub fn has_patches(kernel: Kernel) -> bool {
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     match kernel {
         Kernel::WarmStartJoints | Kernel::SolveJoints(_) => problem.joint_colors(),
+        Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.direct_joint_colors(),
+        Kernel::FactorJoints | Kernel::SolveJointSystems(_) => 0..problem.systems.active.len() as u32,
         Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
             problem.contact_colors()
         }

@@ -6,8 +6,11 @@ use crate::kernels::contact::{clear_impulse, restitute_contact, solve_contact, w
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::joint_system::{
+    JointChanges, JointFactors, apply_joint_change, factor_system, measure_joint, solve_system, turned_inertia,
+};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Contact, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Point, Rules, StepParams};
+use crate::kernels::{Contact, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Point, Rules, StepParams, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -18,6 +21,10 @@ pub struct Reference<S> {
     rows: KernelRows<S>,
     free: Vec<Free<S>>,
     convergence: ConvergenceRow,
+    /// Factors of the joints that are solved at once.
+    factors: JointFactors<S>,
+    /// Their corrections, joint by joint.
+    joint_changes: Vec<Vec3<S>>,
     /// State of accelerated sweeps: velocities of the sweep before, impulses of points and joints, and how far a sweep moved the
     /// impulses.
     velocities_before: Vec<[Vec3<S>; 2]>,
@@ -98,6 +105,31 @@ impl<S: Scalar> Reference<S> {
                 self.lengths.extend(points.chain(joints).map(|(now, step)| step_length(now, step)));
             }
             Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.lengths)),
+            Kernel::TurnInertias => {
+                for row in &problem.turning {
+                    let (x, yz) = (Vec3::load(row.inv_inertia_x), Vec3::load(row.inv_inertia_yz));
+                    let q = self.rows.bodies[row.body as usize].dq;
+                    self.rows.masses[row.body as usize].inv_inertia = turned_inertia(Sym3 { x, yz }, q);
+                }
+            }
+            Kernel::FactorJoints => self.over_systems(problem, pass),
+            Kernel::MeasureJoints(rules) => {
+                if !self.is_converged(rules) {
+                    self.over_changes(problem, pass, |params, pair, joint, change| {
+                        *change = measure_joint(rules, params, pair, joint);
+                    });
+                }
+            }
+            Kernel::SolveJointSystems(rules) => {
+                if !self.is_converged(rules) {
+                    self.over_systems(problem, pass);
+                }
+            }
+            Kernel::ApplyJointChanges(rules) => {
+                if !self.is_converged(rules) {
+                    self.over_changes(problem, pass, |_, pair, joint, change| apply_joint_change(pair, joint, *change));
+                }
+            }
             Kernel::WarmStartJoints => self.over_joints(problem, pass, |_, pair, joint, impulse| {
                 warm_start_joint(pair, joint, *impulse);
             }),
@@ -187,6 +219,41 @@ impl<S: Scalar> Reference<S> {
         }
     }
 
+    /// One system of joints after another.
+    fn over_systems(&mut self, problem: &StepProblem, pass: &Pass) {
+        let (systems, mut factors) = (&problem.systems, std::mem::take(&mut self.factors));
+        factors.reset(systems);
+        self.joint_changes.resize(problem.joints.len(), Vec3::default());
+        for system in systems.active[pass.colors.start as usize..pass.colors.end as usize].iter().map(|&i| i as usize) {
+            let own = factors.of(systems, system);
+            if pass.kernel == Kernel::FactorJoints {
+                let load = |joint: usize| {
+                    let row = &problem.joints[joint];
+                    (self.rows.joints[joint], self.load_pair([row.body_a as usize, row.body_b as usize]))
+                };
+                factor_system(systems, system, load, own);
+            } else {
+                let impulses = &mut self.rows.joint_impulses;
+                let mut changes = Changes { changes: &mut self.joint_changes, impulses };
+                solve_system(systems, system, &mut changes, own);
+            }
+        }
+        self.factors = factors;
+    }
+
+    /// One joint after another, with its correction.
+    fn over_changes(
+        &mut self,
+        problem: &StepProblem,
+        pass: &Pass,
+        kernel: impl Fn(&StepParams<S>, &mut Pair<S>, &Joint<S>, &mut Vec3<S>),
+    ) {
+        self.joint_changes.resize(problem.joints.len(), Vec3::default());
+        std::mem::swap(&mut self.joint_changes, &mut self.rows.joint_impulses);
+        self.over_joints(problem, pass, kernel);
+        std::mem::swap(&mut self.joint_changes, &mut self.rows.joint_impulses);
+    }
+
     fn load_pair(&self, [a, b]: [usize; 2]) -> Pair<S> {
         let (mass_a, mass_b) = (self.rows.masses[a], self.rows.masses[b]);
         Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
@@ -208,6 +275,27 @@ impl<S: Scalar> Reference<S> {
 
     fn is_converged(&self, rules: Rules) -> bool {
         rules.measured && self.convergence.done != 0
+    }
+}
+
+/// Corrections and impulses of joints.
+struct Changes<'a, S> {
+    changes: &'a mut [Vec3<S>],
+    impulses: &'a mut [Vec3<S>],
+}
+
+impl<S: Scalar> JointChanges<S> for Changes<'_, S> {
+    fn impulse(&self, joint: usize) -> Vec3<S> {
+        self.impulses[joint]
+    }
+
+    fn lacking(&self, joint: usize) -> Vec3<S> {
+        self.changes[joint]
+    }
+
+    fn change(&mut self, joint: usize, change: Vec3<S>) {
+        self.changes[joint] = change;
+        self.impulses[joint] += change;
     }
 }
 

@@ -12,6 +12,7 @@ use super::shared::Shared;
 use super::simd::{Lanes, WIDTH, Wide, Work, row_at};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::joint_system::{apply_joint_change, measure_joint};
 use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, Rules, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::plan::Kernel;
@@ -109,12 +110,13 @@ impl Swept for JointRow {
         // SAFETY: `Joint` is `repr(C)` and holds lanes only.
         let joint: &Joint<L> = unsafe { &as_lanes::<_, 9>(std::slice::from_ref(joint))[0] };
         let mut impulse = impulses[0].components();
-        if matches!(kernel, Kernel::WarmStartJoints) {
-            warm_start_joint(pair, joint, impulse);
-        } else {
-            solve_joint(rules, params, pair, joint, &mut impulse);
-            impulses[0].set_components(impulse);
+        match kernel {
+            Kernel::WarmStartJoints => return warm_start_joint(pair, joint, impulse),
+            Kernel::ApplyJointChanges(_) => return apply_joint_change(pair, joint, impulse),
+            Kernel::MeasureJoints(_) => impulse = measure_joint(rules, params, pair, joint),
+            _ => solve_joint(rules, params, pair, joint, &mut impulse),
         }
+        impulses[0].set_components(impulse);
     }
 }
 

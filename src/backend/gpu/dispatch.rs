@@ -55,6 +55,9 @@ fn threads(problem: &StepProblem, pass: &Pass) -> usize {
         // A workgroup a chunk.
         Kernel::MeasureStep => problem.impulse_count().div_ceil(CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
+        Kernel::TurnInertias => problem.turning.len(),
+        Kernel::FactorJoints | Kernel::SolveJointSystems(_) => pass.colors.len(),
+        Kernel::MeasureJoints(_) => problem.rows_of(&pass.colors).len(),
         _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     }

@@ -22,6 +22,9 @@ const FEWEST_PASSES: usize = 4;
 /// large for one workgroup, or where a kernel needs more than one.
 pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec<[u32; 4]>)> {
     let rows = |pass: &Pass| {
+        if matches!(pass.kernel, Kernel::FactorJoints | Kernel::SolveJointSystems(_)) {
+            return pass.colors.len();
+        }
         let colors = pass.colors.clone().map(|color| problem.rows_of(&(color..color + 1)).len());
         colors.max().unwrap_or(0)
     };
@@ -29,7 +32,8 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
         && problem.points.len() <= 4 * MOST_ROWS
         && (FEWEST_PASSES..=MOST_PASSES).contains(&passes.len())
         && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MOST_ROWS);
-    if !fits || needs_many_buffers(problem, passes) {
+    // Systems of joints have five buffers more.
+    if !fits || !problem.systems.active.is_empty() || needs_many_buffers(problem, passes) {
         return None;
     }
     let mut kernels: Vec<Kernel> = Vec::new();

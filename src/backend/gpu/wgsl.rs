@@ -74,6 +74,8 @@ enum Over {
     Count(&'static str),
     /// The rows of the colors of a pass.
     Colors,
+    /// The systems of joints of a pass.
+    Systems,
     /// The rows that the kernel finds itself.
     Own,
 }
@@ -106,6 +108,25 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
         Kernel::WarmStartJoints => {
             let parts = &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")];
             (parts, Over::Colors, "warm_start_joint(row)".into())
+        }
+        Kernel::TurnInertias => {
+            (&[part!("turn_inertias")], Over::Count("arrayLength(&turning)"), "turn_inertia(row)".into())
+        }
+        Kernel::FactorJoints => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("lib/joint_system"), part!("factor_joints")];
+            (parts, Over::Systems, "factor_joints(row)".into())
+        }
+        Kernel::MeasureJoints(rules) => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("measure_joints")];
+            (parts, Over::Colors, with("measure_joint", rules))
+        }
+        Kernel::SolveJointSystems(rules) => {
+            let parts = &[part!("lib/joint_system"), part!("solve_joint_systems")];
+            (parts, Over::Systems, with("solve_joint_system", rules))
+        }
+        Kernel::ApplyJointChanges(rules) => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("apply_joint_changes")];
+            (parts, Over::Colors, with("apply_joint_change", rules))
         }
         Kernel::SolveJoints(rules) => {
             (&[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")], Over::Colors, with("solve_joint", rules))
@@ -162,6 +183,9 @@ fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[Strin
         calls.push(match over {
             Over::Own => format!("{call};"),
             Over::Count(count) => over_count(count, &call),
+            Over::Systems => {
+                format!("for (var row = {colors}.first + first; row < {colors}.end; row += stride) {{ {call}; }}")
+            }
             Over::Colors => {
                 let name = format!("over_colors_{at}");
                 loops += &part!("lib/over_colors").replace("over_colors", &name).replace("over_row(row)", &call);
