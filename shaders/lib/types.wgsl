@@ -58,7 +58,7 @@ struct Params {
     fixed: Softness,
     joint: Softness,
     body_count: u32, point_count: u32, slop: f32, relaxation: f32,
-    tolerance: f32, joint_count: u32, patches: u32,
+    tolerance: f32, joint_count: u32, patches: u32, turning_count: u32,
 }
 
 // The colors that one dispatch sweeps, one after another. The buffer `colors` holds where each color begins, then where the last one

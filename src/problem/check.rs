@@ -34,6 +34,7 @@ impl StepProblem {
             ("params.body_count", params.body_count as usize, self.bodies.len(), "bodies"),
             ("params.point_count", params.point_count as usize, self.points.len(), "points"),
             ("params.joint_count", params.joint_count as usize, self.joints.len(), "joints"),
+            ("params.turning_count", params.turning_count as usize, self.turning.len(), "turning"),
             ("params.inertia_count", params.inertia_count as usize, self.inertias.len(), "inertias"),
         ] {
             if rows != wanted {

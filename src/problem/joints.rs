@@ -193,6 +193,7 @@ impl JointRows {
             problem.turning.push(TurningRow { inv_inertia_x, body: own[0].0, inv_inertia_yz, pad: 0.0 });
         }
         lent.clear();
+        problem.params.turning_count = problem.turning.len() as u32;
         self.lent = lent;
     }
 

@@ -294,8 +294,8 @@ pub struct Params {
     pub joint_count: u32,
     /// 1 if a patch follows the points of every contact.
     pub patches: u32,
-    #[doc(hidden)]
-    pub pad: u32,
+    /// Number of bodies whose inertia turns.
+    pub turning_count: u32,
 }
 
 /// Rows in `points` and `impulses` that a slot of a simulation has.

@@ -82,7 +82,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
         Params = Params {
             substep inverse_substep restitution_threshold inertia_count movable fixed joint
-            body_count point_count slop relaxation tolerance joint_count patches
+            body_count point_count slop relaxation tolerance joint_count patches turning_count
         }
         PassColors = PassColors { first end }
         Preload = Preload { movable_compliance fixed_compliance share warm_start }

@@ -110,7 +110,7 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (parts, Over::Colors, "warm_start_joint(row)".into())
         }
         Kernel::TurnInertias => {
-            (&[part!("turn_inertias")], Over::Count("arrayLength(&turning)"), "turn_inertia(row)".into())
+            (&[part!("turn_inertias")], Over::Count("params.turning_count"), "turn_inertia(row)".into())
         }
         Kernel::FactorJoints => {
             let parts = &[part!("lib/pair"), part!("lib/joint"), part!("lib/joint_system"), part!("factor_joints")];
