@@ -253,7 +253,8 @@ impl fmt::Display for StepPlan {
             write!(f, "{}", run[0].kernel)?;
             let colors: Vec<_> = run.iter().filter(|p| !p.colors.is_empty()).map(|p| group_name(&p.colors)).collect();
             if !colors.is_empty() {
-                write!(f, " over colors {}", colors.join(", "))?;
+                let is_over_systems = matches!(run[0].kernel, Kernel::FactorJoints | Kernel::SolveJointSystems(_));
+                write!(f, " over {} {}", if is_over_systems { "systems" } else { "colors" }, colors.join(", "))?;
             }
             writeln!(f)?;
         }
