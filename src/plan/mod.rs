@@ -129,7 +129,10 @@ impl StepPlan {
         let mut plan = Self::default();
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
-        let carried = shared.accumulated && problem.joint_colors().is_empty() && is_long_enough(problem);
+        let carried = {
+            let joints = problem.joint_colors();
+            shared.accumulated && joints.is_empty() && is_long_enough(problem)
+        };
         plan.over_systems(Kernel::FactorJoints, &systems);
         for substep in 0..config.substeps {
             let carry = carried && substep > 0;
@@ -200,7 +203,6 @@ impl StepPlan {
             if accelerated {
                 self.over_bodies(Kernel::Extrapolate { first, measured });
             }
-            self.over_colors(Kernel::SolveJoints(rules.of_joints()), sweeps.joints);
             if let Some(first) = sweeps.direct.first() {
                 let rules = rules.of_joints();
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
@@ -208,6 +210,7 @@ impl StepPlan {
                 self.over_systems(Kernel::SolveJointSystems(rules), &sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), sweeps.direct);
             }
+            self.over_colors(Kernel::SolveJoints(rules.of_joints()), sweeps.joints);
             self.over_colors(Kernel::SolveContacts(rules), sweeps.contacts);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
                 self.over_bodies(Kernel::MeasureStep);
