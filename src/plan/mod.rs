@@ -203,7 +203,6 @@ impl StepPlan {
             if accelerated {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
-            self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             if let [first, ..] = sweeps.direct {
                 let rules = rules.of_joints();
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
@@ -211,6 +210,7 @@ impl StepPlan {
                 self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
             }
+            self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
                 self.over_all(Kernel::MeasureStep, block);
