@@ -63,7 +63,8 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
     }
 }
 
-/// Where the rows of one kind of colors stand in the order: contacts, joints, bodies or rows of inertia.
+/// Where the rows of one kind of colors stand in the order: contacts, joints, bodies, rows of inertia, systems of joints or rows of turning
+/// inertia.
 fn places(problem: &StepProblem, kind: usize) -> std::ops::Range<usize> {
     let colors = &problem.blocks[0].colors()[kind];
     problem.colors[colors.start as usize] as usize..problem.colors[colors.end as usize] as usize
@@ -80,11 +81,15 @@ fn second_block(problem: &mut StepProblem) {
     let mut second = problem.blocks[0];
     second.contacts = [second.contacts[1]; 2];
     second.joints = [second.joints[1]; 2];
-    let bodies = problem.blocks[0].bodies as usize;
-    problem.colors.insert(bodies, problem.colors[bodies]);
-    problem.colors.insert(bodies + 2, problem.colors[bodies + 2]);
-    (second.bodies, second.inertias) = (second.bodies + 1, second.inertias + 2);
-    problem.blocks[0].inertias += 1;
+    second.direct = second.joints[1];
+    let bodies = second.bodies;
+    for kind in 0..4 {
+        let first = (bodies + 2 * kind) as usize;
+        problem.colors.insert(first, problem.colors[first]);
+    }
+    let first = &mut problem.blocks[0];
+    [first.bodies, first.inertias, first.systems, first.turning] = [0, 2, 4, 6].map(|kind| bodies + kind);
+    [second.bodies, second.inertias, second.systems, second.turning] = [1, 3, 5, 7].map(|kind| bodies + kind);
     problem.blocks.push(second);
 }
 

@@ -10,7 +10,8 @@ use crate::error::{Result, ensure};
 mod rules;
 
 pub use rules::{
-    Clamping, ComparisonRules, Friction, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization,
+    Clamping, ComparisonRules, Friction, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, JointSolver, Method,
+    Stabilization,
 };
 
 /// Settings of one step of the solver. The defaults hold every standing scene of the catalogue.
@@ -75,6 +76,10 @@ pub struct SolverConfig {
     pub friction_at: FrictionAt,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
+    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where sweeps would leave a gap of more
+    /// than 1e-3 of the arms at rest: where a joint bears many times the mass of its bodies. Measured with 8 substeps, a chain of 100
+    /// links with 1000 times the mass of a link at its end: gap 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
+    pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,
     /// Damping ratio of the joint spring.
@@ -146,6 +151,7 @@ impl Default for SolverConfig {
             friction: Friction::Disc,
             friction_at: FrictionAt::Points,
             friction_sweeps: FrictionSweeps::Relax,
+            joint_solver: JointSolver::Auto,
             joint_frequency: 0.25,
             joint_damping: 2.0,
             warm_start: true,
