@@ -268,8 +268,7 @@ const SWING_LIMIT: f64 = 3.0;
 fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
     let tension = r.dot(impulse);
-    // Also where a number is no number.
-    if !(tension > 0.0) {
+    if tension.is_nan() || tension <= 0.0 {
         return DMat3::ZERO;
     }
     let along = DMat3::from_cols(r * r.x, r * r.y, r * r.z) * r.length_squared().recip();

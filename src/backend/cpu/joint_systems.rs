@@ -8,7 +8,7 @@ use super::bodies::State;
 use super::lane_layout::LaneLayout;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::shared::Shared;
-use super::simd::{Lanes, Wide, Work};
+use super::simd::{Lanes, WIDTH, Wide, Work};
 use crate::kernels::joint_system::{
     Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
 };
@@ -137,7 +137,7 @@ impl Changes<'_, '_> {
     fn numbers<'c>(rows: &Shared<'c, [Wide; 4]>, place: ImpulsePlace, k: usize) -> &'c mut f32 {
         // SAFETY: this reaches one lane of the row, and no other task the same lane.
         let row = rows.as_ptr().wrapping_add(place.row as usize);
-        unsafe { &mut *(&raw mut (*row)[k].0[place.lane as usize]) }
+        unsafe { &mut *row.cast::<f32>().add(k * WIDTH + place.lane as usize) }
     }
 }
 

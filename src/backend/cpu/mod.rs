@@ -111,7 +111,8 @@ impl Cpu {
         self.turning.extend(problem.turning.iter().map(|row| {
             let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[row.body as usize]);
             let mut begin = Row8(std::array::from_fn(|i| mass[i]));
-            (begin.0[..3].copy_from_slice(&row.inv_inertia_x), begin.0[4..7].copy_from_slice(&row.inv_inertia_yz));
+            begin.0[..3].copy_from_slice(&row.inv_inertia_x);
+            begin.0[4..7].copy_from_slice(&row.inv_inertia_yz);
             (slots[row.body as usize], begin)
         }));
         self.turning.sort_unstable_by_key(|row| row.0);
