@@ -19,10 +19,10 @@ pub fn islands() -> Scene {
     scene.world.join(BallJoint::to_world(hung, 0.3 * Vec3::Y, Vec3::new(40.0, 5.3, 0.0)));
     add_chain(&mut scene, Vec3::new(50.0, 40.0, 0.0));
     // Of this one the heavy end presses on a box that lies on a box.
-    add_chain(&mut scene, Vec3::new(70.0, 1.3, 0.0));
+    add_chain(&mut scene, Vec3::new(70.0, 1.2, 0.0));
     for level in 0..2 {
-        let cube = Body::dynamic().shape(Shape::cuboid(0.25, 0.25, 0.25));
-        scene.world.add(cube.position(70.0 + LINKS as f32 * LINK, 0.25 + 0.5 * level as f32, 0.0));
+        let cube = Body::dynamic().shape(Shape::cuboid(0.25, 0.25, 0.25)).density(100.0);
+        scene.world.add(cube.position(70.0 + LINKS as f32 * LINK + ARM, 0.25 + 0.5 * level as f32, 0.0));
     }
     scene
 }
@@ -31,6 +31,9 @@ pub fn islands() -> Scene {
 const LINKS: usize = 30;
 /// Length of a link (m).
 const LINK: f32 = 0.3;
+
+/// From the last joint to the middle of the ball, which touches no link (m).
+const ARM: f32 = 0.25;
 
 /// A level chain from an anchor to a ball of 1000 times the mass of a link: its joints are solved at once.
 fn add_chain(scene: &mut Scene, anchor: Vec3) {
@@ -45,8 +48,8 @@ fn add_chain(scene: &mut Scene, anchor: Vec3) {
         });
         before = Some(body);
     }
-    let Vec3 { x, y, z } = anchor + LINKS as f32 * LINK * Vec3::X;
-    let ball = Body::dynamic().shape(Shape::ball(0.3)).total_mass(1000.0 * link.mass.mass).position(x, y, z);
+    let Vec3 { x, y, z } = anchor + (LINKS as f32 * LINK + ARM) * Vec3::X;
+    let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(1000.0 * link.mass.mass).position(x, y, z);
     let end = scene.world.add(ball);
-    scene.world.join(BallJoint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, Vec3::ZERO));
+    scene.world.join(BallJoint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, -ARM * Vec3::X));
 }
