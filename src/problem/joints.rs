@@ -31,12 +31,12 @@ pub struct JointRows {
     /// Gravity and the length of a substep that the systems were chosen for.
     chosen_for: Option<(Vec3, f32)>,
     swept_gap: f32,
+    /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
+    needs: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<(u32, DMat3)>,
 }
 
-/// Largest gap of a joint, as a share of its arms, that sweeps may leave at rest.
-const LARGEST_SWEPT_GAP: f32 = 1e-3;
 /// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
 const MOST_TERMS_A_JOINT: usize = 24;
@@ -70,6 +70,8 @@ impl JointRows {
         self.systems.clear();
         self.systems.resize(self.joints.len(), SWEPT);
         self.swept_gap = 0.0;
+        self.needs.clear();
+        self.needs.resize(self.joints.len(), 0.0);
         if config.joint_solver == JointSolver::Sweeps {
             return;
         }
@@ -87,13 +89,16 @@ impl JointRows {
             let gap = self.gap_of_sweeps(joints, world, config, substep);
             self.swept_gap = self.swept_gap.max(gap);
             let most_terms = match config.joint_solver {
-                JointSolver::Auto if gap <= LARGEST_SWEPT_GAP => continue,
+                JointSolver::Auto if gap <= config.max_joint_gap_share => continue,
                 JointSolver::Auto => MOST_TERMS_A_JOINT * joints.len(),
                 _ => usize::MAX,
             };
             let system = problem.systems.len() as u32;
             if problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
                 joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
+            } else {
+                let need = gap / config.max_joint_gap_share;
+                joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
             }
         }
     }
@@ -166,10 +171,15 @@ impl JointRows {
         }
     }
 
+    /// Whether any joint needs more than class 0 gives.
+    pub fn are_above(&self) -> bool {
+        self.needs.iter().any(|&need| need > 1.0)
+    }
+
     /// The joints that take part, for the effort of their islands.
     pub fn interfaces(&self, world: &World, asleep: &[bool]) -> impl Iterator<Item = Interface> + Clone {
         let awake = self.edges.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
-        awake.map(|(_, edge)| Interface { a: edge.a, b: edge.b, need: 0.0 })
+        awake.map(|(i, edge)| Interface { a: edge.a, b: edge.b, need: self.needs.get(i).copied().unwrap_or(0.0) })
     }
 
     /// Whether a joint is solved at once with others, and not swept.

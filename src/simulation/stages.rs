@@ -173,7 +173,7 @@ impl Stages {
             }
             let asleep = sleep.asleep();
             let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
-            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0);
+            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
             effort.follow(world, asleep, config, dt, is_above, interfaces)
         })
     }
