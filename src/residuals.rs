@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::contacts::{ContactProblem, Operator, Velocity};
+use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 
 /// The errors of impulses. All numbers are NaN if any of them is not finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +46,52 @@ impl Residuals {
         measure.of(impulses, &measure.operator.velocities(impulses))
     }
 
+    /// Of impulses of a problem without bodies, one a contact in its coordinates (N s). Nothing carries velocities, so nothing
+    /// drifts.
+    ///
+    /// # Panics
+    /// There is not one impulse a contact.
+    pub fn of_blocks(problem: &LocalProblem, impulses: &[DVec3]) -> Self {
+        assert_eq!(impulses.len(), problem.rows.len(), "one impulse a contact");
+        let contact = |i: usize| At {
+            mu: problem.friction[i],
+            rho: step(problem.block(i)),
+            r: impulses[i],
+            u: problem.free[i] + problem.response(i, impulses),
+        };
+        let free = problem.free.iter().map(|q| q.length_squared()).sum::<f64>().sqrt();
+        Self::of_contacts((0..impulses.len()).map(contact), free).spoiled()
+    }
+
+    fn of_contacts(contacts: impl Iterator<Item = At>, free_norm: f64) -> Self {
+        let (mut squares, mut squares_at_one) = (0.0, 0.0);
+        let (mut worst, mut approach, mut complement, mut cone, mut dissipation) =
+            (Largest::default(), Largest::default(), Largest::default(), Largest::default(), Largest::default());
+        for (i, At { mu, rho, r, u }) in contacts.enumerate() {
+            let (r_t, u_t) = (DVec2::new(r.y, r.z), DVec2::new(u.y, u.z));
+            let residual = natural_map(mu, r, u, rho).length() / rho;
+            squares += residual * residual;
+            squares_at_one += natural_map(mu, r, u, 1.0).length_squared();
+            worst.add(i, residual);
+            approach.add(i, -u.x);
+            complement.add(i, (u.x * r.x).abs());
+            cone.add(i, r_t.length() - mu * r.x);
+            cone.add(i, -r.x);
+            dissipation.add(i, (u_t.dot(r_t) + mu * r.x * u_t.length()).abs());
+        }
+        Self {
+            e_vel: ratio(squares.sqrt(), free_norm),
+            e_fclib: ratio(squares_at_one.sqrt(), free_norm),
+            vmax: worst.value,
+            worst_contact: worst.place,
+            pen_rate: approach.value,
+            compl: complement.value,
+            cone: cone.value,
+            diss: dissipation.value,
+            eom: 0.0,
+        }
+    }
+
     fn numbers_mut(&mut self) -> [&mut f64; 8] {
         let Self { e_vel, e_fclib, vmax, worst_contact: _, pen_rate, compl, cone, diss, eom } = self;
         [e_vel, e_fclib, vmax, pen_rate, compl, cone, diss, eom]
@@ -58,6 +104,19 @@ impl Residuals {
         }
         self
     }
+}
+
+/// What the errors of a contact depend on.
+struct At {
+    mu: f64,
+    rho: f64,
+    r: DVec3,
+    u: DVec3,
+}
+
+/// rho of a contact with the block W_ii: 3/trace(W_ii) (kg).
+fn step(block: DMat3) -> f64 {
+    3.0 / (block.x_axis.x + block.y_axis.y + block.z_axis.z)
 }
 
 /// A problem with what does not depend on the impulses.
@@ -73,8 +132,7 @@ impl<'a> Measure<'a> {
     /// Of a problem.
     pub fn new(problem: &'a ContactProblem) -> Self {
         let operator = Operator::new(problem);
-        let trace = |m: DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
-        let steps = (0..problem.contacts.len()).map(|i| 3.0 / trace(operator.block(i))).collect();
+        let steps = (0..problem.contacts.len()).map(|i| step(operator.block(i))).collect();
         let free: Vec<_> = problem.bodies.iter().map(|b| b.free).collect();
         let squares = (0..problem.contacts.len()).map(|i| operator.relative_velocity(i, &free).length_squared());
         let free_norm = squares.sum::<f64>().sqrt();
@@ -88,36 +146,14 @@ impl<'a> Measure<'a> {
     pub fn of(&self, impulses: &[DVec3], carried: &[Velocity]) -> Residuals {
         assert_eq!(carried.len(), self.operator.problem().bodies.len(), "one velocity a body");
         let velocities = self.operator.velocities(impulses);
-        let (mut squares, mut squares_at_one) = (0.0, 0.0);
-        let (mut worst, mut approach, mut complement, mut cone, mut dissipation) =
-            (Largest::default(), Largest::default(), Largest::default(), Largest::default(), Largest::default());
-        let contacts = self.operator.problem().contacts.iter();
-        for (i, ((contact, &r), &rho)) in contacts.zip(impulses).zip(&self.steps).enumerate() {
-            let mu = contact.friction;
-            let u = self.operator.relative_velocity(i, &velocities);
-            let (r_t, u_t) = (DVec2::new(r.y, r.z), DVec2::new(u.y, u.z));
-            let residual = natural_map(mu, r, u, rho).length() / rho;
-            squares += residual * residual;
-            squares_at_one += natural_map(mu, r, u, 1.0).length_squared();
-            worst.add(i, residual);
-            approach.add(i, -u.x);
-            complement.add(i, (u.x * r.x).abs());
-            cone.add(i, r_t.length() - mu * r.x);
-            cone.add(i, -r.x);
-            dissipation.add(i, (u_t.dot(r_t) + mu * r.x * u_t.length()).abs());
-        }
-        Residuals {
-            e_vel: ratio(squares.sqrt(), self.free_norm),
-            e_fclib: ratio(squares_at_one.sqrt(), self.free_norm),
-            vmax: worst.value,
-            worst_contact: worst.place,
-            pen_rate: approach.value,
-            compl: complement.value,
-            cone: cone.value,
-            diss: dissipation.value,
-            eom: self.drift(&velocities, carried),
-        }
-        .spoiled()
+        let contact = |i: usize| At {
+            mu: self.operator.problem().contacts[i].friction,
+            rho: self.steps[i],
+            r: impulses[i],
+            u: self.operator.relative_velocity(i, &velocities),
+        };
+        let residuals = Residuals::of_contacts((0..impulses.len()).map(contact), self.free_norm);
+        Residuals { eom: self.drift(&velocities, carried), ..residuals }.spoiled()
     }
 
     fn drift(&self, velocities: &[Velocity], carried: &[Velocity]) -> f64 {
@@ -132,7 +168,7 @@ impl<'a> Measure<'a> {
 }
 
 /// r - P_K(r - rho (u + mu |u_t| n)).
-fn natural_map(mu: f64, r: DVec3, u: DVec3, rho: f64) -> DVec3 {
+pub(crate) fn natural_map(mu: f64, r: DVec3, u: DVec3, rho: f64) -> DVec3 {
     let slip = DVec2::new(u.y, u.z).length();
     r - projected_on_cone(mu, r - (u + DVec3::X * (mu * slip)) * rho)
 }

@@ -15,6 +15,7 @@ use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverSt
 use common::contacts::tower;
 use drystone::contacts::{ContactProblem, FreeBody, Operator, Velocity};
 use drystone::residuals::Residuals;
+use drystone::solver::newton::{Bodies, NewtonEnded, newton};
 use drystone::solver::{Solution, solution};
 use drystone::{Cpu, Scene, Simulation, SolverConfig};
 use glam::{DVec2, DVec3};
@@ -166,6 +167,28 @@ fn where_it_slips_it_is_the_convex_program_of_its_own_slip() {
         let pushed = &problems(friction)[1];
         assert!(slip(pushed, &exact(pushed).velocities).iter().any(|&speed| speed > 1e-3), "nothing slips");
     }
+}
+
+#[test]
+fn newtons_method_finds_what_the_convex_program_of_its_slip_finds() {
+    let mut reached = 0;
+    for friction in [0.0, 0.05, 0.2, 0.7] {
+        for problem in problems(friction) {
+            // Newton's method alone, and with sweeps before and after it.
+            for (tolerance, sweeps) in [(1e-9, 0), (1e-11, 20_000)] {
+                let found = newton(&mut Bodies::new(&problem), tolerance, sweeps);
+                if sweeps == 0 && found.newton != NewtonEnded::Reached {
+                    continue;
+                }
+                reached += u32::from(found.newton == NewtonEnded::Reached);
+                let velocities = Operator::new(&problem).velocities(&found.impulses);
+                let difference = from_own_program(&problem, &velocities);
+                println!("{}, {friction}: {difference:.1e} apart after {} steps", problem.name, found.steps);
+                assert!(difference < SAME && found.e_vel <= tolerance, "{}, {friction}: {difference:e}", problem.name);
+            }
+        }
+    }
+    assert!(reached >= 9, "Newton's method came to the end {reached} times");
 }
 
 #[test]

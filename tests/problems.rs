@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use common::contacts::{curve, sweeps_to};
 use common::gpu;
 use drystone::config::Method;
+use drystone::contacts::Operator;
 use drystone::residuals::Measure;
+use drystone::solver::newton::{Bodies, newton};
 use drystone::solver::{Order, Solver};
 use drystone::stats::median;
 use drystone::{Backend, ContactProblem, Cpu};
@@ -28,6 +30,7 @@ tests! {
         manifold_by_manifold_sweeps_are_no_more,
         single_precision_leaves_the_errors_of_double_precision,
         acceleration_pays,
+        newtons_method_solves_each_to_the_end,
     }
     given_problems_and_any_gpu {
         contact_by_contact_sweeps_of_the_gpu_are_those_of_the_anchors,
@@ -174,4 +177,14 @@ fn acceleration_pays() {
     measured!("median {:.2} times fewer to 1e-3, {:.1} times lower after 32", median(&fewer), median(&lower));
     assert!(median(&fewer) >= 2.4, "{fewer:?}");
     assert!(median(&lower) >= 5.0, "{lower:?}");
+}
+
+fn newtons_method_solves_each_to_the_end() {
+    for (name, problem) in problems(&folder()) {
+        let outcome = newton(&mut Bodies::new(&problem), 1e-8, MOST);
+        let error =
+            Measure::new(&problem).of(&outcome.impulses, &Operator::new(&problem).velocities(&outcome.impulses)).e_vel;
+        measured!("{name:<18} {} steps, {} sweeps, {:?}: {error:.1e}", outcome.steps, outcome.sweeps, outcome.ended);
+        assert!(error <= 1.01e-8 && outcome.steps <= 40 && outcome.sweeps <= 500, "{name}: {error:e}");
+    }
 }

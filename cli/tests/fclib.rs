@@ -83,3 +83,56 @@ fn bad_input_ends_in_one_line_that_names_the_file_and_nothing_is_written() {
     }
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), before);
 }
+
+/// A file of a local problem: a ball of 2 kg that falls onto the ground, and slides.
+fn local(group: &str) -> Vec<u8> {
+    let mut file = hdf5_pure::FileBuilder::new();
+    let mut local = file.create_group(group);
+    local.create_dataset("spacedim").with_i32_data(&[3]);
+    let mut w = local.create_group("W");
+    for (name, number) in [("m", 3), ("n", 3), ("nz", 3), ("nzmax", 3)] {
+        w.create_dataset(name).with_i32_data(&[number]);
+    }
+    w.create_dataset("p").with_i32_data(&[0, 1, 2]);
+    w.create_dataset("i").with_i32_data(&[0, 1, 2]);
+    w.create_dataset("x").with_f64_data(&[0.5; 3]);
+    local.add_group(w.finish());
+    let mut vectors = local.create_group("vectors");
+    vectors.create_dataset("q").with_f64_data(&[-1.0, 3.0, 0.0]);
+    vectors.create_dataset("mu").with_f64_data(&[0.25]);
+    local.add_group(vectors.finish());
+    file.add_group(local.finish());
+    file.finish().expect("a file")
+}
+
+#[test]
+fn a_problem_without_bodies_is_solved_in_double_precision_and_refused_on_lanes_and_gpu() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("ball.hdf5"), local("fclib_local")).expect("written");
+    std::fs::write(folder.path().join("rolling.hdf5"), local("fclib_local_rolling")).expect("written");
+    let output = run(folder.path(), "solve ball.hdf5 --method newton --json");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    // It bears 1/0.5 N s, and friction takes a quarter of that from the slip.
+    let impulse = report["impulses"][0].as_array().expect("an impulse");
+    for (number, expected) in impulse.iter().zip([2.0, -0.5, 0.0]) {
+        assert!((number.as_f64().expect("a number") - expected).abs() < 1e-6, "{report}");
+    }
+    for method in ["plain", "accelerated"] {
+        let output = run(folder.path(), &format!("solve ball.hdf5 --method {method} --tolerance 1e-6 --json"));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+        assert_eq!((&report["bodies"], &report["contacts"], &report["colors"]), (&0.into(), &1.into(), &1.into()));
+        assert!(report["curve"][0]["e_vel"].as_f64() < Some(1e-6), "{report}");
+    }
+    for (arguments, named) in [
+        ("solve ball.hdf5 --backend cpu", &["ball.hdf5: fclib_local: has no bodies", "f64", "cpu does not"][..]),
+        ("solve ball.hdf5 --backend gpu", &["has no bodies", "gpu does not"]),
+        ("solve ball.hdf5 --order manifolds", &["has no bodies", "by contacts"]),
+        ("solve rolling.hdf5", &["rolling.hdf5: fclib_local_rolling: rolling friction cannot be read"]),
+        ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, and bodies are needed"]),
+    ] {
+        let output = run(folder.path(), arguments);
+        let line = text(&output.stderr);
+        assert_eq!((output.status.code(), line.lines().count()), (Some(2), 1), "{arguments}: {line}");
+        assert!(named.iter().all(|part| line.contains(part)), "{arguments}: {line}");
+    }
+}

@@ -68,6 +68,27 @@ fn a_tolerance_ends_the_sweeps() {
 }
 
 #[test]
+fn newtons_method_says_what_ended_it() {
+    let report = json("tower.contacts --method newton");
+    assert_eq!((&report["method"], &report["backend"]), (&"newton".into(), &"f64".into()));
+    assert_eq!((&report["ended"], &report["newton"]), (&"newton".into(), &"reached".into()), "{report}");
+    assert!(report["residuals"]["e_vel"].as_f64() <= Some(1e-8), "{report}");
+    assert!((5..=20).contains(&report["iterations"].as_u64().expect("a number")), "{report}");
+    assert_eq!(report["impulses"].as_array().expect("impulses").len(), 40);
+    // What sweeps do in a moment needs no step.
+    let rough = json("tower.contacts --method newton --tolerance 0.5");
+    assert_eq!(
+        (&rough["ended"], &rough["newton"], &rough["iterations"]),
+        (&"first-sweeps".into(), &"not-begun".into(), &0.into())
+    );
+    let output = run("tower.contacts --method newton");
+    let printed = text(&output.stdout);
+    for part in ["10 bodies, 40 contacts", "newton: ", "steps", "ended by Newton's method"] {
+        assert!(printed.contains(part), "{part} is not in: {printed}");
+    }
+}
+
+#[test]
 fn a_solve_reports_on_itself_as_rows() {
     let output = run("tower.contacts --sweeps 64 --order contacts");
     let printed = text(&output.stdout);
@@ -122,6 +143,11 @@ fn bad_input_ends_in_one_line_that_names_it() {
         ("tower.contacts --tolerance 0", &["--tolerance 0", "more than 0"]),
         ("tower.contacts --tolerance nan", &["--tolerance NaN"]),
         ("fast.contacts", &["fast.contacts", "finite"]),
+        ("fast.contacts --method newton", &["fast.contacts", "finite"]),
+        ("tower.contacts --method newton --sweeps 5", &["--sweeps", "newton has none"]),
+        ("tower.contacts --method newton --order contacts", &["--order", "newton has none"]),
+        ("tower.contacts --method newton --passes 2", &["--passes", "newton has none"]),
+        ("tower.contacts --method newton --backend cpu", &["--backend cpu", "newton runs in f64"]),
     ] {
         let output = run(arguments);
         let line = text(&output.stderr);

@@ -6,11 +6,32 @@ use std::str::{FromStr, Lines, SplitWhitespace};
 
 use glam::{DMat3, DVec3};
 
-use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
+use super::{ContactProblem, FreeBody, PointContact, Problem, Velocity, is_positive_definite};
 use crate::error::{Error, Result, ensure, input};
 
 /// The first bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// A file of text or HDF5.
+fn read<T>(path: &Path, fclib: fn(Vec<u8>) -> Result<T>, text: fn(&str) -> Result<T>) -> Result<T> {
+    let bytes = std::fs::read(path).map_err(Error::file(path))?;
+    let problem = if bytes.starts_with(HDF5_SIGNATURE) {
+        fclib(bytes)
+    } else {
+        String::from_utf8(bytes).map_err(|_| Error::input("neither text nor HDF5")).and_then(|bytes| text(&bytes))
+    };
+    problem.map_err(|e| e.within(path.display()))
+}
+
+impl Problem {
+    /// From a file: text, or FCLIB's HDF5 in global or local form.
+    ///
+    /// # Errors
+    /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        read(path.as_ref(), Self::from_fclib, |text| ContactProblem::parse(text).map(Self::Bodies))
+    }
+}
 
 impl ContactProblem {
     /// From a file: text, or FCLIB's HDF5.
@@ -18,15 +39,7 @@ impl ContactProblem {
     /// # Errors
     /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(Error::file(path))?;
-        let problem = if bytes.starts_with(HDF5_SIGNATURE) {
-            Self::from_fclib(bytes)
-        } else {
-            let text = String::from_utf8(bytes).map_err(|_| Error::input("neither text nor HDF5"));
-            text.and_then(|text| Self::parse(&text))
-        };
-        problem.map_err(|e| e.within(path.display()))
+        read(path.as_ref(), Self::from_fclib, Self::parse)
     }
 
     /// From text.

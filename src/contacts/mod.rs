@@ -9,13 +9,16 @@
 //! ```
 //!
 //! The rows are those of docs/derivation.md, sections 2 and 6. As text: docs/contacts-format.md; as HDF5: FCLIB's global form.
+//! FCLIB's local form has u = W r + q in place of the first line: [`LocalProblem`].
 
 #[cfg(feature = "fclib")]
 mod fclib;
 mod format;
+mod local;
 mod operator;
 mod step;
 
+pub use local::LocalProblem;
 pub use operator::Operator;
 
 use glam::{DMat3, DVec3};
@@ -83,10 +86,29 @@ impl PointContact {
     }
 }
 
+/// A contact problem in either form.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Problem {
+    /// With its bodies.
+    Bodies(ContactProblem),
+    /// Without them: W in blocks of contacts.
+    Blocks(LocalProblem),
+}
+
+#[cfg(not(feature = "fclib"))]
+const NO_HDF5: &str = "an HDF5 file: drystone was built without the feature fclib, which reads it";
+
 #[cfg(not(feature = "fclib"))]
 impl ContactProblem {
     fn from_fclib(_: Vec<u8>) -> crate::error::Result<Self> {
-        Err(crate::error::Error::input("an HDF5 file: drystone was built without the feature fclib, which reads it"))
+        Err(crate::error::Error::input(NO_HDF5))
+    }
+}
+
+#[cfg(not(feature = "fclib"))]
+impl Problem {
+    fn from_fclib(_: Vec<u8>) -> crate::error::Result<Self> {
+        Err(crate::error::Error::input(NO_HDF5))
     }
 }
 

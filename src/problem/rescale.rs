@@ -1,7 +1,7 @@
 //! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
 
 use super::StepProblem;
-use super::rows::{ContactRow, ImpulseRow};
+use super::rows::{ContactRow, ImpulseRow, PointRow};
 use super::softness::contact_softness;
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
@@ -30,11 +30,16 @@ impl StepScale {
     }
 }
 
-/// Brings an impulse or a preload from substeps of one share of those of class 0 to another. A preload is in proportion to the square.
-pub(super) fn change_share(contact: &mut ContactRow, share: f32, impulses: &mut [ImpulseRow]) {
+/// Brings a contact from substeps of one share of those of class 0 to another, so that it bears the same force. Its springs get stiffer by
+/// the square of the ratio, and are then compressed by as much less; the preload takes up what the bodies already sank in. Without that a
+/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled.
+pub(super) fn change_share(contact: &mut ContactRow, share: f32, points: &[PointRow], impulses: &mut [ImpulseRow]) {
     let ratio = ratio(share, contact.substep_share);
     contact.substep_share = share;
-    contact.preload *= ratio * ratio;
+    let points = &points[..contact.point_count as usize];
+    let separation = points.iter().map(|point| point.separation).sum::<f32>() / points.len() as f32;
+    let compression = (contact.preload - separation).max(0.0);
+    contact.preload += (ratio * ratio - 1.0) * compression;
     impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
 }
 

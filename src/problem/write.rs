@@ -99,7 +99,7 @@ impl Writer<'_> {
         if slot.takes_part {
             let share = self.share(contact);
             if share != contact.substep_share {
-                change_share(contact, share, impulses);
+                change_share(contact, share, points, impulses);
             }
         }
         // Where the rows are on a device, the kernel begin_contacts does this.

@@ -2,7 +2,7 @@
 
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
-use crate::effort::{self, Effort};
+use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
@@ -167,14 +167,14 @@ impl Stages {
             }
             joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
-            contacts.follow_loads(config, problem);
+            stats.hardest = contacts.follow_loads(config, effort.is_one_class(), problem);
             if are_sorted_anew {
                 contacts.sort(detector, problem);
             }
             let asleep = sleep.asleep();
             let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
-            stats.hardest = effort::hardest(contacts.interfaces(world, detector));
-            effort.follow(world, asleep, config, dt, interfaces)
+            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0);
+            effort.follow(world, asleep, config, dt, is_above, interfaces)
         })
     }
 

@@ -10,6 +10,7 @@
 //! 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5, tower10 5e-4 and 1e-4.
 
 mod assemble;
+pub mod newton;
 mod oracle;
 mod order;
 

@@ -8,7 +8,7 @@ use super::output::print;
 use super::progress::{PERCENT, Progress};
 use crate::files;
 use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
-use crate::report::{RUNS, convergence, problems, rules};
+use crate::report::{RUNS, Solvers, convergence, problems, rules, solvers};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
 
@@ -37,6 +37,9 @@ enum Page {
         /// Directory of contact problems, in addition to those of catalogue scenes.
         #[arg(long, value_name = "DIR")]
         problems: Option<PathBuf>,
+        /// Table of benches/against_siconos.py, for the section on other solvers and its profiles.
+        #[arg(long, value_name = "TABLE")]
+        siconos: Option<PathBuf>,
     },
 }
 
@@ -76,14 +79,24 @@ impl ReportArgs {
                 report.write(out)?;
                 print(out.join("rules.md").display())
             }
-            Some(Page::Convergence { out, problems }) => {
+            Some(Page::Convergence { out, problems, siconos }) => {
+                // A wrong table is refused before anything runs.
+                let others = siconos.as_deref().map(solvers).transpose()?;
                 let (bar, mut done) = (Progress::steps(0, false), 0);
-                let page = convergence(problems.as_deref(), |problems| {
+                let mut page = convergence(problems.as_deref(), |problems| {
                     done += 1;
                     bar.set(done, problems as u64);
                 })?;
                 bar.finish();
                 std::fs::create_dir_all(out).map_err(Error::file(out))?;
+                if let Some(Solvers { section, pictures }) = others {
+                    page.push_str(&section);
+                    let folder = out.join("convergence");
+                    std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
+                    for (name, text) in pictures {
+                        files::write(&folder.join(name), text.as_bytes())?;
+                    }
+                }
                 let path = out.join("convergence.md");
                 files::write(&path, page.as_bytes())?;
                 print(path.display())

@@ -5,32 +5,40 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::output::{print, print_json};
-use super::words;
-use crate::report::{CurveRow, SolveReport, SolveSettings};
+use super::words::{self, SolveMethod};
+use crate::report::{CurveRow, NewtonReport, SolveReport, SolveSettings};
 use drystone::backend::BackendKind;
 use drystone::config::Method;
+use drystone::contacts::Problem;
 use drystone::solver::Order;
-use drystone::{ContactProblem, Error, Result};
+use drystone::solver::newton::{Ended, NewtonEnded};
+use drystone::{Error, Result};
 
 /// Largest number of sweeps with a tolerance.
 const MOST_SWEEPS: u32 = 40_000;
+
+/// Default number of sweeps.
+const SWEEPS: u32 = 512;
+
+/// Default error at which Newton's method ends.
+const TOLERANCE: f64 = 1e-8;
 
 #[derive(Args)]
 pub struct SolveArgs {
     /// A contact problem of `run --save-problem` (docs/contacts-format.md), or FCLIB's.
     file: PathBuf,
-    /// Number of sweeps.
-    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    sweeps: u32,
-    /// Sweep until the error e_vel is less than this, at most 40000 times.
+    /// Number of sweeps; the default is 512.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    sweeps: Option<u32>,
+    /// Solve until the error e_vel is less than this, with at most 40000 sweeps. The default of Newton's method is 1e-8.
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true, conflicts_with = "sweeps")]
     tolerance: Option<f64>,
-    /// Method of the sweeps.
-    #[arg(long, value_parser = words::of::<Method>(), default_value = "accelerated")]
-    method: Method,
-    /// Order of the sweeps.
-    #[arg(long, value_parser = words::of::<Order>(), default_value_t)]
-    order: Order,
+    /// Method.
+    #[arg(long, value_parser = words::of::<SolveMethod>(), default_value = "accelerated")]
+    method: SolveMethod,
+    /// Order of the sweeps; the default is manifolds, or contacts where a problem has no bodies.
+    #[arg(long, value_parser = words::of::<Order>())]
+    order: Option<Order>,
     /// Passes over a manifold before the next one; the default is 2 by manifolds and 1 by contacts.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
@@ -50,16 +58,27 @@ impl SolveArgs {
         if let Some(tolerance) = self.tolerance.filter(|t| !(t.is_finite() && *t > 0.0)) {
             return Err(Error::input(format!("--tolerance {tolerance}: must be more than 0")));
         }
-        let problem = ContactProblem::read(&self.file)?;
-        let settings = SolveSettings {
-            method: self.method,
-            order: self.order,
-            passes: self.passes.unwrap_or(self.order.passes()),
-            sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps },
-            tolerance: self.tolerance.unwrap_or(0.0),
+        let problem = Problem::read(&self.file)?;
+        let report = match (self.method, &problem) {
+            (SolveMethod::Newton, problem) => return self.newton(problem),
+            (SolveMethod::Sweeps(method), Problem::Bodies(problem)) => {
+                let settings = self.settings(method, self.order.unwrap_or_default());
+                let backend = (self.backend != BackendKind::F64).then(|| self.backend.open(self.exact)).transpose()?;
+                SolveReport::new(problem, &settings, backend)
+            }
+            (SolveMethod::Sweeps(method), Problem::Blocks(problem)) => {
+                let bodies = || format!("{}: fclib_local: has no bodies", self.file.display());
+                if self.backend != BackendKind::F64 {
+                    let name = self.backend;
+                    return Err(Error::input(format!("{}: --backend f64 sweeps it, and {name} does not", bodies())));
+                }
+                if self.order == Some(Order::Manifolds) || self.passes.is_some_and(|passes| passes > 1) {
+                    return Err(Error::input(format!("{}: it is swept by contacts, once each", bodies())));
+                }
+                SolveReport::of_blocks(problem, &self.settings(method, Order::Contacts))
+            }
         };
-        let backend = (self.backend != BackendKind::F64).then(|| self.backend.open(self.exact)).transpose()?;
-        let report = SolveReport::new(&problem, &settings, backend).map_err(|e| e.within(self.file.display()))?;
+        let report = report.map_err(|e| e.within(self.file.display()))?;
         if self.json {
             print_json(&report)?;
         } else {
@@ -71,6 +90,60 @@ impl SolveArgs {
         }
         Ok(())
     }
+
+    fn settings(&self, method: Method, order: Order) -> SolveSettings {
+        SolveSettings {
+            method,
+            order,
+            passes: self.passes.unwrap_or(order.passes()),
+            sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps.unwrap_or(SWEEPS) },
+            tolerance: self.tolerance.unwrap_or(0.0),
+        }
+    }
+
+    fn newton(&self, problem: &Problem) -> Result<()> {
+        let given = [
+            ("--sweeps", self.sweeps.is_some()),
+            ("--order", self.order.is_some()),
+            ("--passes", self.passes.is_some()),
+            ("--exact", self.exact),
+        ];
+        if let Some((name, _)) = given.into_iter().find(|given| given.1) {
+            return Err(Error::input(format!("{name}: --method newton has none")));
+        }
+        if self.backend != BackendKind::F64 {
+            return Err(Error::input(format!("--backend {}: --method newton runs in f64", self.backend)));
+        }
+        let r = NewtonReport::new(problem, self.tolerance.unwrap_or(TOLERANCE), MOST_SWEEPS);
+        if r.residuals.e_vel.is_nan() {
+            return Err(Error::input(format!("{}: impulses left the finite range", self.file.display())));
+        }
+        if self.json {
+            return print_json(&r);
+        }
+        print(format_args!("{}: {} bodies, {} contacts", r.problem, r.bodies, r.contacts))?;
+        print(format_args!("newton: {} steps and {} sweeps in {:.3} ms on f64", r.iterations, r.sweeps, r.ms))?;
+        let x = &r.residuals;
+        print(format_args!("e_vel {:.2e}, vmax {:.2e} m/s, ended by {}", x.e_vel, x.vmax, ended(&r)))
+    }
+}
+
+/// What ended a solve, in words.
+fn ended(r: &NewtonReport) -> String {
+    let newton = match r.newton {
+        NewtonEnded::NotBegun => "Newton's method was not needed",
+        NewtonEnded::Reached => "Newton's method reached it",
+        NewtonEnded::Stalled => "the error of Newton's method no longer fell",
+        NewtonEnded::Blocked => "Newton's method found no further step",
+        _ => "Newton's method ended",
+    };
+    let by = match r.ended {
+        Ended::FirstSweeps => "sweeps",
+        Ended::Newton => "Newton's method",
+        Ended::LastSweeps => "sweeps after Newton's method",
+        _ => "the limit of sweeps",
+    };
+    format!("{by} ({newton})")
 }
 
 fn print_table(r: &SolveReport) -> Result<()> {

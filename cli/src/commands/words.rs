@@ -48,6 +48,29 @@ impl Named for Order {
     ];
 }
 
+/// The solver of `drystone solve`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SolveMethod {
+    Sweeps(Method),
+    Newton,
+}
+
+impl FromStr for SolveMethod {
+    type Err = drystone::Error;
+
+    fn from_str(name: &str) -> drystone::Result<Self> {
+        if name == "newton" { Ok(Self::Newton) } else { name.parse().map(Self::Sweeps) }
+    }
+}
+
+impl Named for SolveMethod {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        Method::WORDS[0],
+        Method::WORDS[1],
+        ("newton", "Newton's method on the central path, after sweeps while they pay; in double precision"),
+    ];
+}
+
 impl Named for BackendChoice {
     const WORDS: &'static [(&'static str, &'static str)] = &[
         ("auto", "A hardware GPU for scenes in which it is faster, by a measurement on a small pile; else the CPU"),

@@ -10,10 +10,12 @@ mod rules;
 mod run;
 mod scene_hash;
 mod solve;
+mod solvers;
 mod trajectory;
 
 pub use convergence::{convergence, problem_of_step, problems};
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
-pub use solve::{CurveRow, Reached, SolveReport, SolveSettings};
+pub use solve::{CurveRow, NewtonReport, Reached, SolveReport, SolveSettings};
+pub use solvers::{Solvers, solvers};
 pub use trajectory::Trajectory;

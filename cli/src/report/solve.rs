@@ -5,9 +5,12 @@ use std::time::Duration;
 use serde::Serialize;
 
 use drystone::config::Method;
+use drystone::contacts::{ContactProblem, LocalProblem, Problem};
+use drystone::glam::DVec3;
 use drystone::residuals::{Measure, Residuals};
+use drystone::solver::newton::{Blocks, Bodies, Ended, NewtonEnded, Outcome, Sweeps, newton};
 use drystone::solver::{Order, Solver};
-use drystone::{Backend, ContactProblem, Result};
+use drystone::{Backend, Result};
 
 use super::rounds::Clock;
 
@@ -77,46 +80,153 @@ impl SolveSettings {
 impl SolveReport {
     /// Solves a problem in f64, or in f32 on a backend.
     pub fn new(problem: &ContactProblem, settings: &SolveSettings, backend: Option<Box<dyn Backend>>) -> Result<Self> {
-        let &SolveSettings { method, order, passes, sweeps, tolerance } = settings;
+        let &SolveSettings { method, order, passes, .. } = settings;
         let measure = Measure::new(problem);
         let name = backend.as_ref().map_or("f64", |b| b.name());
         let mut solver = Solver::new(problem, method, order, backend)?.with_passes(passes);
-        let mut report = Self {
+        let report = Self {
             problem: problem.name.clone(),
             bodies: problem.bodies.len(),
             contacts: problem.contacts.len(),
+            adapter: solver.adapter(),
+            colors: solver.colors(),
+            ..Self::begun(settings, name)
+        };
+        let residuals = |solver: &Solver| measure.of(&solver.impulses(), &solver.velocities());
+        report.swept(settings, &mut solver, |solver| solver.advance(1), residuals)
+    }
+
+    /// Solves a problem without bodies, in f64 and contact by contact.
+    pub fn of_blocks(problem: &LocalProblem, settings: &SolveSettings) -> Result<Self> {
+        let blocks = Blocks::new(problem);
+        let mut sweeps = Sweeps::new(&blocks, settings.method, vec![DVec3::ZERO; problem.rows.len()]);
+        let report = Self {
+            problem: problem.name.clone(),
+            contacts: problem.rows.len(),
+            adapter: ADAPTER.into(),
+            colors: problem.colors().len(),
+            ..Self::begun(&SolveSettings { order: Order::Contacts, passes: 1, ..*settings }, "f64")
+        };
+        let advance = |sweeps: &mut Sweeps| {
+            sweeps.advance(&blocks);
+            Ok(())
+        };
+        report.swept(settings, &mut sweeps, advance, |sweeps| Residuals::of_blocks(problem, sweeps.impulses()))
+    }
+
+    fn begun(&SolveSettings { method, order, passes, .. }: &SolveSettings, backend: &str) -> Self {
+        Self {
+            problem: String::new(),
+            bodies: 0,
+            contacts: 0,
             method,
             order,
             passes,
-            backend: name.into(),
-            adapter: solver.adapter(),
-            colors: solver.colors(),
+            backend: backend.into(),
+            adapter: String::new(),
+            colors: 0,
             sweeps: 0,
             ms: 0.0,
             reached: ERRORS.map(|e_vel| Reached { e_vel, sweeps: None, ms: None }).to_vec(),
             curve: Vec::new(),
-        };
-        let clock = Clock::of(name);
+        }
+    }
+
+    fn swept<S>(
+        mut self,
+        &SolveSettings { sweeps, tolerance, .. }: &SolveSettings,
+        solver: &mut S,
+        advance: impl Fn(&mut S) -> Result<()>,
+        measure: impl Fn(&S) -> Residuals,
+    ) -> Result<Self> {
+        let clock = Clock::of(&self.backend);
         let mut time = Duration::ZERO;
         for sweep in 1..=sweeps {
             let begin = clock.now();
-            solver.advance(1)?;
+            advance(solver)?;
             time += clock.now() - begin;
             let ms = time.as_secs_f64() * 1e3;
-            let residuals = measure.of(&solver.impulses(), &solver.velocities());
+            let residuals = measure(solver);
             let e_vel = residuals.e_vel;
-            (report.sweeps, report.ms) = (sweep, ms);
-            for reached in report.reached.iter_mut().filter(|r| r.sweeps.is_none() && e_vel < r.e_vel) {
+            (self.sweeps, self.ms) = (sweep, ms);
+            for reached in self.reached.iter_mut().filter(|r| r.sweeps.is_none() && e_vel < r.e_vel) {
                 (reached.sweeps, reached.ms) = (Some(sweep), Some(ms));
             }
             let last = sweep == sweeps || e_vel < tolerance || e_vel.is_nan();
             if last || sweep.is_power_of_two() {
-                report.curve.push(CurveRow { sweeps: sweep, ms, residuals });
+                self.curve.push(CurveRow { sweeps: sweep, ms, residuals });
             }
             if last {
                 break;
             }
         }
-        Ok(report)
+        Ok(self)
+    }
+}
+
+/// What f64 runs on where no backend does.
+const ADAPTER: &str = "one thread, scalar f64";
+
+/// Report of one solve by Newton's method; its fields are the keys of the JSON object.
+#[derive(Clone, Debug, Serialize)]
+pub struct NewtonReport {
+    /// Name of the problem.
+    pub problem: String,
+    /// Bodies that can move; 0 where the problem has none.
+    pub bodies: usize,
+    /// Contacts.
+    pub contacts: usize,
+    /// `newton`.
+    pub method: &'static str,
+    /// `f64`.
+    pub backend: &'static str,
+    /// Error `e_vel` that was asked for.
+    pub tolerance: f64,
+    /// Steps of Newton's method.
+    pub iterations: u32,
+    /// Sweeps before and after it.
+    pub sweeps: u32,
+    /// What ended the solve.
+    pub ended: Ended,
+    /// What ended Newton's method.
+    pub newton: NewtonEnded,
+    /// Time from the problem in memory to the impulses (ms).
+    pub ms: f64,
+    /// Errors of the impulses.
+    pub residuals: Residuals,
+    /// The impulse of each contact: normal, first and second tangent (N s).
+    pub impulses: Vec<[f64; 3]>,
+}
+
+impl NewtonReport {
+    /// Solves a problem to a tolerance, with at most so many sweeps.
+    pub fn new(problem: &Problem, tolerance: f64, most: u32) -> Self {
+        let clock = Clock::of("f64");
+        let begin = clock.now();
+        let outcome = match problem {
+            Problem::Bodies(problem) => newton(&mut Bodies::new(problem), tolerance, most),
+            Problem::Blocks(problem) => newton(&mut Blocks::new(problem), tolerance, most),
+        };
+        let ms = (clock.now() - begin).as_secs_f64() * 1e3;
+        let Outcome { impulses, sweeps, steps, ended, newton, .. } = outcome;
+        let (name, bodies, residuals) = match problem {
+            Problem::Bodies(p) => (&p.name, p.bodies.len(), Residuals::of(p, &impulses)),
+            Problem::Blocks(p) => (&p.name, 0, Residuals::of_blocks(p, &impulses)),
+        };
+        Self {
+            problem: name.clone(),
+            bodies,
+            contacts: impulses.len(),
+            method: "newton",
+            backend: "f64",
+            tolerance,
+            iterations: steps,
+            sweeps,
+            ended,
+            newton,
+            ms,
+            residuals,
+            impulses: impulses.iter().map(DVec3::to_array).collect(),
+        }
     }
 }

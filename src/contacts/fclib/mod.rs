@@ -1,7 +1,8 @@
-//! Contact problems in FCLIB's HDF5 files, global form:
+//! Contact problems in FCLIB's HDF5 files. The global form has bodies, and the local form (`local`) has none:
 //!
 //! ```text
 //! M v = H r + f        u = Hᵀ v + w        three columns of H a contact: normal, two tangents
+//! u = W r + q          three rows and columns of W a contact
 //! ```
 //!
 //! Rigid bodies are six rows each, three of the velocity of the center of mass and three of the angular velocity in the body's
@@ -9,6 +10,7 @@
 //! Written files have the world's axes for the body's, and H and M as entries by row and column.
 
 mod frames;
+mod local;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -16,7 +18,7 @@ mod tests;
 use glam::{DMat3, DVec3};
 
 use super::operator::inverse;
-use super::{ContactProblem, FreeBody, PointContact, Velocity, is_positive_definite};
+use super::{ContactProblem, FreeBody, LocalProblem, PointContact, Problem, Velocity, is_positive_definite};
 use crate::error::{Error, Result, ensure, input};
 use frames::{Lever, arm, rotation};
 use table::{Global, Sparse, Tables};
@@ -32,17 +34,34 @@ struct Rows {
     angular: [DVec3; 3],
 }
 
+impl Problem {
+    /// From the bytes of an FCLIB file.
+    pub(super) fn from_fclib(bytes: Vec<u8>) -> Result<Self> {
+        let tables = Tables::open(bytes)?;
+        if tables.has("fclib_global") {
+            return ContactProblem::from_tables(&tables).map(Self::Bodies);
+        }
+        if tables.has("fclib_local") {
+            return LocalProblem::from_tables(&tables).map(Self::Blocks);
+        }
+        let rolling = ["fclib_global_rolling", "fclib_local_rolling"].into_iter().find(|group| tables.has(group));
+        Err(Error::input(match rolling {
+            Some(group) => format!("{group}: rolling friction cannot be read"),
+            None => "no group fclib_global or fclib_local: not an FCLIB file".into(),
+        }))
+    }
+}
+
 impl ContactProblem {
     /// From the bytes of an FCLIB file with a global problem of rigid bodies in space.
     pub(super) fn from_fclib(bytes: Vec<u8>) -> Result<Self> {
-        let tables = Tables::open(bytes)?;
-        if !tables.has("fclib_global") {
-            let other = ["fclib_local", "fclib_global_rolling"].into_iter().find(|group| tables.has(group));
-            return Err(Error::input(match other {
-                Some(other) => format!("{other}: only fclib_global can be read"),
-                None => "no group fclib_global: not an FCLIB file".into(),
-            }));
+        match Problem::from_fclib(bytes)? {
+            Problem::Bodies(problem) => Ok(problem),
+            Problem::Blocks(_) => Err(Error::input("fclib_local: has no bodies, and bodies are needed")),
         }
+    }
+
+    fn from_tables(tables: &Tables) -> Result<Self> {
         let dimensions = tables.number("fclib_global/spacedim")?;
         ensure(dimensions == 3, || format!("fclib_global/spacedim: {dimensions}: must be 3"))?;
         ensure(!tables.has("fclib_global/G"), || "fclib_global/G: joints cannot be read".into())?;
@@ -51,10 +70,7 @@ impl ContactProblem {
         let contacts = contact_rows(&h, m.rows).map_err(|e| e.within("fclib_global/H"))?;
         let f = tables.reals("fclib_global/vectors/f", m.rows)?;
         let w = tables.reals("fclib_global/vectors/w", h.columns)?;
-        let mu = tables.reals("fclib_global/vectors/mu", contacts.len())?;
-        if let Some(i) = mu.iter().position(|&mu| mu < 0.0) {
-            return Err(input!("fclib_global/vectors/mu: {:?} of contact {i}: must not be negative", mu[i]));
-        }
+        let mu = tables.frictions("fclib_global/vectors/mu", contacts.len())?;
 
         let turns = rotations(blocks.len(), &contacts).map_err(|e| e.within("fclib_global/H"))?;
         let vectors = |numbers: &[f64]| numbers.chunks_exact(3).map(DVec3::from_slice).collect::<Vec<_>>();

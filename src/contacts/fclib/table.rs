@@ -49,6 +49,15 @@ impl Tables {
         }
     }
 
+    /// So many friction coefficients.
+    pub(super) fn frictions(&self, path: &str, count: usize) -> Result<Vec<f64>> {
+        let mu = self.reals(path, count)?;
+        match mu.iter().position(|&mu| mu < 0.0) {
+            Some(i) => Err(Error::input(format!("{path}: {:?} of contact {i}: must not be negative", mu[i]))),
+            None => Ok(mu),
+        }
+    }
+
     fn read<T>(
         &self,
         path: &str,

@@ -6,16 +6,16 @@ use super::*;
 use crate::contacts::Operator;
 
 #[derive(Clone, Debug)]
-enum Data {
+pub(super) enum Data {
     Whole(Vec<i32>),
     Real(Vec<f64>),
 }
 
 /// The datasets of a file, by path within the global problem; `M/x` before another group begins.
-type Tree = Vec<(&'static str, Data)>;
+pub(super) type Tree = Vec<(&'static str, Data)>;
 
 /// Three boxes, one on the ground and two on it, of which one has one contact only; tangents that are not orthogonal.
-fn boxes() -> ContactProblem {
+pub(super) fn boxes() -> ContactProblem {
     let free = Velocity { linear: DVec3::new(0.1, -0.2, -1.0), angular: DVec3::new(0.3, -0.7, 0.2) };
     let body = |mass: f64| {
         let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), mass);
@@ -81,7 +81,7 @@ fn tree(problem: &ContactProblem) -> Tree {
     tree
 }
 
-fn triplets(names: [&'static str; 7], matrix: &Sparse, [rows, columns]: [i32; 2]) -> Tree {
+pub(super) fn triplets(names: [&'static str; 7], matrix: &Sparse, [rows, columns]: [i32; 2]) -> Tree {
     let e = &matrix.entries;
     let count = e.len() as i32;
     let sizes = [count, rows, columns, count].map(|size| Data::Whole(vec![size]));
@@ -89,7 +89,7 @@ fn triplets(names: [&'static str; 7], matrix: &Sparse, [rows, columns]: [i32; 2]
     names.into_iter().zip(sizes.into_iter().chain([p, i, Data::Real(e.iter().map(|e| e.2).collect())])).collect()
 }
 
-fn bytes(tree: &Tree, group: &str) -> Vec<u8> {
+pub(super) fn bytes(tree: &Tree, group: &str) -> Vec<u8> {
     let put = |group: &mut GroupBuilder, name: &str, data: &Data| {
         match data {
             Data::Whole(numbers) => group.create_dataset(name).with_i32_data(numbers),
@@ -98,7 +98,7 @@ fn bytes(tree: &Tree, group: &str) -> Vec<u8> {
     };
     let mut file = FileBuilder::new();
     let mut global = file.create_group(group);
-    for inner in ["M", "H", "G", "vectors"] {
+    for inner in ["M", "H", "G", "W", "R", "vectors"] {
         let mut within = global.create_group(inner);
         let mut any = false;
         for (path, data) in tree {
@@ -117,7 +117,7 @@ fn bytes(tree: &Tree, group: &str) -> Vec<u8> {
     file.finish().expect("a file")
 }
 
-fn change<'a>(tree: &'a mut Tree, path: &str) -> &'a mut Data {
+pub(super) fn change<'a>(tree: &'a mut Tree, path: &str) -> &'a mut Data {
     &mut tree.iter_mut().find(|(at, _)| *at == path).expect(path).1
 }
 
@@ -305,8 +305,9 @@ fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
     jointed.push(("G/m", Whole(vec![18])));
     let refused = |bytes: Vec<u8>| ContactProblem::from_fclib(bytes).expect_err("refused").to_string();
     assert_eq!(refused(bytes(&jointed, "fclib_global")), "fclib_global/G: joints cannot be read");
-    assert_eq!(refused(bytes(&good, "fclib_local")), "fclib_local: only fclib_global can be read");
-    assert_eq!(refused(bytes(&good, "other")), "no group fclib_global: not an FCLIB file");
+    assert_eq!(refused(bytes(&good, "fclib_global_rolling")), "fclib_global_rolling: rolling friction cannot be read");
+    assert!(refused(bytes(&good, "fclib_local")).starts_with("fclib_local/W/m: "));
+    assert_eq!(refused(bytes(&good, "other")), "no group fclib_global or fclib_local: not an FCLIB file");
 }
 
 #[test]

@@ -1,0 +1,59 @@
+//! A contact problem without bodies: how the relative velocities at its contacts answer to their impulses.
+
+use glam::{DMat3, DVec3};
+
+/// u = W r + q, with W in blocks of contacts; the conditions on r and u are those of [`super::ContactProblem`].
+///
+/// W need not be symmetric: files of some programs differ from their transpose by a thousandth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LocalProblem {
+    /// Its name, on one line.
+    pub name: String,
+    /// Coulomb coefficient of each contact.
+    pub friction: Vec<f64>,
+    /// q: the relative velocity at each contact without impulses, in its coordinates: normal, first and second tangent (m/s).
+    pub free: Vec<DVec3>,
+    /// The rows of W (1/kg): for each contact the contacts that it answers to, ascending, each with its block. Every contact
+    /// answers to itself.
+    pub rows: Vec<Vec<(u32, DMat3)>>,
+}
+
+impl LocalProblem {
+    /// W_ii (1/kg).
+    ///
+    /// # Panics
+    /// The contact does not answer to itself.
+    pub fn block(&self, contact: usize) -> DMat3 {
+        let row = &self.rows[contact];
+        row[row.binary_search_by_key(&(contact as u32), |e| e.0).expect("a contact answers to itself")].1
+    }
+
+    /// W r at a contact (m/s), of impulses in the coordinates of their contacts (N s).
+    pub fn response(&self, contact: usize, impulses: &[DVec3]) -> DVec3 {
+        self.rows[contact].iter().fold(DVec3::ZERO, |u, &(j, w)| u + w * impulses[j as usize])
+    }
+
+    /// Contacts in colors: in the order of the file each takes the first color that has no contact which it answers to, or which
+    /// answers to it.
+    pub fn colors(&self) -> Vec<Vec<u32>> {
+        let mut near: Vec<Vec<u32>> = vec![Vec::new(); self.rows.len()];
+        for (i, row) in (0..).zip(&self.rows) {
+            for &(j, _) in row {
+                near[i as usize].push(j);
+                near[j as usize].push(i);
+            }
+        }
+        let mut color_of: Vec<Option<usize>> = vec![None; self.rows.len()];
+        let mut colors: Vec<Vec<u32>> = Vec::new();
+        for (i, near) in (0..).zip(&near) {
+            let is_used = |color: &usize| near.iter().any(|&j| color_of[j as usize] == Some(*color));
+            let color = (0..).find(|color| !is_used(color)).expect("there are more colors than neighbors");
+            if color == colors.len() {
+                colors.push(Vec::new());
+            }
+            colors[color].push(i);
+            color_of[i as usize] = Some(color);
+        }
+        colors
+    }
+}

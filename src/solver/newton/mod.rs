@@ -1,0 +1,183 @@
+//! A contact problem to the end, in f64: accelerated sweeps while they pay, Newton's method on the central path where they do not.
+//!
+//! Sweeps need thousands of passes where a heavy body stands on light ones, or many bodies on each other. A step of Newton's method
+//! solves a sparse linear system instead ([`System`]: six unknowns a body, or three a contact where a problem is given without
+//! bodies), and tens of steps come to 1e-8 however badly conditioned the problem is. docs/derivation.md, section 10, has the method;
+//! docs/convergence.md compares it with the solvers of Siconos.
+
+mod blocks;
+mod bodies;
+mod cone;
+mod elimination;
+mod factor;
+mod interior;
+mod scaling;
+mod sweeps;
+mod system;
+
+pub use blocks::Blocks;
+pub use bodies::Bodies;
+pub use factor::Factor;
+pub use sweeps::Sweeps;
+pub use system::{Cone, System};
+
+use glam::DVec3;
+
+use crate::config::Method;
+use interior::Interior;
+
+/// Sweeps after which the error is looked at.
+const STRIDE: u32 = 4;
+/// How often it is looked at before sweeps are judged: Newton's method has nothing prepared until then.
+const FIRST_STRIDES: usize = 8;
+/// Steps that Newton's method is taken to need, when the work that is left is compared.
+const EXPECTED_STEPS: f64 = 20.0;
+/// Most steps of Newton's method.
+const MOST_STEPS: u32 = 100;
+/// Steps in which the least error must fall by a tenth.
+const PATIENCE: u32 = 12;
+
+/// Error, in tolerances, below which sweeps go on where Newton's method ended.
+const LAST_DIGITS: f64 = 100.0;
+
+/// What ended a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Ended {
+    /// The sweeps before Newton's method came to the tolerance.
+    FirstSweeps,
+    /// Newton's method came to the tolerance.
+    Newton,
+    /// Newton's method came to nothing, and the sweeps after it came to the tolerance.
+    LastSweeps,
+    /// Nothing came to the tolerance.
+    Limit,
+}
+
+/// What ended Newton's method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum NewtonEnded {
+    /// It was not needed.
+    NotBegun,
+    /// The tolerance.
+    Reached,
+    /// The error no longer fell.
+    Stalled,
+    /// A matrix was singular, or a step came to nothing.
+    Blocked,
+}
+
+/// A problem solved as far as it went.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Outcome {
+    /// Impulses of the contacts, each in its coordinates (N s): the best there were.
+    pub impulses: Vec<DVec3>,
+    /// Their error.
+    pub e_vel: f64,
+    /// Sweeps, before and after Newton's method.
+    pub sweeps: u32,
+    /// Steps of Newton's method.
+    pub steps: u32,
+    /// What ended the solve.
+    pub ended: Ended,
+    /// What ended Newton's method.
+    pub newton: NewtonEnded,
+}
+
+impl Outcome {
+    fn keep(&mut self, impulses: &[DVec3], e_vel: f64) {
+        // The first, and what is less; a NaN never is.
+        if e_vel < self.e_vel {
+            (self.e_vel, self.impulses) = (e_vel, impulses.to_vec());
+        }
+    }
+}
+
+/// Solves a problem until `e_vel` is at most `tolerance`, with at most `most` sweeps.
+pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
+    let zero = vec![DVec3::ZERO; system.cones().len()];
+    let mut best = Outcome {
+        impulses: zero.clone(),
+        e_vel: f64::INFINITY,
+        sweeps: 0,
+        steps: 0,
+        ended: Ended::FirstSweeps,
+        newton: NewtonEnded::NotBegun,
+    };
+    let mut sweeps = Sweeps::new(system, Method::Accelerated, zero);
+    best.keep(sweeps.impulses(), sweeps.error(system));
+    if best.e_vel <= tolerance {
+        return best;
+    }
+
+    // Sweeps for as long as they promise to be cheaper.
+    let mut errors = Vec::new();
+    while best.e_vel > tolerance && sweeps.count < most {
+        (0..STRIDE).for_each(|_| sweeps.advance(system));
+        best.keep(sweeps.impulses(), sweeps.error(system));
+        errors.push(best.e_vel);
+        if errors.len() < FIRST_STRIDES {
+            continue;
+        }
+        // At the rate of the last half of the sweeps.
+        let rate = (errors[errors.len() / 2] / best.e_vel).ln() / (0.5 * f64::from(sweeps.count));
+        let left = (best.e_vel / tolerance).ln() / rate;
+        let (step, sweep) = system.work();
+        let affordable = EXPECTED_STEPS * step / sweep;
+        if left.is_nan() || left.max(sweeps.count.into()) > affordable {
+            break;
+        }
+    }
+    best.sweeps = sweeps.count;
+    if best.e_vel <= tolerance {
+        return best;
+    }
+
+    for careful in [false, true] {
+        best.newton = follow(&mut Interior::new(system, careful), system, tolerance, &mut best);
+        if best.newton == NewtonEnded::Reached {
+            best.ended = Ended::Newton;
+            return best;
+        }
+        // What is left are the last digits, which sweeps find.
+        if best.e_vel <= LAST_DIGITS * tolerance {
+            break;
+        }
+    }
+
+    let mut sweeps = Sweeps::new(system, Method::Accelerated, best.impulses.clone());
+    while best.e_vel > tolerance && best.e_vel.is_finite() && best.sweeps + sweeps.count < most {
+        (0..STRIDE).for_each(|_| sweeps.advance(system));
+        best.keep(sweeps.impulses(), sweeps.error(system));
+    }
+    best.sweeps += sweeps.count;
+    best.ended = if best.e_vel <= tolerance { Ended::LastSweeps } else { Ended::Limit };
+    best
+}
+
+/// Steps of Newton's method until something ends them.
+fn follow(interior: &mut Interior, system: &mut impl System, tolerance: f64, best: &mut Outcome) -> NewtonEnded {
+    let (mut milestone, mut since) = (f64::INFINITY, 0);
+    for _ in 0..MOST_STEPS {
+        if interior.step(system, tolerance).is_none() {
+            return NewtonEnded::Blocked;
+        }
+        best.steps += 1;
+        best.keep(&interior.r, interior.error);
+        if interior.error <= tolerance {
+            return NewtonEnded::Reached;
+        }
+        since += 1;
+        if interior.error < 0.9 * milestone {
+            (milestone, since) = (interior.error, 0);
+        }
+        if since > PATIENCE {
+            break;
+        }
+    }
+    NewtonEnded::Stalled
+}

@@ -1,0 +1,63 @@
+//! u = W r + q of a contact problem, in the form that sweeps and Newton's method need.
+
+use glam::{DMat3, DVec3};
+
+/// A contact problem as velocities that are linear in the impulses: u = W r + q.
+///
+/// [`Self::factor`] and [`Self::solve`] are a direct solver of 1 + D W for any D in blocks; with an approximate D they precondition
+/// other methods.
+pub trait System {
+    /// What each contact is by itself.
+    fn cones(&self) -> &[Cone];
+
+    /// The order in which sweeps visit the contacts.
+    fn sequence(&self) -> &[u32];
+
+    /// The velocities that impulses `r` give the bodies: what [`Self::response`] needs besides `r`. Empty where W has blocks.
+    fn carried(&self, r: &[DVec3]) -> Vec<f64>;
+
+    /// W r at a contact (m/s): u without q, since small changes of u would drown in q.
+    fn response(&self, contact: usize, r: &[DVec3], carried: &[f64]) -> DVec3;
+
+    /// Adds what a change of a contact's impulse does to `carried`.
+    fn push(&self, contact: usize, change: DVec3, carried: &mut [f64]);
+
+    /// Multiplications of one [`Self::factor`], and of one sweep. Orders the elimination when it is first called.
+    fn work(&mut self) -> (f64, f64);
+
+    /// Factors 1 + D W with D in 3x3 blocks, one a contact (kg); none if a pivot is singular.
+    fn factor(&mut self, d: &[DMat3]) -> Option<()>;
+
+    /// W x of (1 + D W) x = b, with the D that was factored last. x = b - D W x is left to the caller: D may be known in more digits
+    /// than its blocks hold.
+    ///
+    /// # Panics
+    /// Nothing was factored.
+    fn solve(&self, b: &[DVec3]) -> Vec<DVec3>;
+}
+
+/// What one contact is by itself.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Cone {
+    /// Coulomb coefficient.
+    pub mu: f64,
+    /// u without impulses (m/s).
+    pub q: DVec3,
+    /// W_ii: how u answers to the contact's own impulse (1/kg).
+    pub block: DMat3,
+    /// 3/trace(W_ii): the step of `e_vel` (kg).
+    pub rho: f64,
+    /// The largest step along u_t that contracts in every direction (kg; docs/derivation.md, section 6).
+    pub tangent_step: f64,
+}
+
+impl Cone {
+    /// Of a friction coefficient, q and W_ii.
+    pub fn new(mu: f64, q: DVec3, block: DMat3) -> Self {
+        let [[nn, _, _], [_, yy, yz], [_, zy, zz]] = block.to_cols_array_2d();
+        let between = 0.5 * (yz + zy);
+        let largest = 0.5 * (yy + zz + ((yy - zz).powi(2) + 4.0 * between * between).sqrt());
+        Self { mu, q, block, rho: 3.0 / (nn + yy + zz), tangent_step: 1.0 / largest }
+    }
+}
