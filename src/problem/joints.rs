@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::f32::consts::TAU;
 
-use glam::{DMat3, Vec3};
+use glam::Vec3;
 
-use super::effective::InverseMass;
 use super::joint_loads::borne_masses;
-use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, TurningRow};
+use super::lent_inertia::{LentInertia, lend_inertia};
+use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
@@ -34,7 +34,7 @@ pub struct JointRows {
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
-    lent: Vec<(u32, DMat3)>,
+    lent: Vec<LentInertia>,
 }
 
 /// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
@@ -187,38 +187,6 @@ impl JointRows {
         self.systems[joint as usize] != SWEPT
     }
 
-    /// Gives the bodies of joints that are solved at once the inertia that their joints lend them, and lets it turn with them. `substep`
-    /// is the length of a substep of class 0 (s).
-    fn stiffen(&mut self, world: &World, asleep: &[bool], substep: f32, problem: &mut StepProblem) {
-        let mut lent = std::mem::take(&mut self.lent);
-        for i in (0..world.joints.len()).filter(|&i| self.is_direct(i as u32) && takes_part(world, asleep, i as u32)) {
-            let (row, impulse) = (&problem.joints[i], problem.joint_impulses[i].linear);
-            let h = substep * self.shares[i];
-            for (body, arm, sign) in [(row.body_a, row.r_a, -1.0), (row.body_b, row.r_b, 1.0)] {
-                lent.push((body, lent_inertia(Vec3::from_array(arm), Vec3::from_array(impulse) * sign, h)));
-            }
-        }
-        lent.sort_by_key(|(body, _)| *body);
-        for own in lent.chunk_by(|a, b| a.0 == b.0) {
-            let Some(row) = problem.masses.get_mut(own[0].0 as usize).filter(|row| row.inv_mass > 0.0) else {
-                continue;
-            };
-            let sum = own.iter().fold(DMat3::ZERO, |sum, lent| sum + lent.1);
-            let inverse = InverseMass::of(row).inertia.as_dmat3();
-            let product = sum * inverse;
-            let swing = product.x_axis.x + product.y_axis.y + product.z_axis.z;
-            let share = SWING_LIMIT.recip() - swing.max(SWING_LIMIT).recip();
-            let i = inverse * (DMat3::IDENTITY + product * share).inverse();
-            let [xx, xy, xz] = i.x_axis.as_vec3().to_array();
-            row.inv_inertia_x = [xx, xy, xz];
-            row.inv_inertia_yz = [i.y_axis.y as f32, i.y_axis.z as f32, i.z_axis.z as f32];
-            let (inv_inertia_x, inv_inertia_yz) = (row.inv_inertia_x, row.inv_inertia_yz);
-            problem.turning.push(TurningRow { inv_inertia_x, body: own[0].0, inv_inertia_yz, pad: 0.0 });
-        }
-        lent.clear();
-        self.lent = lent;
-    }
-
     /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class 0 (s).
     pub fn write(&mut self, world: &World, asleep: &[bool], effort: &Effort, substep: f32, problem: &mut StepProblem) {
         problem.joints.clear();
@@ -248,7 +216,9 @@ impl JointRows {
                 ..JointRow::default()
             }
         }));
-        self.stiffen(world, asleep, substep, problem);
+        let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
+        let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
+        lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
         // The world, as a body that nothing moves.
         if world.joints.iter().any(|j| j.body_b.is_none()) {
             problem.bodies.push(BodyRow::AT_REST);
@@ -266,23 +236,6 @@ pub(super) fn takes_part(world: &World, asleep: &[bool], joint: u32) -> bool {
     let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
     (moves(joint.body_a) || joint.body_b.is_some_and(moves))
         && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
-}
-
-/// (h w)² of a body that swings at the frequency w under the pull of its joints, above which it is lent inertia. Explicit steps are
-/// stable below 4. Chains of 10 to 300 links with 1000 times at the end over 50 s, which go slack and snap: with 3 none gains energy and
-/// gaps stay below 25 mm; with 2 and less energy grows up to 0.1 of the swing, as the lent inertia comes and goes; with 4 gaps reach 2.5 m.
-const SWING_LIMIT: f64 = 3.0;
-
-/// h² times the stiffness against turning that a joint at the arm `r` gives a body while it pulls with `impulse` in a substep of `h`
-/// seconds: |r| |F| across the arm.
-fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
-    let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
-    let tension = r.dot(impulse);
-    if tension.is_nan() || tension <= 0.0 {
-        return DMat3::ZERO;
-    }
-    let along = DMat3::from_cols(r * r.x, r * r.y, r * r.z) * r.length_squared().recip();
-    (DMat3::IDENTITY - along) * (tension * f64::from(h))
 }
 
 /// Which of the joints before each joint is now.

@@ -10,6 +10,7 @@ pub mod effective;
 mod joint_loads;
 mod joint_systems;
 mod joints;
+mod lent_inertia;
 mod rescale;
 mod rows;
 mod slots;

@@ -12,6 +12,7 @@ mod lane_layout;
 mod partition;
 mod reference;
 mod shared;
+mod shared_step;
 pub(crate) mod simd;
 mod sweep;
 #[cfg(test)]
@@ -30,15 +31,14 @@ use crate::kernels::joint_system::JointFactors;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{Block, ContactRow, ConvergenceRow, JointRow, Params, StepProblem};
-use bodies::{BodyWork, State, TurningWork, extrapolate_velocities, integrate_spins, load_bodies, store_bodies};
-use constraint::Constraint;
-use joint_systems::{SharedFactors, SystemLayout, SystemWork};
+use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
+use bodies::{State, extrapolate_velocities, load_bodies, store_bodies};
+use joint_systems::{SharedFactors, SystemLayout};
 use lane_layout::LaneLayout;
 use partition::Partition;
 use shared::Shared;
+use shared_step::{SharedStep, Spread};
 use simd::{InstructionSet, Row8, WIDTH, Wide};
-use sweep::{Sweep, clear_impulses};
 use threads::Threads;
 
 /// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
@@ -220,108 +220,6 @@ fn in_groups(bodies: usize, threads: &Threads, work: &(dyn Fn(Range<usize>) + Sy
 fn stays_on_islands(kernel: Kernel) -> bool {
     use Kernel::{BeginSweep, Extrapolate, MeasureStep, UpdateMomentum};
     !matches!(kernel, BeginSweep { .. } | Extrapolate { .. } | MeasureStep | UpdateMomentum)
-}
-
-/// The data of a step, shared by threads that have different parts of it.
-struct SharedStep<'a> {
-    instructions: InstructionSet,
-    params: &'a Params,
-    blocks: &'a [Block],
-    partition: &'a Partition,
-    bodies: Shared<'a, State>,
-    free: Shared<'a, Row8>,
-    accelerations: &'a [Row8],
-    inertias: &'a [(usize, Inertia<f32>)],
-    contacts: &'a LaneLayout<ContactRow>,
-    contact_impulses: Shared<'a, [Wide; 4]>,
-    joints: &'a LaneLayout<JointRow>,
-    joint_impulses: Shared<'a, [Wide; 4]>,
-    problem: &'a StepProblem,
-    systems: &'a SystemLayout,
-    turning: &'a [(u32, Row8)],
-    factors: SharedFactors<'a>,
-    joint_changes: Shared<'a, [Wide; 4]>,
-    /// Set if a correction was above the tolerance.
-    moving: &'a AtomicBool,
-}
-
-/// Runs some work over some groups, on one thread or on many.
-type Spread<'a> = &'a dyn Fn(Range<usize>, &(dyn Fn(Range<usize>) + Sync));
-
-impl SharedStep<'_> {
-    /// Runs a pass over a part. Each task has its own part.
-    fn run(&self, pass: &Pass, part: usize, spread: Spread, spread_each: Spread) {
-        let (kernel, params, bodies) = (pass.kernel, self.params, self.bodies);
-        let substep = &self.blocks[pass.block as usize].substep;
-        match kernel {
-            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
-                let work =
-                    BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
-                spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
-            }
-            Kernel::IntegrateGyroscopic => {
-                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
-                let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
-                integrate_spins((params, substep), &self.inertias[first..end], &bodies, &self.free);
-            }
-            Kernel::ClearImpulses => {
-                for color in pass.colors.clone() {
-                    let groups = self.contacts.ranges.of(part, color);
-                    clear_impulses(&self.contact_impulses, self.contacts.impulses_of(groups));
-                }
-            }
-            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                self.sweep(pass, part, self.contacts, self.contact_impulses, spread);
-            }
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
-                self.sweep(pass, part, self.joints, self.joint_impulses, spread);
-            }
-            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
-                self.sweep(pass, part, self.joints, self.joint_changes, spread);
-            }
-            Kernel::TurnInertias => {
-                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
-                let [first, end] =
-                    [slots.start, slots.end].map(|slot| self.turning.partition_point(|row| (row.0 as usize) < slot));
-                let work = TurningWork { rows: &self.turning[first..end], bodies };
-                spread(0..(end - first).div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
-            }
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => {
-                let work = SystemWork {
-                    factors_only: kernel == Kernel::FactorJoints,
-                    problem: self.problem,
-                    layout: self.systems,
-                    slots: &self.partition.slots,
-                    bodies,
-                    factors: self.factors,
-                    changes: self.joint_changes,
-                    impulses: self.joint_impulses,
-                };
-                for color in pass.colors.clone() {
-                    spread_each(self.systems.ranges().of(part, color), &|range| self.instructions.run(&work, range));
-                }
-            }
-            Kernel::BeginSweep { .. } | Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => {
-                unreachable!("{kernel} does not stay on islands")
-            }
-        }
-    }
-
-    fn sweep<C: Constraint>(
-        &self,
-        pass: &Pass,
-        part: usize,
-        layout: &LaneLayout<C>,
-        impulses: Shared<[Wide; 4]>,
-        spread: Spread,
-    ) {
-        let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
-        let substep = &self.blocks[pass.block as usize].substep;
-        let work = Sweep { kernel, params, substep, bodies, layout, impulses, moving };
-        for color in pass.colors.clone() {
-            spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
-        }
-    }
 }
 
 impl Backend for Cpu {
