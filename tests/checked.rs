@@ -88,13 +88,28 @@ fn second_block(problem: &mut StepProblem) {
     problem.blocks.push(second);
 }
 
+/// Gives the second of two blocks everything.
+fn first_block_of_nothing(problem: &mut StepProblem) {
+    second_block(problem);
+    let [first, second] = &mut problem.blocks[..] else { unreachable!("two blocks") };
+    (second.contacts, first.contacts) = (first.contacts, [0; 2]);
+    (second.joints, first.joints) = (first.joints, [second.contacts[1]; 2]);
+}
+
+/// Gives the second of two blocks everything but the rows of inertia.
+fn inertias_of_another_block(problem: &mut StepProblem) {
+    first_block_of_nothing(problem);
+    let own = problem.blocks[0].inertias as usize;
+    problem.colors[own + 1] = problem.colors[own + 2];
+}
+
 #[test]
 fn what_is_not_there_is_refused_by_row_and_field() {
     let (problem, plan) = step(&[]);
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 34] = [
+    let cases: [(&str, Break); 36] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -122,7 +137,16 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("blocks[0]: colors", |p, _| p.blocks[0].bodies += 1),
         ("blocks[0]: colors", |p, _| p.blocks[0].inertias -= 1),
         ("blocks: 0 colors, but there are", |p, _| p.blocks.clear()),
+        ("blocks[0]: colors", |p, _| {
+            // One of the joints' colors is counted twice.
+            let block = &mut p.blocks[0];
+            block.joints[1] = block.joints[0] - 1;
+            (block.bodies, block.inertias) = (block.joints[1], block.joints[0]);
+            p.colors.truncate(p.blocks[0].joints[0] as usize + 1);
+            p.colors.push(p.order.len() as u32);
+        }),
         ("color 0: body", |p, _| second_block(p)),
+        ("inertias[0]: body", |p, _| inertias_of_another_block(p)),
         ("colors: must ascend", |p, _| p.colors[1] = u32::MAX),
         ("colors: must ascend", |p, _| p.colors[0] = 1),
         ("colors: must ascend", |p, _| *p.colors.last_mut().expect("joints") += 1),
@@ -200,4 +224,19 @@ fn a_pass_with_patches_over_rows_without_is_refused_and_the_other_way_round() {
         let line = refusal(problem, &[pass]).expect("refused");
         assert!(line.contains("patch = "), "{line}");
     }
+}
+
+#[test]
+fn momentum_over_several_blocks_is_refused_and_so_is_a_pass_of_no_block() {
+    let (mut problem, plan) = step(&["method=accelerated", "iterations=5"]);
+    assert_eq!(refusal(problem.clone(), &plan.passes), None);
+    let momentum = plan.passes.iter().find(|p| matches!(p.kernel, Kernel::Extrapolate { .. })).expect("a pass");
+    let mut beyond = momentum.clone();
+    beyond.block = 1;
+    let line = refusal(problem.clone(), &[beyond]).expect("refused");
+    assert!(line.starts_with("pass 0, extrapolate: block 1: there are 1"), "{line}");
+    first_block_of_nothing(&mut problem);
+    assert_eq!(refusal(problem.clone(), &[]), None);
+    let line = refusal(problem, std::slice::from_ref(momentum)).expect("refused");
+    assert!(line.contains("there is more than one block"), "{line}");
 }
