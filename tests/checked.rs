@@ -109,7 +109,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 36] = [
+    let cases: [(&str, Break); 37] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -117,6 +117,11 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("params.point_count: ", |p, _| p.params.point_count += 1),
         ("params.joint_count: ", |p, _| p.params.joint_count += 1),
         ("order: ", |p, _| p.inertias.push(p.inertias[0])),
+        ("order: ", |p, _| {
+            let bodies = p.blocks[0].bodies as usize;
+            p.order.remove(p.colors[bodies] as usize);
+            p.colors[bodies + 1..].iter_mut().for_each(|end| *end -= 1);
+        }),
         ("contacts[1]: bodies", |p, n| p.contacts[1].body_b = n),
         ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),

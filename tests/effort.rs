@@ -199,7 +199,7 @@ fn settings_limit_the_classes_of_islands() {
     assert_eq!(substeps(|c| c.max_substeps = 16), 16);
     assert_eq!(substeps(|c| c.tolerance = 1e-3), 8);
     assert_eq!(substeps(|c| c.method = Method::Accelerated), 8);
-    assert_eq!(substeps(|c| c.stabilization = Stabilization::Baumgarte), 8);
+    assert_eq!(substeps(|c| (c.stabilization, c.relax) = (Stabilization::Baumgarte, 0)), 8);
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 1);
     simulation.set_config(SolverConfig::default().with(|c| c.max_substeps = 16)).expect("a setting");
