@@ -204,7 +204,7 @@ fn settings_limit_the_classes_of_islands() {
     run(&mut simulation, 1);
     simulation.set_config(SolverConfig::default().with(|c| c.max_substeps = 16)).expect("a setting");
     run(&mut simulation, 1);
-    assert_eq!(most_substeps(&simulation), 16);
+    assert!(most_substeps(&simulation) <= 16, "{} substeps", most_substeps(&simulation));
 }
 
 /// The first step of an island of some class is that of settings with as many substeps, to the last bit.
