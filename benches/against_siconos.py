@@ -8,10 +8,10 @@
 A FILE is a contact problem that drystone reads: text, or FCLIB's HDF5 in global or local form. A global problem goes to the
 global solvers of Siconos and, as W = H^T M^-1 H in blocks, to the local ones.
 
-Siconos ends at its own error, drystone at e_vel; this script computes e_vel from the impulses of both. Each solver of Siconos therefore runs with the tolerances 1e-1, 1e-2 ... 1e-14,
-this script computes e_vel from the impulses of every run, and the first run whose e_vel is at most a target counts for the
-target. Times are those of the driver, without the assembly of W. Each solver runs in a process of its own, on one thread: some
-solvers crash, and some do not end. The runs of drystone are half before and half after those of Siconos.
+Siconos ends at its own error, drystone at e_vel. This script computes e_vel from the impulses of both. Each solver of Siconos
+runs with the tolerances 1e-1, 1e-2 ... 1e-14, and the first run whose e_vel is at most a target counts for the target. Times are
+those of the driver, without the assembly of W. Each solver runs in a process of its own, on one thread: some solvers crash, and
+some do not end. The runs of drystone are half before and half after those of Siconos.
 """
 
 import argparse

@@ -4,7 +4,7 @@ use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::{Pass, StepPlan};
-use crate::problem::StepProblem;
+use crate::problem::{JointSystems, StepProblem};
 use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::world::World;
@@ -181,7 +181,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 15] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -195,6 +195,8 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 15] {
         order,
         colors,
         blocks,
+        systems: JointSystems { begins, softness, nodes, blocks: system_blocks, terms },
+        turning,
         joints,
         joint_impulses,
         convergence,
@@ -212,6 +214,12 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 15] {
         ("order", bytemuck::cast_slice(order)),
         ("colors", bytemuck::cast_slice(colors)),
         ("blocks", bytemuck::cast_slice(blocks)),
+        ("systems.begins", bytemuck::cast_slice(begins)),
+        ("systems.softness", bytemuck::cast_slice(softness)),
+        ("systems.nodes", bytemuck::cast_slice(nodes)),
+        ("systems.blocks", bytemuck::cast_slice(system_blocks)),
+        ("systems.terms", bytemuck::cast_slice(terms)),
+        ("turning", bytemuck::cast_slice(turning)),
         ("joints", bytemuck::cast_slice(joints)),
         ("joint_impulses", bytemuck::cast_slice(joint_impulses)),
         ("convergence", bytemuck::bytes_of(convergence)),

@@ -11,7 +11,7 @@
 use crate::config::{Method, SolverConfig, Stabilization};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
-use crate::stats::{EFFORT_CLASSES, HardestContact};
+use crate::stats::EFFORT_CLASSES;
 use crate::world::{BodyKind, World};
 
 /// A constraint, for the effort that its island takes.
@@ -73,13 +73,6 @@ const CALM_SHARE: f32 = 0.5;
 /// The highest class of all.
 const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
 
-/// The interface that asks for most.
-pub fn hardest(interfaces: impl Iterator<Item = Interface>) -> Option<HardestContact> {
-    let harder = |a: Interface, b: Interface| if b.need > a.need { b } else { a };
-    let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
-    interfaces.reduce(harder).map(|i| HardestContact { bodies: [body(i.a), body(i.b)], need: i.need })
-}
-
 /// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
     now.min(4.0 * before + 0.25)
@@ -106,13 +99,14 @@ impl Effort {
     }
 
     /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` are the contacts and joints between bodies that are
-    /// awake, where a body counts as movable that a pass moves.
+    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives.
     pub fn follow(
         &mut self,
         world: &World,
         asleep: &[bool],
         config: &SolverConfig,
         dt: f32,
+        is_above: bool,
         interfaces: impl Iterator<Item = Interface> + Clone,
     ) -> bool {
         self.highest = Self::highest(config);
@@ -124,9 +118,7 @@ impl Effort {
                 self.begin(world, config, dt);
             }
         }
-        let is_needed = |interface: Interface| interface.need > 1.0;
-        (is_first || self.any_above || interfaces.clone().any(is_needed))
-            && self.follow_islands(world, asleep, interfaces)
+        (is_first || self.any_above || is_above) && self.follow_islands(world, asleep, interfaces)
     }
 
     /// Classes by the loads of statics.
@@ -211,6 +203,11 @@ impl Effort {
         let mut counts = [0; EFFORT_CLASSES];
         counts[0] = bodies;
         counts
+    }
+
+    /// Whether all bodies are in class 0, asleep or not.
+    pub fn is_one_class(&self) -> bool {
+        !self.any_above
     }
 
     /// The class of a body.

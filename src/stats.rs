@@ -29,6 +29,10 @@ pub struct StepStats {
     pub hardest: Option<HardestContact>,
     /// Joints.
     pub joints: usize,
+    /// Those of them that are solved at once and not swept.
+    pub direct_joints: usize,
+    /// Largest gap at rest that sweeps would leave in a joint, as a share of its arms: above 1e-3 its joints are solved at once.
+    pub swept_joint_gap: f32,
     /// Sweeps that were done, where the settings have a tolerance; else 0.
     pub sweeps: u32,
     /// Sweeps that the plan held, where the settings have a tolerance; else 0.

@@ -149,6 +149,11 @@ fn jointed_scenes_stay_together_and_gain_no_energy() {
         ("joint-grid", ["n=6", "n=6"]),
     ] {
         let (scene, mut simulation) = run(name, &parameters, 0);
+        // The steps of symplectic Euler swing about the energy less this: h/2 times the power of gravity.
+        let swing = |simulation: &Simulation| {
+            let power = |b: &drystone::Body| f64::from(b.mass.mass * b.linear_velocity.dot(simulation.world.gravity));
+            0.5 * f64::from(scene.dt) / 8.0 * simulation.world.bodies.iter().map(power).sum::<f64>()
+        };
         let before = energy(&simulation);
         let mut gap = 0.0_f32;
         for _ in 0..90 {
@@ -156,12 +161,17 @@ fn jointed_scenes_stay_together_and_gain_no_energy() {
             gap = gap.max(simulation.world.joint_gap());
         }
         assert!(gap < 0.01, "{name}: {gap} m");
-        assert!(energy(&simulation) < before + 1.0, "{name}");
-        // Its weight at least stretches what it hangs on.
+        let gained = energy(&simulation) + swing(&simulation) - before;
+        println!("{name} {parameters:?}: {gained} J gained of {before}");
+        assert!(gained < 1.0, "{name}: {gained} J");
+        // Its weight at least stretches what it hangs on, or is borne by joints that are solved at once.
         let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
         let moved = both.map(|(was, is)| was.position.distance(is.position)).fold(0.0, f32::max);
         println!("{name} {parameters:?}: {moved} m");
-        assert!(moved > 1e-5, "{name}: {moved} m in 1.5 s");
+        let weight: f32 = scene.world.bodies.iter().map(|b| b.mass.mass * 9.81).sum();
+        let borne = simulation.joint_impulses()[0].length() * 8.0 / scene.dt;
+        let hangs_still = parameters[1] == "angle=0" && (borne / weight - 1.0).abs() < 1e-3;
+        assert!(moved > 1e-5 || hangs_still, "{name}: {moved} m in 1.5 s, {borne} N of {weight}");
     }
 }
 

@@ -63,7 +63,8 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
     }
 }
 
-/// Where the rows of one kind of colors stand in the order: contacts, joints, bodies or rows of inertia.
+/// Where the rows of one kind of colors stand in the order: contacts, joints, bodies, rows of inertia, systems of joints or rows of turning
+/// inertia.
 fn places(problem: &StepProblem, kind: usize) -> std::ops::Range<usize> {
     let colors = &problem.blocks[0].colors()[kind];
     problem.colors[colors.start as usize] as usize..problem.colors[colors.end as usize] as usize
@@ -80,11 +81,15 @@ fn second_block(problem: &mut StepProblem) {
     let mut second = problem.blocks[0];
     second.contacts = [second.contacts[1]; 2];
     second.joints = [second.joints[1]; 2];
-    let bodies = problem.blocks[0].bodies as usize;
-    problem.colors.insert(bodies, problem.colors[bodies]);
-    problem.colors.insert(bodies + 2, problem.colors[bodies + 2]);
-    (second.bodies, second.inertias) = (second.bodies + 1, second.inertias + 2);
-    problem.blocks[0].inertias += 1;
+    second.direct = second.joints[1];
+    let bodies = second.bodies;
+    for kind in 0..4 {
+        let first = (bodies + 2 * kind) as usize;
+        problem.colors.insert(first, problem.colors[first]);
+    }
+    let first = &mut problem.blocks[0];
+    [first.bodies, first.inertias, first.systems, first.turning] = [0, 2, 4, 6].map(|kind| bodies + kind);
+    [second.bodies, second.inertias, second.systems, second.turning] = [1, 3, 5, 7].map(|kind| bodies + kind);
     problem.blocks.push(second);
 }
 
@@ -178,6 +183,49 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         let line = refusal(broken, &plan.passes).unwrap_or_else(|| panic!("{start}: was taken"));
         let known = line.starts_with(&format!("step problem: {start}"));
         assert!(known && !line.contains('\n'), "{start}: {line}");
+    }
+}
+
+#[test]
+fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
+    let (problem, plan) = step(&["joint_solver=direct"]);
+    assert_eq!(refusal(problem.clone(), &plan.passes), None);
+    assert!(problem.systems.terms.len() > 1 && problem.turning.len() > 1);
+    type Break = fn(&mut StepProblem);
+    let cases: [(&str, Break); 18] = [
+        ("systems: 1 with 0 softnesses", |p| p.systems.softness.clear()),
+        ("systems: ", |p| p.systems.begins[1] -= 1),
+        ("systems: ", |p| p.systems.begins[0] = 1),
+        ("systems.nodes[0]: blocks", |p| p.systems.nodes[0].end_block = p.systems.nodes[0].first_block),
+        ("systems.nodes[0]: blocks", |p| p.systems.nodes[0].end_block = u32::MAX),
+        ("systems.nodes[1]: blocks", |p| p.systems.nodes[1].first_block += 1),
+        ("systems.nodes[1]: blocks", |p| p.systems.blocks[p.systems.nodes[1].first_block as usize].node = 0),
+        ("systems.blocks[1]: node 999999", |p| p.systems.blocks[1].node = 999_999),
+        ("systems.blocks[", |p| p.systems.blocks[1].end_term = u32::MAX),
+        ("systems.blocks[", |p| p.systems.terms[0] = [u32::MAX, 0]),
+        ("systems.blocks[", |p| p.systems.terms[0] = [0, u32::MAX]),
+        ("blocks[0]: the joints of its systems", |p| p.systems.nodes[0].joint = p.systems.nodes[1].joint),
+        ("blocks[0]: the joints of its systems", |p| p.blocks[0].direct = p.blocks[0].joints[1]),
+        ("blocks[0]: colors", |p| p.blocks[0].direct = p.blocks[0].joints[1] + 1),
+        ("order: system 999999, but there are", |p| put(p, 4, 0, 999_999)),
+        ("order: turning 0 occurs twice", |p| put(p, 5, 1, 0)),
+        ("order: ", |p| p.turning.push(p.turning[0])),
+        ("turning[1]: body", |p| p.turning[1].body = p.bodies.len() as u32),
+    ];
+    for (start, spoil) in cases {
+        let mut broken = problem.clone();
+        spoil(&mut broken);
+        let line = refusal(broken, &plan.passes).unwrap_or_else(|| panic!("{start}: was taken"));
+        let known = line.starts_with(&format!("step problem: {start}"));
+        assert!(known && !line.contains('\n'), "{start}: {line}");
+    }
+    // A pass over systems goes over their color and no other.
+    for wanted in [Kernel::FactorJoints, Kernel::TurnInertias] {
+        let at = plan.passes.iter().position(|pass| pass.kernel == wanted).expect("a pass");
+        let mut passes = plan.passes.clone();
+        passes[at].colors = 0..1;
+        let line = refusal(problem.clone(), &passes).expect("refused");
+        assert!(line.contains(wanted.name()) && line.contains("colors 0..1"), "{line}");
     }
 }
 

@@ -106,8 +106,8 @@ fn whatever_a_backend_gives_back_is_compared() {
     problem.colors.push(problem.order.len() as u32);
     let block = problem.blocks[0];
     problem.in_one_block(colors as u32, block.substep);
-    // The colors of the bodies stand after the new one.
-    for pass in plan.passes.iter_mut().filter(|pass| pass.kernel.is_over_bodies()) {
+    // The colors of the bodies, and those after them, stand after the new one.
+    for pass in plan.passes.iter_mut().filter(|pass| pass.kernel.has_one_color()) {
         pass.colors = pass.colors.start + 1..pass.colors.end + 1;
     }
     let spoils: [fn(&mut StepProblem); 5] = [

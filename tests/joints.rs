@@ -3,6 +3,7 @@
 #[macro_use]
 mod common;
 
+use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
 use drystone::{BallJoint, Body, Shape, Simulation, SolverConfig, World};
 
@@ -73,7 +74,8 @@ fn every_joint_of_a_hanging_chain_carries_what_hangs_on_it(open: Open) {
         };
         above = Some(link);
     }
-    let config = SolverConfig::default().without_sleep();
+    // The static law is that of sweeps.
+    let config = SolverConfig::default().without_sleep().with(|c| c.joint_solver = JointSolver::Sweeps);
     let substep = 1.0 / 60.0 / config.substeps as f32;
     let mut simulation = simulate(world, config, open);
     for _ in 0..1200 {

@@ -73,6 +73,13 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
     }
+    // Systems of joints: what one of these kernels leaves to the next is not read back.
+    if let Kernel::MeasureJoints(rules) | Kernel::SolveJointSystems(rules) | Kernel::ApplyJointChanges(rules) = kernel {
+        return vec![system_sweep(rules, problem)];
+    }
+    if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
+        return vec![system_sweep(Rules::default(), problem)];
+    }
     // What a warm start applies is what happened since it last ran.
     if kernel == (Kernel::IntegrateVelocities { warm_start: true }) {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
@@ -80,6 +87,16 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     }
     ways.dedup();
     ways
+}
+
+/// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
+fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
+    let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
+    let first = [Kernel::IntegratePositions, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
+    let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
+    let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
+    let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();
+    first.chain(sweep.clone()).chain(sweep).collect()
 }
 
 /// A random problem whose manifolds carry no patches, and one whose manifolds do.

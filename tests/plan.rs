@@ -158,6 +158,7 @@ fn a_pile_needs_no_more_colors_than_there_are() {
 /// Contacts have the last word: what a joint pushes into the ground is pushed out of it again.
 #[test]
 fn joints_are_swept_before_contacts() {
+    use drystone::config::JointSolver;
     let mut world = row(&cube(), 0.5, 0.0);
     world.join(drystone::BallJoint::new(1, Vec3::X, 2, -Vec3::X));
     let config = SolverConfig::default().with(|c| {
@@ -165,7 +166,7 @@ fn joints_are_swept_before_contacts() {
         c.iterations = 2;
         c.relax = 1;
     });
-    let (plan, ..) = planned(world, config);
+    let solved_by = |solver| planned(world.clone(), config.clone().with(|c| c.joint_solver = solver)).0.to_string();
     let expected = "\
 integrate_velocities
 warm_start_joints over colors 1
@@ -178,7 +179,19 @@ integrate_positions
 solve_joints() over colors 1
 solve_contacts(disc friction) over colors 0
 ";
-    assert_eq!(plan.to_string(), expected);
+    assert_eq!(solved_by(JointSolver::Sweeps), expected);
+    // At once, they stand at the same places.
+    let at_once = |rules: &str| {
+        format!(
+            "measure_joints({rules}) over colors 1\nsolve_joint_systems({rules})\n\
+             apply_joint_changes({rules}) over colors 1\n"
+        )
+    };
+    let expected = expected
+        .replace("solve_joints(biased) over colors 1\n", &at_once("biased"))
+        .replace("solve_joints() over colors 1\n", &at_once(""))
+        .replace("integrate_positions\n", "integrate_positions\nturn_inertias\nfactor_joints\n");
+    assert_eq!(solved_by(JointSolver::Direct), format!("factor_joints\n{expected}"));
 }
 
 /// The first sweep of the contacts that is not biased, as the plan prints it.

@@ -29,6 +29,19 @@ struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f }
 
 struct JointImpulse { linear: vec3f }
 
+// One joint of a system while it is factored; `right` is the right side, then the correction. Double: src/kernels/joint_system.rs.
+struct JointNode {
+    r_a: vec3f, mass_a: f32,
+    r_b: vec3f, mass_b: f32,
+    turn_a: mat3x3f, turn_b: mat3x3f,
+    right: vec3f, softness: f32,
+}
+
+// A block of L, or the inverse of a pivot, and the block of L D.
+struct JointBlock { lower: mat3x3f, upper: mat3x3f }
+
+struct Turning { inv_inertia_x: vec3f, body: u32, inv_inertia_yz: vec3f }
+
 struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
 struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }

@@ -45,15 +45,18 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         let Some(own) = problem.blocks.get(*block as usize) else {
             return refuse(format!("block {block}: there are {}", problem.blocks.len()));
         };
-        let [contacts, joints, bodies, inertias] = own.colors();
+        let [contacts, joints, bodies, inertias, systems, turning] = own.colors();
         let (known, patch) = match kernel {
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 (contacts, Some(rules.patch))
             }
             Kernel::ClearImpulses => (contacts, None),
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (joints, None),
+            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
             Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => (bodies, None),
             Kernel::IntegrateGyroscopic => (inertias, None),
+            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => (systems, None),
+            Kernel::TurnInertias => (turning, None),
             _ => (0..0, None),
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {

@@ -10,7 +10,8 @@ use crate::error::{Result, ensure};
 mod rules;
 
 pub use rules::{
-    Clamping, ComparisonRules, Friction, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, Method, Stabilization,
+    Clamping, ComparisonRules, Friction, FrictionAt, FrictionOrder, FrictionRule, FrictionSweeps, JointSolver, Method,
+    Stabilization,
 };
 
 /// Settings of one step of the solver. The defaults hold every standing scene of the catalogue.
@@ -75,6 +76,13 @@ pub struct SolverConfig {
     pub friction_at: FrictionAt,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
+    /// Largest gap of a joint at rest, relative to its arms. Sets of joints that sweeps would leave further apart are solved at once, or
+    /// take more substeps where that is cheaper (nets).
+    pub max_joint_gap_share: f32,
+    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where sweeps would leave a gap of more
+    /// than `max_joint_gap_share` at rest: where a joint bears many times the mass of its bodies. Measured with 8 substeps, a chain of 100
+    /// links with 1000 times the mass of a link at its end: gap 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
+    pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,
     /// Damping ratio of the joint spring.
@@ -146,6 +154,8 @@ impl Default for SolverConfig {
             friction: Friction::Disc,
             friction_at: FrictionAt::Points,
             friction_sweeps: FrictionSweeps::Relax,
+            max_joint_gap_share: 5e-3,
+            joint_solver: JointSolver::Auto,
             joint_frequency: 0.25,
             joint_damping: 2.0,
             warm_start: true,
@@ -245,6 +255,7 @@ impl SolverConfig {
         for (name, value, least, most) in [
             ("max_penetration", self.max_penetration, 0.0, 1e3),
             ("max_penetration_share", self.max_penetration_share, 1e-6, 1e3),
+            ("max_joint_gap_share", self.max_joint_gap_share, 1e-9, 1e3),
             ("baumgarte", self.baumgarte, 0.0, 1.0),
             ("slop", self.slop, 0.0, 1e3),
             ("relaxation", self.relaxation, 1e-3, 2.0),

@@ -93,6 +93,22 @@ pub enum Stabilization {
 
 named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
 
+/// How joints are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum JointSolver {
+    /// At once where sweeps would leave gaps and factors stay sparse, else by sweeps.
+    #[default]
+    Auto,
+    /// One after another, as contacts.
+    Sweeps,
+    /// All joints of a connected set of bodies at once, whatever that costs.
+    Direct,
+}
+
+named!(JointSolver { Auto = "auto", Sweeps = "sweeps", Direct = "direct", });
+
 /// Which sweeps of a substep solve friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]

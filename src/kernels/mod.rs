@@ -9,6 +9,7 @@ pub mod convergence;
 pub mod friction;
 pub mod integrate;
 pub mod joint;
+pub mod joint_system;
 mod kernel_rows;
 pub mod momentum;
 pub mod pair;

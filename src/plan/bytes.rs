@@ -7,7 +7,7 @@ use crate::config::FrictionRule;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
-    StepProblem,
+    StepProblem, TurningRow,
 };
 
 impl StepPlan {
@@ -48,6 +48,7 @@ impl Pass {
             }
             Kernel::IntegratePositions => rows.len() * (BODY + BODY / 2),
             Kernel::IntegrateGyroscopic => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
+            Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
@@ -55,8 +56,11 @@ impl Pass {
             Kernel::UpdateMomentum => {
                 problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * size_of::<StepLength<f32>>()
             }
-            Kernel::WarmStartJoints => rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>()),
+            Kernel::MeasureJoints(_) | Kernel::WarmStartJoints | Kernel::ApplyJointChanges(_) => {
+                rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>())
+            }
             Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
             Kernel::ClearImpulses => {
                 let patches = if problem.has_patches() { rows.len() } else { 0 };
                 (points_of(&self.colors) + patches) * 2 * IMPULSE
@@ -72,5 +76,19 @@ impl Pass {
             }
         };
         bytes as u64
+    }
+
+    /// Bytes of a kernel over systems of joints: bodies and joints, blocks of the factors, and the products that they are made of.
+    fn bytes_of_systems(&self, problem: &StepProblem) -> usize {
+        const PAIR: usize = 2 * (size_of::<BodyRow>() + size_of::<MassRow>());
+        const BLOCK: usize = 48;
+        let systems = &problem.systems;
+        let of_system = |&system: &u32| {
+            let nodes = systems.nodes_of(system as usize);
+            let joints = nodes.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>());
+            let blocks = nodes.map(|node| systems.blocks_of(node)).map(|blocks| blocks.len()).sum::<usize>();
+            joints + blocks * 2 * BLOCK
+        };
+        problem.rows_of(&self.colors).iter().map(of_system).sum()
     }
 }

@@ -18,6 +18,10 @@ pub enum Kernel {
     IntegrateGyroscopic,
     /// Forgets impulses; over contact colors, all at once.
     ClearImpulses,
+    /// Inertia of bodies that turned; over `turning`.
+    TurnInertias,
+    /// Factors the joints that are solved at once; over systems.
+    FactorJoints,
     /// Impulses that the joints carry; over joint colors.
     WarmStartJoints,
     /// Impulses that the manifolds carry; over contact colors.
@@ -40,6 +44,12 @@ pub enum Kernel {
     UpdateMomentum,
     /// One sweep of the joints; over joint colors.
     SolveJoints(Rules),
+    /// The velocities that joints lack which are solved at once; over their colors, in any order.
+    MeasureJoints(Rules),
+    /// Solves joints at once; over systems.
+    SolveJointSystems(Rules),
+    /// Corrections of joints that are solved at once; over their colors.
+    ApplyJointChanges(Rules),
     /// One sweep of the contacts; over contact colors.
     SolveContacts(Rules),
     /// Poses; over bodies.
@@ -55,6 +65,8 @@ impl Kernel {
             Self::IntegrateVelocities { .. } => "integrate_velocities",
             Self::IntegrateGyroscopic => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
+            Self::TurnInertias => "turn_inertias",
+            Self::FactorJoints => "factor_joints",
             Self::WarmStartJoints => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
             Self::BeginSweep { .. } => "begin_sweep",
@@ -62,15 +74,26 @@ impl Kernel {
             Self::MeasureStep => "measure_step",
             Self::UpdateMomentum => "update_momentum",
             Self::SolveJoints(_) => "solve_joints",
+            Self::MeasureJoints(_) => "measure_joints",
+            Self::SolveJointSystems(_) => "solve_joint_systems",
+            Self::ApplyJointChanges(_) => "apply_joint_changes",
             Self::SolveContacts(_) => "solve_contacts",
             Self::IntegratePositions => "integrate_positions",
             Self::ApplyRestitution(_) => "apply_restitution",
         }
     }
 
-    /// Whether the color that it goes over is that of the bodies of a block, or of their rows of inertia.
-    pub fn is_over_bodies(self) -> bool {
-        matches!(self, Self::IntegrateVelocities { .. } | Self::IntegrateGyroscopic | Self::IntegratePositions)
+    /// Whether it goes over the one color that a block has of bodies, of rows of inertia, or of systems of joints.
+    pub fn has_one_color(self) -> bool {
+        matches!(
+            self,
+            Self::IntegrateVelocities { .. }
+                | Self::IntegrateGyroscopic
+                | Self::IntegratePositions
+                | Self::TurnInertias
+                | Self::FactorJoints
+                | Self::SolveJointSystems(_)
+        )
     }
 
     /// Rules of a kernel that sweeps constraints, or none.
@@ -78,6 +101,9 @@ impl Kernel {
         match self {
             Self::WarmStart(rules)
             | Self::SolveJoints(rules)
+            | Self::MeasureJoints(rules)
+            | Self::SolveJointSystems(rules)
+            | Self::ApplyJointChanges(rules)
             | Self::SolveContacts(rules)
             | Self::ApplyRestitution(rules) => Some(rules),
             _ => None,
@@ -88,7 +114,11 @@ impl Kernel {
     pub fn is_measured(self) -> bool {
         match self {
             Self::Extrapolate { measured, .. } => measured,
-            Self::SolveJoints(rules) | Self::SolveContacts(rules) => rules.measured,
+            Self::SolveJoints(rules)
+            | Self::MeasureJoints(rules)
+            | Self::SolveJointSystems(rules)
+            | Self::ApplyJointChanges(rules)
+            | Self::SolveContacts(rules) => rules.measured,
             _ => false,
         }
     }

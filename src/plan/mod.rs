@@ -35,6 +35,9 @@ struct Sweeps<'a> {
     go_on: bool,
     block: u32,
     joints: &'a [Range<u32>],
+    /// Joints that are solved at once: the color of their systems, and the groups of their colors.
+    systems: &'a [Range<u32>],
+    direct: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
 }
 
@@ -101,11 +104,16 @@ impl StepPlan {
     /// The substeps of a block: in each velocities, warm start, biased sweeps, positions, relax sweeps.
     fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
         let Block { substeps, substep: Substep { length, .. }, .. } = problem.blocks[block as usize];
-        let [contact_colors, joint_colors, bodies, inertias] = problem.blocks[block as usize].colors();
+        let own = &problem.blocks[block as usize];
+        let [contact_colors, joint_colors, bodies, inertias, systems, turning] = own.colors();
         let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
-        let (contacts, joints) = (groups(&contact_colors), groups(&joint_colors));
-        let has_inertias = !problem.rows_of(&inertias).is_empty();
-        let (bodies, inertias) = ([bodies], [inertias]);
+        let (contacts, joints, direct) =
+            (groups(&contact_colors), groups(&own.swept_joints()), groups(&own.direct_joints()));
+        // A color without rows needs no pass.
+        let kept = |color: &'_ Range<u32>| !problem.rows_of(color).is_empty();
+        let [bodies, inertias, systems, turning] =
+            [bodies, inertias, systems, turning].map(|color| Some(color).filter(kept));
+        let [bodies, inertias, systems, turning] = [&bodies, &inertias, &systems, &turning].map(Option::as_slice);
         // Momentum begins with the third sweep.
         let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
         let sweeps = |count: u32| Sweeps {
@@ -114,6 +122,8 @@ impl StepPlan {
             go_on: false,
             block,
             joints: &joints,
+            systems,
+            direct: &direct,
             contacts: &contacts,
         };
         // Friction needs some sweep to happen in.
@@ -122,14 +132,14 @@ impl StepPlan {
         let biased = Rules { biased: true, friction: biased_friction, ..shared };
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn, and short steps give less than velocities are rounded by.
-        let carried = shared.accumulated && joints.is_empty() && length >= SHORTEST_CARRIED;
+        let carried = shared.accumulated && joint_colors.is_empty() && length >= SHORTEST_CARRIED;
+        self.over_colors(Kernel::FactorJoints, block, systems);
         for substep in 0..substeps {
             let warm_start = carried && substep > 0;
-            self.over_colors(Kernel::IntegrateVelocities { warm_start }, block, &bodies);
-            if has_inertias {
-                self.over_colors(Kernel::IntegrateGyroscopic, block, &inertias);
-            }
+            self.over_colors(Kernel::IntegrateVelocities { warm_start }, block, bodies);
+            self.over_colors(Kernel::IntegrateGyroscopic, block, inertias);
             self.over_colors(Kernel::WarmStartJoints, block, &joints);
+            self.over_colors(Kernel::WarmStartJoints, block, &direct);
             if warm_start {
                 // Done already.
             } else if shared.accumulated {
@@ -138,7 +148,9 @@ impl StepPlan {
                 self.passes.push(Pass { kernel: Kernel::ClearImpulses, block, colors: contact_colors.clone() });
             }
             self.sweeps(sweeps(config.iterations), biased);
-            self.over_colors(Kernel::IntegratePositions, block, &bodies);
+            self.over_colors(Kernel::IntegratePositions, block, bodies);
+            self.over_colors(Kernel::TurnInertias, block, turning);
+            self.over_colors(Kernel::FactorJoints, block, systems);
             self.sweeps(sweeps(config.relax), shared);
         }
     }
@@ -157,7 +169,17 @@ impl StepPlan {
         let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
         let joints = color_groups(&problem.colors, problem.joint_colors(), FUSE_BELOW);
         let mut plan = Self::default();
-        plan.sweeps(Sweeps { method, range, go_on: true, block: 0, joints: &joints, contacts: &contacts }, rules);
+        let sweeps = Sweeps {
+            method,
+            range,
+            go_on: true,
+            block: 0,
+            joints: &joints,
+            systems: &[],
+            direct: &[],
+            contacts: &contacts,
+        };
+        plan.sweeps(sweeps, rules);
         plan
     }
 
@@ -180,6 +202,13 @@ impl StepPlan {
             let accelerated = sweeps.method == Method::Accelerated;
             if accelerated {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
+            }
+            if let [first, ..] = sweeps.direct {
+                let rules = rules.of_joints();
+                let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
+                self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
+                self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
+                self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
             }
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
@@ -222,7 +251,7 @@ impl fmt::Display for StepPlan {
                 write!(f, "block {}: ", run[0].block)?;
             }
             write!(f, "{}", run[0].kernel)?;
-            let named = |p: &&Pass| !p.colors.is_empty() && !p.kernel.is_over_bodies();
+            let named = |p: &&Pass| !p.colors.is_empty() && !p.kernel.has_one_color();
             let colors: Vec<_> = run.iter().filter(named).map(|p| group_name(&p.colors)).collect();
             if !colors.is_empty() {
                 write!(f, " over colors {}", colors.join(", "))?;

@@ -6,7 +6,7 @@ use super::StepProblem;
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 
-fn refuse(what: impl Display) -> Result<()> {
+pub(super) fn refuse(what: impl Display) -> Result<()> {
     Err(Error::input(format!("step problem: {what}")))
 }
 
@@ -22,10 +22,12 @@ impl StepProblem {
         self.check_order()?;
         self.check_bodies()?;
         self.check_points()?;
+        self.check_systems()?;
         self.check_colors()
     }
 
-    /// The blocks tile the colors: first all contacts, then all joints, all bodies, all rows of inertia.
+    /// The blocks tile the colors: first all contacts, then all joints, all bodies, all rows of inertia, all systems of joints, all rows of
+    /// turning inertia.
     fn check_blocks(&self) -> Result<()> {
         let (colors, order) = (&self.colors, self.order.len());
         let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
@@ -33,10 +35,13 @@ impl StepProblem {
             return refuse(format_args!("colors: must ascend from 0 to {order}"));
         }
         let mut next = 0;
-        for kind in 0..4 {
+        for kind in 0..6 {
             for (i, block) in self.blocks.iter().enumerate() {
                 let own = &block.colors()[kind];
-                if own.start != next || own.end < own.start {
+                if own.start != next
+                    || own.end < own.start
+                    || !(block.joints[0]..=block.joints[1]).contains(&block.direct)
+                {
                     return refuse(format_args!("blocks[{i}]: colors {own:?}, but the color before is {next}"));
                 }
                 next = own.end;
@@ -123,9 +128,12 @@ impl StepProblem {
             let ends = self.blocks.first().zip(self.blocks.last());
             self.rows_of(&ends.map_or(0..0, |(a, b)| a.colors()[kind].start..b.colors()[kind].end))
         };
-        let (bodies, inertias) = (all(2), all(3));
-        for (name, rows, count) in [("bodies", bodies, self.bodies.len()), ("inertias", inertias, self.inertias.len())]
-        {
+        let (bodies, inertias, systems, turning) = (all(2), all(3), all(4), all(5));
+        for (name, rows, count) in [
+            ("bodies", bodies, self.bodies.len()),
+            ("inertias", inertias, self.inertias.len()),
+            ("turning", turning, self.turning.len()),
+        ] {
             if rows.len() != count {
                 return refuse(format_args!("order: {} {name}, but there are {count}", rows.len()));
             }
@@ -135,6 +143,8 @@ impl StepProblem {
             ("joint", self.rows_of(&self.joint_colors()), self.joints.len()),
             ("body", bodies, self.bodies.len()),
             ("inertia", inertias, self.inertias.len()),
+            ("system", systems, self.systems.len()),
+            ("turning", turning, self.turning.len()),
         ] {
             let mut seen = vec![false; count];
             for &row in rows {
@@ -156,7 +166,7 @@ impl StepProblem {
         }
         let mut seen = vec![u32::MAX; self.bodies.len()];
         for (i, block) in self.blocks.iter().enumerate() {
-            let [contacts, joints, _, inertias] = block.colors();
+            let [contacts, joints, _, inertias, _, turning] = block.colors();
             for color in contacts.clone().chain(joints) {
                 let is_contact = contacts.contains(&color);
                 for &row in self.rows_of(&(color..color + 1)) {
@@ -183,6 +193,12 @@ impl StepProblem {
                 let body = self.inertias[row as usize].body;
                 if block_of[body as usize] != i {
                     return refuse(format_args!("inertias[{row}]: body {body} is not of block {i}"));
+                }
+            }
+            for &row in self.rows_of(&turning) {
+                let body = self.turning[row as usize].body;
+                if block_of[body as usize] != i {
+                    return refuse(format_args!("turning[{row}]: body {body} is not of block {i}"));
                 }
             }
         }

@@ -12,6 +12,7 @@ use crate::collide::{Detector, MAX_POINTS};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
+use crate::stats::HardestContact;
 use crate::world::{Body, BodyKind, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
@@ -71,18 +72,31 @@ impl ContactRows {
         }
     }
 
-    /// Follows the loads that contacts bore in the step before.
-    pub fn follow_loads(&mut self, config: &SolverConfig, problem: &StepProblem) {
-        for (i, slot) in self.slots.all.iter_mut().enumerate().filter(|(_, slot)| slot.takes_part) {
-            slot.need = match problem.contacts.get(i).filter(|_| slot.write != Write::New) {
-                Some(contact) => {
+    /// Follows the loads that contacts bore in the step before; returns the contact that asks for most. `is_one_class`: all substeps have
+    /// the length of class 0.
+    pub fn follow_loads(
+        &mut self,
+        config: &SolverConfig,
+        is_one_class: bool,
+        problem: &StepProblem,
+    ) -> Option<HardestContact> {
+        let Slots { all, edges, .. } = &mut self.slots;
+        let mut hardest: Option<(usize, f32)> = None;
+        for (i, slot) in all.iter_mut().enumerate().filter(|(_, slot)| slot.takes_part) {
+            slot.need = match problem.sags.get(i).filter(|_| slot.write != Write::New) {
+                Some(sag) => {
+                    let share = if is_one_class { 1.0 } else { problem.contacts[i].substep_share };
                     // In class 0 the substeps are longer, and sags grow with the square.
-                    let sag = problem.sags[i] / (contact.substep_share * contact.substep_share);
-                    effort::lasting(sag / config.promised_sag(slot.size), slot.need)
+                    effort::lasting(sag / (share * share * config.promised_sag(slot.size)), slot.need)
                 }
                 None => 0.0,
             };
+            if hardest.is_none_or(|(_, need)| slot.need > need) {
+                hardest = Some((i, slot.need));
+            }
         }
+        let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
+        hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }
 
     /// The contacts that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it touches.

@@ -1,13 +1,17 @@
 //! The rows of joints: one for each joint of the world, in its order. An impulse stays in its row.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::StepProblem;
+use super::joint_loads::borne_masses;
+use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow};
+use super::{JointSystems, StepProblem};
+use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
-use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
 use crate::world::{BallJoint, BodyKind, World};
 
 /// The joints that have rows, and their colors.
@@ -22,7 +26,23 @@ pub struct JointRows {
     is_colored: bool,
     /// The length of the substeps that each impulse belongs to, over that of class 0; 0 without an impulse.
     shares: Vec<f32>,
+    /// The system of each joint that is solved directly, `SWEPT` of the others.
+    systems: Vec<u32>,
+    /// Gravity and the length of a substep that the systems were chosen for.
+    chosen_for: Option<(Vec3, f32)>,
+    swept_gap: f32,
+    /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
+    needs: Vec<f32>,
+    /// Inertia that joints lend to bodies, in memory that every step uses again.
+    lent: Vec<LentInertia>,
 }
+
+/// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
+/// substeps are cheaper there.
+const MOST_TERMS_A_JOINT: usize = 24;
+
+/// The system of a joint that is swept.
+const SWEPT: u32 = u32::MAX;
 
 impl JointRows {
     /// The joints that have rows.
@@ -34,6 +54,82 @@ impl JointRows {
     pub fn forget_colors(&mut self) {
         self.edges.iter_mut().for_each(|edge| edge.color = None);
         self.is_colored = false;
+    }
+
+    /// Lets the joints that are solved at once be chosen anew.
+    pub fn forget_systems(&mut self) {
+        self.chosen_for = None;
+    }
+
+    /// Chooses the joints that are solved at once, unless they are chosen. `substep` is the length of a substep (s).
+    pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
+        if self.chosen_for.replace((world.gravity, substep)) == Some((world.gravity, substep)) {
+            return;
+        }
+        problem.systems = JointSystems::default();
+        self.systems.clear();
+        self.systems.resize(self.joints.len(), SWEPT);
+        self.swept_gap = 0.0;
+        self.needs.clear();
+        self.needs.resize(self.joints.len(), 0.0);
+        if config.joint_solver == JointSolver::Sweeps {
+            return;
+        }
+        let mut islands = Islands::default();
+        islands.reset(world.bodies.len());
+        self.edges.iter().filter(|e| e.a != IMMOVABLE && e.b != IMMOVABLE).for_each(|e| islands.join(e.a, e.b));
+        let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for (joint, edge) in self.edges.iter().enumerate() {
+            let body = if edge.a == IMMOVABLE { edge.b } else { edge.a };
+            if body != IMMOVABLE {
+                members.entry(islands.root(body)).or_default().push(joint as u32);
+            }
+        }
+        for joints in members.values() {
+            let gap = self.gap_of_sweeps(joints, world, config, substep);
+            self.swept_gap = self.swept_gap.max(gap);
+            let most_terms = match config.joint_solver {
+                JointSolver::Auto if gap <= config.max_joint_gap_share => continue,
+                JointSolver::Auto => MOST_TERMS_A_JOINT * joints.len(),
+                _ => usize::MAX,
+            };
+            let system = problem.systems.len() as u32;
+            if problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
+                joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
+            } else {
+                let need = gap / config.max_joint_gap_share;
+                joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
+            }
+        }
+    }
+
+    /// The bodies of a joint that can move.
+    fn sides(&self, joint: u32) -> [Option<u32>; 2] {
+        let Edge { a, b, .. } = self.edges[joint as usize];
+        [a, b].map(|body| Some(body).filter(|&body| body != IMMOVABLE))
+    }
+
+    /// The largest gap at rest that sweeps leave in some joints, as a share of their arms: F/(m w²), the load F that a joint bears, the mass
+    /// m of its bodies, the frequency w of its spring.
+    fn gap_of_sweeps(&self, joints: &[u32], world: &World, config: &SolverConfig, substep: f32) -> f32 {
+        let sides: Vec<_> = joints.iter().map(|&joint| self.sides(joint)).collect();
+        let mass = |body: u32| world.bodies[body as usize].mass.mass;
+        let omega = TAU * config.joint_frequency / substep;
+        let gap = |(&joint, borne): (&u32, f32)| {
+            let BallJoint { body_a, body_b, .. } = self.joints[joint as usize];
+            let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
+            let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
+            let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
+            let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
+            borne * world.gravity.length() * softness / (omega * omega * arms)
+        };
+        // A joint without arms has no length to be held against.
+        joints.iter().zip(borne_masses(&sides, mass)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
+    }
+
+    /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.
+    pub fn swept_gap(&self) -> f32 {
+        self.swept_gap
     }
 
     /// Takes over the joints of the world; returns those that began, ended or changed.
@@ -52,6 +148,7 @@ impl JointRows {
         };
         let edges: Vec<Edge> = now.iter().zip(&from).map(edge).collect();
         self.is_colored &= edges == self.edges;
+        self.chosen_for = None;
         self.edges = edges;
         let impulse =
             |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
@@ -74,15 +171,26 @@ impl JointRows {
         }
     }
 
+    /// Whether any joint needs more than class 0 gives.
+    pub fn are_above(&self) -> bool {
+        self.needs.iter().any(|&need| need > 1.0)
+    }
+
     /// The joints that take part, for the effort of their islands.
     pub fn interfaces(&self, world: &World, asleep: &[bool]) -> impl Iterator<Item = Interface> + Clone {
         let awake = self.edges.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
-        awake.map(|(_, edge)| Interface { a: edge.a, b: edge.b, need: 0.0 })
+        awake.map(|(i, edge)| Interface { a: edge.a, b: edge.b, need: self.needs.get(i).copied().unwrap_or(0.0) })
     }
 
-    /// Writes the rows of all joints, after those of bodies.
-    pub fn write(&mut self, world: &World, effort: &Effort, problem: &mut StepProblem) {
+    /// Whether a joint is solved at once with others, and not swept.
+    pub fn is_direct(&self, joint: u32) -> bool {
+        self.systems[joint as usize] != SWEPT
+    }
+
+    /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class 0 (s).
+    pub fn write(&mut self, world: &World, asleep: &[bool], effort: &Effort, substep: f32, problem: &mut StepProblem) {
         problem.joints.clear();
+        problem.turning.clear();
         problem.joint_impulses.resize(world.joints.len(), JointImpulseRow::default());
         problem.params.joint_count = world.joints.len() as u32;
         if world.joints.is_empty() {
@@ -108,6 +216,9 @@ impl JointRows {
                 ..JointRow::default()
             }
         }));
+        let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
+        let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
+        lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
         // The world, as a body that nothing moves.
         if world.joints.iter().any(|j| j.body_b.is_none()) {
             problem.bodies.push(BodyRow::AT_REST);

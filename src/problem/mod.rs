@@ -4,9 +4,13 @@ mod blocks;
 mod bodies;
 pub mod carry;
 mod check;
+mod check_systems;
 mod contacts;
 pub mod effective;
+mod joint_loads;
+mod joint_systems;
 mod joints;
+mod lent_inertia;
 mod rescale;
 mod rows;
 mod slots;
@@ -16,12 +20,13 @@ mod write;
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
+pub use joint_systems::{BlockRow, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, Substep,
+    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TurningRow,
 };
 
 use std::ops::Range;
@@ -50,13 +55,17 @@ pub struct StepProblem {
     pub joints: Vec<JointRow>,
     /// Impulses of the joints.
     pub joint_impulses: Vec<JointImpulseRow>,
-    /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, and the rows of unequal
-    /// moments of inertia.
+    /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, the rows of unequal
+    /// moments of inertia, the systems of joints that take part, and the rows of turning inertia.
     pub order: Vec<u32>,
     /// Where each color begins in `order`, and where the last ends.
     pub colors: Vec<u32>,
-    /// The blocks, one after another in each of the four kinds of colors.
+    /// The blocks, one after another in each of the six kinds of colors.
     pub blocks: Vec<Block>,
+    /// Joints that are solved at once.
+    pub systems: JointSystems,
+    /// Bodies of joints that are solved at once.
+    pub turning: Vec<TurningRow>,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
@@ -72,6 +81,16 @@ impl StepProblem {
     /// Colors of the joints of all blocks.
     pub fn joint_colors(&self) -> Range<u32> {
         self.blocks.first().map_or(0, |block| block.joints[0])..self.blocks.last().map_or(0, |block| block.joints[1])
+    }
+
+    /// Colors of the systems of joints of all blocks.
+    pub fn system_colors(&self) -> Range<u32> {
+        self.blocks.first().zip(self.blocks.last()).map_or(0..0, |(first, last)| first.systems..last.systems + 1)
+    }
+
+    /// Whether any joints are solved at once.
+    pub fn has_systems(&self) -> bool {
+        !self.rows_of(&self.system_colors()).is_empty()
     }
 
     /// The contacts, or joints, of some neighboring colors, by their rows.
@@ -101,13 +120,17 @@ impl StepProblem {
     /// `contact_colors` of them, then those of joints.
     pub fn in_one_block(&mut self, contact_colors: u32, substep: Substep) {
         let joints = [contact_colors, (self.colors.len() as u32).saturating_sub(1).max(contact_colors)];
-        let (bodies, inertias) = (joints[1], joints[1] + 1);
+        // Where systems stand, they solve all joints.
+        let direct = if self.systems.is_empty() { joints[1] } else { joints[0] };
         self.colors.resize(self.colors.len().max(1), 0);
-        for count in [self.bodies.len(), self.inertias.len()] {
+        for count in [self.bodies.len(), self.inertias.len(), self.systems.len(), self.turning.len()] {
             self.order.extend(0..count as u32);
             self.colors.push(self.order.len() as u32);
         }
-        self.blocks = vec![Block { substeps: 1, substep, contacts: [0, contact_colors], joints, bodies, inertias }];
+        let [bodies, inertias, systems, turning] = [0, 1, 2, 3].map(|kind| joints[1] + kind);
+        let contacts = [0, contact_colors];
+        self.blocks =
+            vec![Block { substeps: 1, substep, contacts, joints, direct, bodies, inertias, systems, turning }];
     }
 
     /// Whether a patch follows the points of every contact.

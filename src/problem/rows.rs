@@ -152,6 +152,20 @@ pub struct PointRow {
     pub slip_2: f32,
 }
 
+/// The inverse inertia of a body of joints that are solved at once, when the step begins; it turns with the body, 32 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TurningRow {
+    /// World axes (1/(kg m²)); xx xy xz.
+    pub inv_inertia_x: [f32; 3],
+    /// The body.
+    pub body: u32,
+    /// yy yz zz.
+    pub inv_inertia_yz: [f32; 3],
+    #[doc(hidden)]
+    pub pad: f32,
+}
+
 /// One ball joint: the anchors of two bodies coincide, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -2,7 +2,7 @@
 
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
-use crate::effort::{self, Effort};
+use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
@@ -129,6 +129,7 @@ impl Stages {
             scale.rescale(&before, world, &mut self.problem);
         }
         if changes.settings || changes.surfaces {
+            self.joints.forget_systems();
             self.contacts.write_again();
             self.plan_key = None;
         }
@@ -164,15 +165,16 @@ impl Stages {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
             }
+            joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
-            contacts.follow_loads(config, problem);
+            stats.hardest = contacts.follow_loads(config, effort.is_one_class(), problem);
             if are_sorted_anew {
                 contacts.sort(detector, problem);
             }
             let asleep = sleep.asleep();
             let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
-            stats.hardest = effort::hardest(contacts.interfaces(world, detector));
-            effort.follow(world, asleep, config, dt, interfaces)
+            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
+            effort.follow(world, asleep, config, dt, is_above, interfaces)
         })
     }
 
@@ -183,7 +185,7 @@ impl Stages {
             problem::begin(world, sleep.asleep(), config, problem);
             contacts.carry.on_device = on_device;
             contacts.write(world, detector, config, effort, dt, problem);
-            joints.write(world, effort, problem);
+            joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
@@ -200,6 +202,8 @@ impl Stages {
         stats.manifolds = contacts.coloring.order.len();
         stats.points = self.points;
         stats.joints = problem.rows_of(&problem.joint_colors()).len();
+        stats.direct_joints = problem.blocks.iter().map(|block| problem.rows_of(&block.direct_joints()).len()).sum();
+        stats.swept_joint_gap = joints.swept_gap();
         stats.colors = contacts.coloring.color_count();
         stats.overflow = contacts.coloring.overflow as usize;
         stats.dispatches = self.plan.passes.len();

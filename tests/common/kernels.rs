@@ -51,6 +51,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::MeasureStep,
         Kernel::UpdateMomentum,
         Kernel::WarmStartJoints,
+        Kernel::TurnInertias,
+        Kernel::FactorJoints,
     ];
     for (first, measured) in [(true, true), (true, false), (false, true), (false, false)] {
         all.push(Kernel::Extrapolate { first, measured });
@@ -58,6 +60,9 @@ pub fn every_kernel() -> Vec<Kernel> {
     for rules in every_rules() {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
+        all.push(Kernel::MeasureJoints(rules.of_joints()));
+        all.push(Kernel::SolveJointSystems(rules.of_joints()));
+        all.push(Kernel::ApplyJointChanges(rules.of_joints()));
         all.push(Kernel::SolveContacts(rules));
         all.push(Kernel::ApplyRestitution(Rules { patch: rules.patch, ..Rules::default() }));
     }
@@ -78,9 +83,12 @@ pub fn has_patches(kernel: Kernel) -> bool {
 
 /// The colors that `kernel` goes over; none for one that goes over something else.
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
-    let [contacts, joints, bodies, inertias] = problem.blocks[0].colors();
+    let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
         Kernel::WarmStartJoints | Kernel::SolveJoints(_) => joints,
+        Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
+        Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
+        Kernel::TurnInertias => turning,
         Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
             contacts
         }

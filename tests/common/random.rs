@@ -7,7 +7,7 @@ use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
-    Substep,
+    Substep, TurningRow,
 };
 use drystone::stages::random::SplitMix64;
 use glam::{Mat3, Quat, Vec3};
@@ -97,8 +97,28 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     }
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
     problem.params = params(&problem, patches);
+    solve_joints_at_once(random, &mut problem);
     problem.in_one_block(contact_colors, substep());
     problem
+}
+
+/// Puts all joints into one system, and lets the inertia of half of the bodies turn.
+fn solve_joints_at_once(random: &mut Random, problem: &mut StepProblem) {
+    let joints: Vec<u32> = (0..problem.joints.len() as u32).collect();
+    let side = |body: u32| Some(body).filter(|&body| is_movable(body));
+    let sides = |joint: u32| {
+        let row = &problem.joints[joint as usize];
+        [side(row.body_a), side(row.body_b)]
+    };
+    assert!(problem.systems.add(&joints, sides, usize::MAX));
+    // More joints than the bodies can follow: soft ones, or S would be near to singular.
+    problem.systems.softness[0] = 0.1;
+    for body in (0..BODIES).filter(|&body| is_movable(body)) {
+        if random.happens(0.5) {
+            let MassRow { inv_inertia_x, inv_inertia_yz, .. } = mass_row(random);
+            problem.turning.push(TurningRow { inv_inertia_x, body, inv_inertia_yz, ..TurningRow::default() });
+        }
+    }
 }
 
 /// The same problem with everything that moves, pushes or separates scaled by `scale`.
@@ -122,6 +142,9 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     let scale = |x: &mut f32| *x *= factor;
     for row in &mut problem.masses {
         row.inv_inertia_x.iter_mut().chain(&mut row.inv_inertia_yz).chain([&mut row.inv_mass]).for_each(lighter);
+    }
+    for row in &mut problem.turning {
+        row.inv_inertia_x.iter_mut().chain(&mut row.inv_inertia_yz).for_each(lighter);
     }
     problem.points.iter_mut().flat_map(|row| [&mut row.normal_mass, &mut row.tangent_mass]).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 
 use super::parsed;
-use drystone::stages::backend::shader::{ResidentParams, SCRATCH_ROW};
+use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW};
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness,
+    MomentumRow, Params, PassRow, PointRow, Softness, TurningRow,
 };
 
 const TYPES: &str = include_str!("../../shaders/lib/types.wgsl");
@@ -40,6 +40,24 @@ struct ImpulseStep {
     before: [f32; 4],
     begin: [f32; 4],
 }
+/// These, too.
+#[repr(C)]
+struct JointNode {
+    r_a: [f32; 3],
+    mass_a: f32,
+    r_b: [f32; 3],
+    mass_b: f32,
+    turn_a: [[f32; 4]; 3],
+    turn_b: [[f32; 4]; 3],
+    right: [f32; 3],
+    softness: f32,
+}
+#[repr(C)]
+struct JointBlock {
+    lower: [[f32; 4]; 3],
+    upper: [[f32; 4]; 3],
+}
+const _: () = assert!(size_of::<JointNode>() == JOINT_NODE && size_of::<JointBlock>() == JOINT_BLOCK);
 const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<ImpulseStep>() == SCRATCH_ROW);
 
 /// The layout of each row, under the name of its twin.
@@ -56,6 +74,9 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
         Joint = JointRow { r_a body_a r_b body_b gap }
         JointImpulse = JointImpulseRow { linear }
+        JointNode = JointNode { r_a mass_a r_b mass_b turn_a turn_b right softness }
+        JointBlock = JointBlock { lower upper }
+        Turning = TurningRow { inv_inertia_x body inv_inertia_yz }
         Convergence = ConvergenceRow { moving done sweeps planned }
         ImpulseStep = ImpulseStep { before begin }
         Momentum = MomentumRow { t factor square restarts }

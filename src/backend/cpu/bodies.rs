@@ -7,8 +7,9 @@ use std::ops::Range;
 use super::shared::Shared;
 use super::simd::{Lanes, Row8, WIDTH, Work, lanes};
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
+use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
-use crate::kernels::{Body, Free, Inertia, Mass, StepParams};
+use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, Params, StepProblem, Substep};
@@ -28,6 +29,14 @@ pub(super) struct State {
 /// Where a body's state begins, in units of 8 bytes.
 pub(super) fn place(body: usize) -> u32 {
     u32::try_from(body * size_of::<State>() / 8).expect("fewer than 268 million bodies")
+}
+
+impl State {
+    /// As the body of a kernel.
+    #[inline(always)]
+    pub fn load(&self) -> Body<f32> {
+        body(self.velocity.0, self.movement.0)
+    }
 }
 
 /// The body of a kernel from the numbers of a state.
@@ -131,6 +140,36 @@ impl Work for BodyWork<'_> {
     }
 }
 
+/// Turns the inertia of some bodies of systems of joints, given with their slots when the step begins.
+pub(super) struct TurningWork<'a> {
+    pub rows: &'a [(u32, Row8)],
+    pub bodies: Shared<'a, State>,
+}
+
+impl Work for TurningWork<'_> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
+        for group in groups {
+            let rows = &self.rows[WIDTH * group..self.rows.len().min(WIDTH * (group + 1))];
+            let mut begin = [Row8::default(); WIDTH];
+            let mut places = [place(rows[0].0 as usize); WIDTH];
+            for ((begin, place_of), (slot, row)) in begin.iter_mut().zip(&mut places).zip(rows) {
+                (*begin, *place_of) = (*row, place(*slot as usize));
+            }
+            // SAFETY: the places are those of states, of which no other task has any; `NEIGHBORING_ROWS` are the places of the rows.
+            let (body, [xx, xy, xz, inv_mass, yy, yz, zz, zero]) = unsafe {
+                (wide_body::<L>(self.bodies.as_ptr(), &places), L::gathered(begin.as_ptr(), &NEIGHBORING_ROWS))
+            };
+            let Sym3 { x, yz } = turned_inertia(Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, body.dq);
+            let turned = L::scattered([x.x, x.y, x.z, inv_mass, yz.x, yz.y, yz.z, zero]);
+            for ((slot, _), mass) in rows.iter().zip(turned) {
+                // SAFETY: as above.
+                unsafe { self.bodies.slice(*slot as usize..*slot as usize + 1)[0].mass = mass };
+            }
+        }
+    }
+}
+
 /// Turns the spins of some bodies with unequal moments of inertia, given with their slots.
 pub(super) fn integrate_spins(
     (params, substep): (&Params, &Substep),
@@ -142,7 +181,7 @@ pub(super) fn integrate_spins(
     for (slot, inertia) in inertias {
         // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
         let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
-        let (mut body, mut free) = (body(state.velocity.0, state.movement.0), free_body(row.0));
+        let (mut body, mut free) = (state.load(), free_body(row.0));
         integrate_gyroscopic(&params, inertia, &mut body, &mut free);
         state.velocity = Row8(velocity_numbers(body.v, body.w));
         *row = Row8(velocity_numbers(free.v, free.w));

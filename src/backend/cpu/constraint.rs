@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
+use crate::kernels::joint_system::{apply_joint_change, measure_joint};
 use crate::kernels::{Contact, Impulse, Joint, Pair, Point, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
@@ -103,7 +104,7 @@ pub(super) fn sweep_contact<L: Lane>(
     }
 }
 
-/// Applies a kernel to a joint of a lane.
+/// Applies a kernel to a joint of a lane, and to its impulse; where it is solved at once with others, to its correction.
 #[inline(always)]
 pub(super) fn sweep_joint<L: Lane>(
     kernel: Kernel,
@@ -115,6 +116,8 @@ pub(super) fn sweep_joint<L: Lane>(
     match kernel {
         Kernel::WarmStartJoints => warm_start_joint(pair, joint, *impulse),
         Kernel::SolveJoints(rules) => solve_joint(rules, params, pair, joint, impulse),
+        Kernel::MeasureJoints(rules) => *impulse = measure_joint(rules, params, pair, joint),
+        Kernel::ApplyJointChanges(_) => apply_joint_change(pair, joint, *impulse),
         _ => unreachable!("a kernel over other rows"),
     }
 }

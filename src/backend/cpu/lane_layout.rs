@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::bodies::place;
 use super::constraint::Constraint;
+use super::joint_systems::ImpulsePlace;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::shared::Shared;
 use super::simd::{Lanes, Portable, WIDTH, Wide};
@@ -210,6 +211,16 @@ impl<C: Constraint> LaneLayout<C> {
                 }
             }
         });
+    }
+
+    /// The place of the first impulse of each of `count` rows.
+    pub fn impulse_places(&self, count: usize, places: &mut Vec<ImpulsePlace>) {
+        places.resize(count, ImpulsePlace::default());
+        for group in &self.groups {
+            for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                places[row as usize] = ImpulsePlace { row: group.first, lane: lane as u32 };
+            }
+        }
     }
 
     /// The impulses of neighboring groups.

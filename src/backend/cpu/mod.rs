@@ -7,10 +7,12 @@
 
 mod bodies;
 mod constraint;
+mod joint_systems;
 mod lane_layout;
 mod partition;
 mod reference;
 mod shared;
+mod shared_step;
 pub(crate) mod simd;
 mod sweep;
 #[cfg(test)]
@@ -25,17 +27,18 @@ use std::sync::atomic::AtomicBool;
 use super::{Backend, CheckedStep};
 use crate::error::Result;
 use crate::kernels::convergence::begin_sweep;
+use crate::kernels::joint_system::JointFactors;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{Block, ContactRow, ConvergenceRow, JointRow, Params, StepProblem};
-use bodies::{BodyWork, State, extrapolate_velocities, integrate_spins, load_bodies, store_bodies};
-use constraint::Constraint;
+use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
+use bodies::{State, extrapolate_velocities, load_bodies, store_bodies};
+use joint_systems::{SharedFactors, SystemLayout};
 use lane_layout::LaneLayout;
 use partition::Partition;
 use shared::Shared;
+use shared_step::{SharedStep, Spread};
 use simd::{InstructionSet, Row8, WIDTH, Wide};
-use sweep::{Sweep, clear_impulses};
 use threads::Threads;
 
 /// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
@@ -58,6 +61,12 @@ pub struct Cpu {
     contact_impulses: Vec<[Wide; 4]>,
     joints: LaneLayout<JointRow>,
     joint_impulses: Vec<[Wide; 4]>,
+    /// Joints that are solved at once: their places, factors and corrections.
+    systems: SystemLayout,
+    factors: JointFactors<f32>,
+    /// Inertia of their bodies when the step begins, in the order of slots.
+    turning: Vec<(u32, Row8)>,
+    joint_changes: Vec<[Wide; 4]>,
     convergence: ConvergenceRow,
     momentum: Momentum<f32>,
     /// Velocities of the accelerated sweep before.
@@ -97,6 +106,18 @@ impl Cpu {
         self.inertias.sort_unstable_by_key(|inertia| inertia.0);
         self.contacts.load(problem, &self.partition, &mut self.contact_impulses, threads);
         self.joints.load(problem, &self.partition, &mut self.joint_impulses, threads);
+        self.systems.load(problem, &self.partition, &self.joints);
+        self.turning.clear();
+        self.turning.extend(problem.turning.iter().map(|row| {
+            let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[row.body as usize]);
+            let mut begin = Row8(std::array::from_fn(|i| mass[i]));
+            begin.0[..3].copy_from_slice(&row.inv_inertia_x);
+            begin.0[4..7].copy_from_slice(&row.inv_inertia_yz);
+            (slots[row.body as usize], begin)
+        }));
+        self.turning.sort_unstable_by_key(|row| row.0);
+        self.factors.reset(&problem.systems);
+        self.joint_changes.resize(self.joint_impulses.len(), [Wide::default(); 4]);
         self.convergence = problem.convergence;
         self.momentum = Momentum::load(&problem.momentum);
     }
@@ -144,6 +165,11 @@ impl Cpu {
             contact_impulses: Shared::new(&mut self.contact_impulses),
             joints: &self.joints,
             joint_impulses: Shared::new(&mut self.joint_impulses),
+            problem,
+            systems: &self.systems,
+            turning: &self.turning,
+            factors: SharedFactors::new(&mut self.factors),
+            joint_changes: Shared::new(&mut self.joint_changes),
             moving: &moving,
         };
         let is_needed = |pass: &&Pass| self.convergence.done == 0 || !pass.kernel.is_measured();
@@ -151,12 +177,16 @@ impl Cpu {
         threads.spread_each(0..for_one.len(), &|parts| {
             for part in parts {
                 for pass in passes.iter().filter(is_needed).filter(|pass| pass.block == for_one[part]) {
-                    shared.run(pass, part, &|groups, work| work(groups));
+                    let alone: Spread = &|groups, work| work(groups);
+                    shared.run(pass, part, alone, alone);
                 }
             }
         });
         for pass in passes.iter().filter(is_needed) {
-            shared.run(pass, for_one.len() + pass.block as usize, &|groups, work| threads.spread(groups, work));
+            let part = for_one.len() + pass.block as usize;
+            shared.run(pass, part, &|groups, work| threads.spread(groups, work), &|systems, work| {
+                threads.spread_each(systems, work);
+            });
         }
         self.convergence.moving |= u32::from(moving.into_inner());
     }
@@ -190,78 +220,6 @@ fn in_groups(bodies: usize, threads: &Threads, work: &(dyn Fn(Range<usize>) + Sy
 fn stays_on_islands(kernel: Kernel) -> bool {
     use Kernel::{BeginSweep, Extrapolate, MeasureStep, UpdateMomentum};
     !matches!(kernel, BeginSweep { .. } | Extrapolate { .. } | MeasureStep | UpdateMomentum)
-}
-
-/// The data of a step, shared by threads that have different parts of it.
-struct SharedStep<'a> {
-    instructions: InstructionSet,
-    params: &'a Params,
-    blocks: &'a [Block],
-    partition: &'a Partition,
-    bodies: Shared<'a, State>,
-    free: Shared<'a, Row8>,
-    accelerations: &'a [Row8],
-    inertias: &'a [(usize, Inertia<f32>)],
-    contacts: &'a LaneLayout<ContactRow>,
-    contact_impulses: Shared<'a, [Wide; 4]>,
-    joints: &'a LaneLayout<JointRow>,
-    joint_impulses: Shared<'a, [Wide; 4]>,
-    /// Set if a correction was above the tolerance.
-    moving: &'a AtomicBool,
-}
-
-/// Runs some work over some groups, on one thread or on many.
-type Spread<'a> = &'a dyn Fn(Range<usize>, &(dyn Fn(Range<usize>) + Sync));
-
-impl SharedStep<'_> {
-    /// Runs a pass over a part. Each task has its own part.
-    fn run(&self, pass: &Pass, part: usize, spread: Spread) {
-        let (kernel, params, bodies) = (pass.kernel, self.params, self.bodies);
-        let substep = &self.blocks[pass.block as usize].substep;
-        match kernel {
-            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
-                let work =
-                    BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
-                spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
-            }
-            Kernel::IntegrateGyroscopic => {
-                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
-                let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
-                integrate_spins((params, substep), &self.inertias[first..end], &bodies, &self.free);
-            }
-            Kernel::ClearImpulses => {
-                for color in pass.colors.clone() {
-                    let groups = self.contacts.ranges.of(part, color);
-                    clear_impulses(&self.contact_impulses, self.contacts.impulses_of(groups));
-                }
-            }
-            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                self.sweep(pass, part, self.contacts, self.contact_impulses, spread);
-            }
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
-                self.sweep(pass, part, self.joints, self.joint_impulses, spread);
-            }
-            Kernel::BeginSweep { .. } | Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => {
-                unreachable!("{kernel} does not stay on islands")
-            }
-        }
-    }
-
-    fn sweep<C: Constraint>(
-        &self,
-        pass: &Pass,
-        part: usize,
-        layout: &LaneLayout<C>,
-        impulses: Shared<[Wide; 4]>,
-        spread: Spread,
-    ) {
-        let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
-        let substep = &self.blocks[pass.block as usize].substep;
-        let work = Sweep { kernel, params, substep, bodies, layout, impulses, moving };
-        for color in pass.colors.clone() {
-            spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
-        }
-    }
 }
 
 impl Backend for Cpu {

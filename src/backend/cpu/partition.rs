@@ -187,7 +187,8 @@ impl ColorRanges {
 /// Rows of a problem, part by part and color by color.
 #[derive(Default)]
 pub(super) struct PartitionedRows {
-    rows: Vec<u32>,
+    /// Part by part and color by color.
+    pub rows: Vec<u32>,
     pub ranges: ColorRanges,
     next: Vec<u32>,
 }

@@ -6,8 +6,9 @@ use crate::error::Result;
 use crate::kernels::contact::clear_impulse;
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
+use crate::kernels::joint_system::{JointChanges, JointFactors, factor_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair};
+use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, StepProblem};
@@ -18,6 +19,10 @@ pub struct Reference<S> {
     rows: KernelRows<S>,
     free: Vec<Free<S>>,
     convergence: ConvergenceRow,
+    /// Factors of the joints that are solved at once.
+    factors: JointFactors<S>,
+    /// Their corrections, joint by joint.
+    joint_changes: Vec<Vec3<S>>,
     /// State of accelerated sweeps: velocities of the sweep before, impulses of points and joints, and how far a sweep moved the
     /// impulses.
     velocities_before: Vec<[Vec3<S>; 2]>,
@@ -97,11 +102,25 @@ impl<S: Scalar> Reference<S> {
                 self.lengths.extend(points.chain(joints).map(|(now, step)| step_length(now, step)));
             }
             Kernel::UpdateMomentum => self.rows.momentum.update(chunked_sum(&self.lengths)),
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
+            Kernel::TurnInertias => {
+                for row in places(problem, pass).map(|i| &problem.turning[i]) {
+                    let (x, yz) = (Vec3::load(row.inv_inertia_x), Vec3::load(row.inv_inertia_yz));
+                    let q = self.rows.bodies[row.body as usize].dq;
+                    self.rows.masses[row.body as usize].inv_inertia = turned_inertia(Sym3 { x, yz }, q);
+                }
+            }
+            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
+            Kernel::WarmStartJoints
+            | Kernel::SolveJoints(_)
+            | Kernel::MeasureJoints(_)
+            | Kernel::ApplyJointChanges(_) => {
+                let is_swept = matches!(pass.kernel, Kernel::WarmStartJoints | Kernel::SolveJoints(_));
+                self.joint_changes.resize(problem.joints.len(), Vec3::default());
                 for i in places(problem, pass) {
                     let bodies = problem.joints[i].bodies();
                     let (mut pair, rows) = (self.load_pair(bodies), &mut self.rows);
-                    sweep_joint(pass.kernel, &params, &mut pair, &rows.joints[i], &mut rows.joint_impulses[i]);
+                    let numbers = if is_swept { &mut rows.joint_impulses } else { &mut self.joint_changes };
+                    sweep_joint(pass.kernel, &params, &mut pair, &rows.joints[i], &mut numbers[i]);
                     self.store_pair(bodies, &pair);
                 }
             }
@@ -142,6 +161,25 @@ impl<S: Scalar> Reference<S> {
         }
     }
 
+    /// One system of joints after another.
+    fn over_systems(&mut self, problem: &StepProblem, pass: &Pass) {
+        let (systems, mut factors) = (&problem.systems, std::mem::take(&mut self.factors));
+        factors.reset(systems);
+        self.joint_changes.resize(problem.joints.len(), Vec3::default());
+        for system in places(problem, pass) {
+            let own = factors.of(systems, system);
+            if pass.kernel == Kernel::FactorJoints {
+                let load = |joint: usize| (self.rows.joints[joint], self.load_pair(problem.joints[joint].bodies()));
+                factor_system(systems, system, load, own);
+            } else {
+                let impulses = &mut self.rows.joint_impulses;
+                let mut changes = Changes { changes: &mut self.joint_changes, impulses };
+                solve_system(systems, system, &mut changes, own);
+            }
+        }
+        self.factors = factors;
+    }
+
     fn load_pair(&self, bodies: [u32; 2]) -> Pair<S> {
         let [a, b] = bodies.map(|body| body as usize);
         let (mass_a, mass_b) = (self.rows.masses[a], self.rows.masses[b]);
@@ -167,6 +205,27 @@ impl<S: Scalar> Reference<S> {
 /// The rows that a pass goes over.
 fn places(problem: &StepProblem, pass: &Pass) -> impl Iterator<Item = usize> {
     problem.rows_of(&pass.colors).iter().map(|&row| row as usize)
+}
+
+/// Corrections and impulses of joints.
+struct Changes<'a, S> {
+    changes: &'a mut [Vec3<S>],
+    impulses: &'a mut [Vec3<S>],
+}
+
+impl<S: Scalar> JointChanges<S> for Changes<'_, S> {
+    fn impulse(&self, joint: usize) -> Vec3<S> {
+        self.impulses[joint]
+    }
+
+    fn lacking(&self, joint: usize) -> Vec3<S> {
+        self.changes[joint]
+    }
+
+    fn change(&mut self, joint: usize, change: Vec3<S>) {
+        self.changes[joint] = change;
+        self.impulses[joint] += change;
+    }
 }
 
 impl<S: Scalar> Backend for Reference<S> {

@@ -46,7 +46,7 @@ bindings! {
     /// Velocities and movements of the bodies; read back.
     Bodies "bodies": "array<Body>", Write;
     /// Masses of the bodies.
-    Masses "masses": "array<Mass>", Read;
+    Masses "masses": "array<Mass>", Write;
     /// Principal inertia of the bodies that have unequal moments.
     Inertias "inertias": "array<Inertia>", Read;
     /// Manifolds.
@@ -61,6 +61,10 @@ bindings! {
     Joints "joints": "array<Joint>", Read;
     /// Impulses of the joints; read back.
     JointImpulses "joint_impulses": "array<JointImpulse>", Write;
+    /// The lists of the systems of joints that are solved at once.
+    JointSystems "joint_systems": "array<u32>", Read;
+    /// Inertia of their bodies when the step begins.
+    Turning "turning": "array<Turning>", Read;
     /// Whether the sweeps still move anything; read back.
     Convergence "convergence": "Convergence", Write;
     /// How far accelerated sweeps extrapolate; read back.
@@ -74,6 +78,12 @@ bindings! {
     ImpulseSteps "impulse_steps": "array<ImpulseStep>", Write;
     /// Sums over the steps of impulses.
     Lengths "lengths": "array<vec2f>", Write;
+    /// The joints of systems while these are factored. This buffer and the next two stay on the device, too.
+    JointNodes "joint_nodes": "array<JointNode>", Write;
+    /// The factors of systems.
+    JointBlocks "joint_blocks": "array<JointBlock>", Write;
+    /// The velocities that joints lack, then their corrections.
+    JointChanges "joint_changes": "array<JointImpulse>", Write;
     /// Numbers of the programs that begin a step on the device.
     Resident "resident": "ResidentParams", Uniform;
     /// Contacts whose rows the host computed anew.

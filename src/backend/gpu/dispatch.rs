@@ -53,7 +53,9 @@ fn threads(problem: &StepProblem, pass: &Pass) -> usize {
         // A workgroup a chunk.
         Kernel::MeasureStep => problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
-        _ if pass.colors.len() > 1 && pass.kernel != Kernel::ClearImpulses => 1,
+        // The order of their rows does not matter.
+        Kernel::ClearImpulses | Kernel::MeasureJoints(_) => problem.rows_of(&pass.colors).len(),
+        _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     }
 }

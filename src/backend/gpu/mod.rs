@@ -56,6 +56,7 @@ pub struct Gpu {
     /// Memory that every step uses again.
     separations: Vec<f32>,
     colors: Vec<u32>,
+    systems: Vec<u32>,
     states: Vec<BodyRow>,
     /// First error that the device reported outside a call.
     device_error: Arc<Mutex<Option<String>>>,
@@ -92,6 +93,7 @@ impl Gpu {
             rows: None,
             separations: Vec::new(),
             colors: Vec::new(),
+            systems: Vec::new(),
             states: Vec::new(),
             device_error,
         })
@@ -110,7 +112,7 @@ impl Gpu {
     /// Sends every row, also those that the device has.
     fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         self.check(problem, passes)?;
-        for (binding, _) in rows::small(problem, &[]) {
+        for (binding, _) in rows::small(problem, &[], &[]) {
             self.buffers.note(binding, &[]);
         }
         self.update_small_rows(problem);
@@ -127,14 +129,19 @@ impl Gpu {
         self.colors.clear();
         self.colors.extend(problem.colors.iter().map(|begin| begin + shift));
         self.colors.extend_from_slice(&problem.order);
-        for (binding, bytes) in rows::small(problem, &self.colors) {
+        rows::pack_systems(problem, &mut self.systems);
+        for (binding, bytes) in rows::small(problem, &self.colors, &self.systems) {
             self.buffers.update(binding, bytes);
+        }
+        if !problem.turning.is_empty() {
+            // This step turns those on the device.
+            self.buffers.note(Binding::Masses, &[]);
         }
     }
 
     /// Refuses a problem that is too large, before any row is sent. Makes room for the buffers that stay on the device.
     fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
-        for (binding, bytes) in rows::small(problem, &[]).into_iter().chain(rows::of_contacts(problem)) {
+        for (binding, bytes) in rows::small(problem, &[], &[]).into_iter().chain(rows::of_contacts(problem)) {
             self.buffers.check(binding, bytes.len())?;
         }
         self.buffers.check(Binding::Colors, size_of::<u32>() * (problem.colors.len() + problem.order.len()))?;

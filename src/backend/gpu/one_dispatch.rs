@@ -30,7 +30,8 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
         && problem.points.len() <= 4 * MOST_ROWS
         && (FEWEST_PASSES..=MOST_PASSES).contains(&passes.len())
         && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MOST_ROWS);
-    if !fits || needs_many_buffers(problem, passes) {
+    // Systems of joints have five buffers more.
+    if !fits || problem.has_systems() || needs_many_buffers(problem, passes) {
         return None;
     }
     let mut kernels: Vec<Kernel> = Vec::new();

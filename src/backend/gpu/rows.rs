@@ -2,13 +2,40 @@
 
 use super::bindings::Binding;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
-use crate::problem::StepProblem;
+use crate::problem::{JointImpulseRow, JointSystems, StepProblem};
 
 /// Size of a row of the buffers that stay on the device: two vectors (B).
 pub const SCRATCH_ROW: usize = 32;
 
+/// Size of the struct `JointNode` of the shaders (B).
+pub const JOINT_NODE: usize = 144;
+/// That of `JointBlock` (B).
+pub const JOINT_BLOCK: usize = 96;
+
+/// The lists of the systems of joints as one buffer: where five lists begin, and the lists.
+pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
+    packed.clear();
+    if !problem.has_systems() {
+        return;
+    }
+    let JointSystems { begins, softness, nodes, blocks, terms } = &problem.systems;
+    let lists: [&[u32]; 5] = [
+        begins,
+        bytemuck::cast_slice(softness),
+        bytemuck::cast_slice(nodes),
+        bytemuck::cast_slice(blocks),
+        bytemuck::cast_slice(terms),
+    ];
+    let mut begin = lists.len();
+    for list in lists {
+        packed.push(begin as u32);
+        begin += list.len();
+    }
+    lists.iter().for_each(|list| packed.extend_from_slice(list));
+}
+
 /// Rows of which a step changes little.
-pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32]) -> [(Binding, &'a [u8]); 9] {
+pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 11] {
     [
         (Binding::Params, bytemuck::bytes_of(&problem.params)),
         (Binding::Bodies, bytemuck::cast_slice(&problem.bodies)),
@@ -17,6 +44,8 @@ pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32]) -> [(Bindin
         (Binding::Colors, bytemuck::cast_slice(colors)),
         (Binding::Joints, bytemuck::cast_slice(&problem.joints)),
         (Binding::JointImpulses, bytemuck::cast_slice(&problem.joint_impulses)),
+        (Binding::JointSystems, bytemuck::cast_slice(systems)),
+        (Binding::Turning, bytemuck::cast_slice(&problem.turning)),
         (Binding::Convergence, bytemuck::bytes_of(&problem.convergence)),
         (Binding::Momentum, bytemuck::bytes_of(&problem.momentum)),
     ]
@@ -42,7 +71,7 @@ pub(super) fn moved(problem: &mut StepProblem) -> Vec<(Binding, &mut [u8])> {
 }
 
 /// Bytes of the buffers that stay on the device. All but the first are for accelerated sweeps.
-pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Binding, usize); 4] {
+pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Binding, usize); 7] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };
     [
@@ -50,5 +79,11 @@ pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Bindi
         (Binding::VelocitiesBefore, SCRATCH_ROW * before),
         (Binding::ImpulseSteps, SCRATCH_ROW * impulses),
         (Binding::Lengths, size_of::<StepLength<f32>>() * impulses.div_ceil(IMPULSES_PER_CHUNK)),
+        (Binding::JointNodes, JOINT_NODE * problem.systems.nodes.len()),
+        (Binding::JointBlocks, JOINT_BLOCK * problem.systems.blocks.len()),
+        (
+            Binding::JointChanges,
+            if problem.systems.is_empty() { 0 } else { size_of::<JointImpulseRow>() * problem.joints.len() },
+        ),
     ]
 }

@@ -103,6 +103,23 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             let parts = &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")];
             (parts, Over::Colors, "warm_start_joint(row)".into())
         }
+        Kernel::TurnInertias => (&[part!("turn_inertias")], Over::Colors, "turn_inertia(row)".into()),
+        Kernel::FactorJoints => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("lib/joint_system"), part!("factor_joints")];
+            (parts, Over::Colors, "factor_system(row)".into())
+        }
+        Kernel::MeasureJoints(rules) => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("measure_joints")];
+            (parts, Over::Colors, with("measure_joint", rules))
+        }
+        Kernel::SolveJointSystems(rules) => {
+            let parts = &[part!("lib/joint_system"), part!("solve_joint_systems")];
+            (parts, Over::Colors, with("solve_system", rules))
+        }
+        Kernel::ApplyJointChanges(rules) => {
+            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("apply_joint_changes")];
+            (parts, Over::Colors, with("apply_joint_change", rules))
+        }
         Kernel::SolveJoints(rules) => {
             (&[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")], Over::Colors, with("solve_joint", rules))
         }

@@ -7,9 +7,23 @@ use crate::random::SplitMix64;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// `n` boxes on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls; every other
-/// one has `ratio` times the density.
+/// A heap of `n` cubes of 1 m; every other one has `ratio` times the density.
 pub(super) fn pile(n: usize, jitter: f64, seed: u64, ratio: f32) -> Scene {
+    let bodies = [unit_box(), unit_box().density(1000.0 * ratio)];
+    heap("pile", n, jitter, seed, |i, _| bodies[i % 2].clone())
+}
+
+/// The same heap of boxes whose edges are 0.2 to 1 m long and whose densities are 200 to 5000 kg/m³, at random.
+pub(super) fn pile_mixed(n: usize, jitter: f64, seed: u64) -> Scene {
+    heap("pile-mixed", n, jitter, seed, |_, random| {
+        let [x, y, z, density] = [(0.1, 0.5), (0.1, 0.5), (0.1, 0.5), (200.0, 5000.0)]
+            .map(|(least, most)| (least + (most - least) * 0.5 * (1.0 + random.symmetric())) as f32);
+        Body::dynamic().shape(Shape::cuboid(x, y, z)).density(density)
+    })
+}
+
+/// `n` bodies of at most 1 m on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
+fn heap(name: &str, n: usize, jitter: f64, seed: u64, mut body: impl FnMut(usize, &mut SplitMix64) -> Body) -> Scene {
     const PITCH: f64 = 1.2;
     const CLEARANCE: f64 = 0.7;
     const LOWEST: f64 = 0.65;
@@ -28,18 +42,17 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64, ratio: f32) -> Scene {
     }
 
     let mut random = SplitMix64::new(seed);
-    let bodies = [unit_box(), unit_box().density(1000.0 * ratio)];
     for i in 0..n {
         let (column, row, layer) = (i % side, i / side % side, i / (side * side));
         let shift = if layer % 2 == 0 { SHIFT } else { -SHIFT };
         let x = centered(column, side) * PITCH + shift + jitter * random.symmetric();
         let y = layer as f64 * PITCH + LOWEST + jitter * random.symmetric();
         let z = centered(row, side) * PITCH + shift + jitter * random.symmetric();
-        let body = bodies[i % 2].clone().position(x as f32, y as f32, z as f32).rotation(small_turn(&mut random));
-        world.add(body);
+        let turn = small_turn(&mut random);
+        world.add(body(i, &mut random).position(x as f32, y as f32, z as f32).rotation(turn));
     }
     let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
-    Scene { container, ..Scene::new("pile", world, 600) }
+    Scene { container, ..Scene::new(name, world, 600) }
 }
 
 /// A turn by up to 0.08 rad about a random axis. Plain arithmetic in f64, so that the bits are the same everywhere.
@@ -138,7 +151,14 @@ mod tests {
 
     #[test]
     fn no_two_bodies_overlap_at_the_start() {
-        for scene in [pile(1000, 0.03, 1, 1.0), pile(500, 0.04, 7, 1.0), pyramid(6), many_pyramids(5, 3), wall(6, 4)] {
+        for scene in [
+            pile(1000, 0.03, 1, 1.0),
+            pile(500, 0.04, 7, 1.0),
+            pile_mixed(500, 0.04, 2),
+            pyramid(6),
+            many_pyramids(5, 3),
+            wall(6, 4),
+        ] {
             no_two_overlap(&scene);
         }
     }
@@ -180,6 +200,23 @@ mod tests {
             let scene = pile(n, 0.03, 1, 1.0);
             assert_eq!((scene.world.dynamic_count(), scene.escaped(&scene.world)), (n, 0));
         }
+    }
+
+    #[test]
+    fn a_mixed_pile_has_all_sizes_and_densities_in_its_range() {
+        let scene = pile_mixed(1000, 0.03, 1);
+        assert_eq!((scene.world.dynamic_count(), scene.escaped(&scene.world)), (1000, 0));
+        let boxes: Vec<_> = scene.world.dynamic().collect();
+        let spans = |what: &dyn Fn(&Body) -> f32, least: f32, most: f32| {
+            let values = boxes.iter().map(|b| what(b));
+            let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), x| (low.min(x), high.max(x)));
+            let margin = 0.02 * (most - least);
+            assert!(low >= least && high <= most, "{low} to {high}");
+            assert!(low < least + margin && high > most - margin, "{low} to {high}");
+        };
+        let half = |b: &Body| b.colliders[0].shape.as_cuboid().expect("a cuboid");
+        (0..3).for_each(|axis| spans(&|b: &Body| half(b)[axis], 0.1, 0.5));
+        spans(&|b: &Body| b.mass.mass / (8.0 * half(b).element_product()), 199.99, 5000.01);
     }
 
     #[test]

@@ -44,6 +44,17 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64, v[3] as f32)),
     },
     Entry {
+        name: "pile-mixed",
+        summary: "a pile of boxes of random sizes and densities, 200 to 5000 kg/m³: none leaves, all come to rest",
+        parameters: &[
+            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
+            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the sizes, densities, shifts and turns"),
+        ],
+        bodies: |v| v[0],
+        build: |v| Ok(boxes::pile_mixed(v[0] as usize, v[1], v[2] as u64)),
+    },
+    Entry {
         name: "pyramid",
         summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
         parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],

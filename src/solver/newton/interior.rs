@@ -1,8 +1,9 @@
 //! Newton's method on the central path of a contact problem: û = W r + q + mu |u_t| n stays inside of the dual of Coulomb's cone, r
 //! inside of the cone, and their product falls to zero (docs/derivation.md, section 10).
 //!
-//! Predictor and corrector of Mehrotra (1992) with the scaling of Nesterov and Todd. The slip mu |u_t| is a part of the system, with
-//! its derivative E, as in Acary, Armand, Nguyen and Shpakovych (2024), so that the limit is Coulomb's law and no convex relaxation.
+//! Predictor and corrector of Mehrotra (1992) with the scaling of Nesterov and Todd (1998), as Acary, Armand, Nguyen and Shpakovych
+//! (2024) solve the convex relaxation. Here the slip mu |u_t| is a part of the system, with its derivative E, so that the limit is
+//! Coulomb's law itself.
 
 use glam::{DMat3, DVec3};
 

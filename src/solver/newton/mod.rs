@@ -8,6 +8,7 @@
 mod blocks;
 mod bodies;
 mod cone;
+mod elimination;
 mod factor;
 mod interior;
 mod scaling;
@@ -149,7 +150,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
     }
 
     let mut sweeps = Sweeps::new(system, Method::Accelerated, best.impulses.clone());
-    while best.e_vel > tolerance && best.sweeps + sweeps.count < most {
+    while best.e_vel > tolerance && best.e_vel.is_finite() && best.sweeps + sweeps.count < most {
         (0..STRIDE).for_each(|_| sweeps.advance(system));
         best.keep(sweeps.impulses(), sweeps.error(system));
     }

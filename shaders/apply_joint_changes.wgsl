@@ -1,0 +1,13 @@
+// apply_joint_changes: one thread applies the correction of one joint of one color to its bodies.
+// Reads joints, joint_changes, masses. Writes bodies that can move.
+// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
+// Double: src/kernels/joint_system.rs.
+
+fn apply_joint_change(rules: Rules, i: u32) {
+    if is_converged(rules.measured) { return; }
+    let joint = joints[i];
+    var pair = load_pair(joint.body_a, joint.body_b);
+    let anchors = current_anchors(&pair, joint);
+    apply_impulse(&pair, anchors.r_a, anchors.r_b, joint_changes[i].linear);
+    store_pair(joint.body_a, joint.body_b, &pair);
+}

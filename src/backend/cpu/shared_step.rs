@@ -1,0 +1,118 @@
+//! One pass over one part of a step, on one thread or on all.
+
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+
+use super::bodies::{BodyWork, State, TurningWork, integrate_spins};
+use super::constraint::Constraint;
+use super::joint_systems::{SharedFactors, SystemLayout, SystemWork};
+use super::lane_layout::LaneLayout;
+use super::partition::Partition;
+use super::shared::Shared;
+use super::simd::{InstructionSet, Row8, WIDTH, Wide};
+use super::sweep::{Sweep, clear_impulses};
+use crate::kernels::Inertia;
+use crate::plan::{Kernel, Pass};
+use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
+
+/// The data of a step, shared by threads that have different parts of it.
+pub(super) struct SharedStep<'a> {
+    pub instructions: InstructionSet,
+    pub params: &'a Params,
+    pub blocks: &'a [Block],
+    pub partition: &'a Partition,
+    pub bodies: Shared<'a, State>,
+    pub free: Shared<'a, Row8>,
+    pub accelerations: &'a [Row8],
+    pub inertias: &'a [(usize, Inertia<f32>)],
+    pub contacts: &'a LaneLayout<ContactRow>,
+    pub contact_impulses: Shared<'a, [Wide; 4]>,
+    pub joints: &'a LaneLayout<JointRow>,
+    pub joint_impulses: Shared<'a, [Wide; 4]>,
+    pub problem: &'a StepProblem,
+    pub systems: &'a SystemLayout,
+    pub turning: &'a [(u32, Row8)],
+    pub factors: SharedFactors<'a>,
+    pub joint_changes: Shared<'a, [Wide; 4]>,
+    /// Set if a correction was above the tolerance.
+    pub moving: &'a AtomicBool,
+}
+
+/// Runs some work over some groups, on one thread or on many.
+pub(super) type Spread<'a> = &'a dyn Fn(Range<usize>, &(dyn Fn(Range<usize>) + Sync));
+
+impl SharedStep<'_> {
+    /// Runs a pass over a part. Each task has its own part.
+    pub fn run(&self, pass: &Pass, part: usize, spread: Spread, spread_each: Spread) {
+        let (kernel, params, bodies) = (pass.kernel, self.params, self.bodies);
+        let substep = &self.blocks[pass.block as usize].substep;
+        match kernel {
+            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
+                let work =
+                    BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
+                spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
+            }
+            Kernel::IntegrateGyroscopic => {
+                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
+                let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
+                integrate_spins((params, substep), &self.inertias[first..end], &bodies, &self.free);
+            }
+            Kernel::ClearImpulses => {
+                for color in pass.colors.clone() {
+                    let groups = self.contacts.ranges.of(part, color);
+                    clear_impulses(&self.contact_impulses, self.contacts.impulses_of(groups));
+                }
+            }
+            Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
+                self.sweep(pass, part, self.contacts, self.contact_impulses, spread);
+            }
+            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
+                self.sweep(pass, part, self.joints, self.joint_impulses, spread);
+            }
+            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
+                self.sweep(pass, part, self.joints, self.joint_changes, spread);
+            }
+            Kernel::TurnInertias => {
+                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
+                let [first, end] =
+                    [slots.start, slots.end].map(|slot| self.turning.partition_point(|row| (row.0 as usize) < slot));
+                let work = TurningWork { rows: &self.turning[first..end], bodies };
+                spread(0..(end - first).div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
+            }
+            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => {
+                let work = SystemWork {
+                    factors_only: kernel == Kernel::FactorJoints,
+                    problem: self.problem,
+                    layout: self.systems,
+                    slots: &self.partition.slots,
+                    bodies,
+                    factors: self.factors,
+                    changes: self.joint_changes,
+                    impulses: self.joint_impulses,
+                };
+                for color in pass.colors.clone() {
+                    spread_each(self.systems.ranges().of(part, color), &|range| self.instructions.run(&work, range));
+                }
+            }
+            Kernel::BeginSweep { .. } | Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => {
+                unreachable!("{kernel} does not stay on islands")
+            }
+        }
+    }
+
+    fn sweep<C: Constraint>(
+        &self,
+        pass: &Pass,
+        part: usize,
+        layout: &LaneLayout<C>,
+        impulses: Shared<[Wide; 4]>,
+        spread: Spread,
+    ) {
+        let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
+        let substep = &self.blocks[pass.block as usize].substep;
+        let work = Sweep { kernel, params, substep, bodies, layout, impulses, moving };
+        for color in pass.colors.clone() {
+            spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Whether systems of joints keep what backends rely on.
+
+use super::check::refuse;
+use super::{JointSystems, StepProblem};
+use crate::error::Result;
+
+impl StepProblem {
+    /// The joints of the direct colors of a block are those of its systems, each once; the blocks and products of a node are those of its system,
+    /// and products come before the block that they are subtracted from.
+    pub(super) fn check_systems(&self) -> Result<()> {
+        let JointSystems { begins, softness, nodes, blocks, terms } = &self.systems;
+        let ends = begins.first().zip(begins.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
+        let count = begins.len().saturating_sub(1);
+        if ends != [0, nodes.len()] || !begins.is_sorted_by(|a, b| a < b) || softness.len() != count {
+            return refuse(format_args!(
+                "systems: {count} with {} softnesses, over {} nodes",
+                softness.len(),
+                nodes.len()
+            ));
+        }
+        let mut end = 0;
+        for (node, row) in nodes.iter().enumerate() {
+            let own = blocks.get(row.first_block as usize..row.end_block as usize).unwrap_or_default();
+            if row.first_block as usize != end || own.first().is_none_or(|pivot| pivot.node as usize != node) {
+                return refuse(format_args!(
+                    "systems.nodes[{node}]: blocks from {} to {}",
+                    row.first_block, row.end_block
+                ));
+            }
+            end = row.end_block as usize;
+        }
+        for system in 0..count {
+            let own = self.systems.nodes_of(system);
+            let first = nodes[own.start].first_block;
+            for node in own.clone() {
+                for at in self.systems.blocks_of(node) {
+                    let row = &blocks[at];
+                    let products = terms.get(row.first_term as usize..row.end_term as usize);
+                    let is_own = |term: &u32| (first..at as u32).contains(term);
+                    let is_after = (node..own.end).contains(&(row.node as usize));
+                    if !is_after || !products.is_some_and(|products| products.iter().flatten().all(is_own)) {
+                        return refuse(format_args!(
+                            "systems.blocks[{at}]: node {}, or a product, is of none before",
+                            row.node
+                        ));
+                    }
+                }
+            }
+        }
+        for (i, block) in self.blocks.iter().enumerate() {
+            let mut direct = self.rows_of(&block.direct_joints()).to_vec();
+            let [_, _, _, _, own, _] = block.colors();
+            let nodes_of = |&system: &u32| &nodes[self.systems.nodes_of(system as usize)];
+            let mut solved: Vec<u32> = self.rows_of(&own).iter().flat_map(nodes_of).map(|node| node.joint).collect();
+            direct.sort_unstable();
+            solved.sort_unstable();
+            if solved != direct {
+                return refuse(format_args!(
+                    "blocks[{i}]: the joints of its systems are not those of its direct colors"
+                ));
+            }
+        }
+        let mut next = 0;
+        for (row, turning) in self.turning.iter().enumerate() {
+            let (body, bodies) = (turning.body as usize, self.bodies.len());
+            if body >= bodies || body < next {
+                return refuse(format_args!("turning[{row}]: body {body}: must be less than {bodies}, and ascending"));
+            }
+            next = body + 1;
+        }
+        Ok(())
+    }
+}

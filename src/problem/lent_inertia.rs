@@ -1,0 +1,60 @@
+//! Inertia that joints lend to the bodies that they pull on, so that explicit steps stay stable. Derivation: docs/derivation.md.
+
+use glam::{DMat3, Vec3};
+
+use super::StepProblem;
+use super::effective::InverseMass;
+use super::rows::TurningRow;
+
+/// Inertia that one joint lends to a body.
+pub(super) type LentInertia = (u32, DMat3);
+
+/// (h w)² of a body that swings at the frequency w under the pull of its joints, above which it is lent inertia. Explicit steps are
+/// stable below 4. Chains of 10 to 300 links with 1000 times at the end over 50 s, which go slack and snap: with 3 none gains energy and
+/// gaps stay below 25 mm; with 2 and less energy grows up to 0.1 of the swing, as the lent inertia comes and goes; with 4 gaps reach 2.5 m.
+const SWING_LIMIT: f64 = 3.0;
+
+/// h² times the stiffness against turning that a joint at the arm `r` gives a body while it pulls with `impulse` in a substep of `h`
+/// seconds: |r| |F| across the arm.
+fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
+    let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
+    let tension = r.dot(impulse);
+    if tension.is_nan() || tension <= 0.0 {
+        return DMat3::ZERO;
+    }
+    let along = DMat3::from_cols(r * r.x, r * r.y, r * r.z) * r.length_squared().recip();
+    (DMat3::IDENTITY - along) * (tension * f64::from(h))
+}
+
+/// Gives the bodies of joints that are solved at once the inertia that their joints lend them, and lets it turn with them. `joints` has the
+/// joints that take part, each with the length of its substeps (s); `lent` is memory that every step uses again.
+pub(super) fn lend_inertia(
+    joints: impl Iterator<Item = (usize, f32)>,
+    lent: &mut Vec<LentInertia>,
+    problem: &mut StepProblem,
+) {
+    for (i, h) in joints {
+        let (row, impulse) = (&problem.joints[i], problem.joint_impulses[i].linear);
+        for (body, arm, sign) in [(row.body_a, row.r_a, -1.0), (row.body_b, row.r_b, 1.0)] {
+            lent.push((body, lent_inertia(Vec3::from_array(arm), Vec3::from_array(impulse) * sign, h)));
+        }
+    }
+    lent.sort_by_key(|(body, _)| *body);
+    for own in lent.chunk_by(|a, b| a.0 == b.0) {
+        let Some(row) = problem.masses.get_mut(own[0].0 as usize).filter(|row| row.inv_mass > 0.0) else {
+            continue;
+        };
+        let sum = own.iter().fold(DMat3::ZERO, |sum, lent| sum + lent.1);
+        let inverse = InverseMass::of(row).inertia.as_dmat3();
+        let product = sum * inverse;
+        let swing = product.x_axis.x + product.y_axis.y + product.z_axis.z;
+        let share = SWING_LIMIT.recip() - swing.max(SWING_LIMIT).recip();
+        let i = inverse * (DMat3::IDENTITY + product * share).inverse();
+        let [xx, xy, xz] = i.x_axis.as_vec3().to_array();
+        row.inv_inertia_x = [xx, xy, xz];
+        row.inv_inertia_yz = [i.y_axis.y as f32, i.y_axis.z as f32, i.z_axis.z as f32];
+        let (inv_inertia_x, inv_inertia_yz) = (row.inv_inertia_x, row.inv_inertia_yz);
+        problem.turning.push(TurningRow { inv_inertia_x, body: own[0].0, inv_inertia_yz, pad: 0.0 });
+    }
+    lent.clear();
+}
