@@ -99,6 +99,7 @@ fn first_block_of_nothing(problem: &mut StepProblem) {
     let [first, second] = &mut problem.blocks[..] else { unreachable!("two blocks") };
     (second.contacts, first.contacts) = (first.contacts, [0; 2]);
     (second.joints, first.joints) = (first.joints, [second.contacts[1]; 2]);
+    (second.direct, first.direct) = (first.direct, second.contacts[1]);
 }
 
 /// Gives the second of two blocks everything but the rows of inertia.
@@ -147,13 +148,11 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("blocks[0]: colors", |p, _| p.blocks[0].bodies += 1),
         ("blocks[0]: colors", |p, _| p.blocks[0].inertias -= 1),
         ("blocks: 0 colors, but there are", |p, _| p.blocks.clear()),
-        ("blocks[0]: colors", |p, _| {
-            // One of the joints' colors is counted twice.
-            let block = &mut p.blocks[0];
-            block.joints[1] = block.joints[0] - 1;
-            (block.bodies, block.inertias) = (block.joints[1], block.joints[0]);
-            p.colors.truncate(p.blocks[0].joints[0] as usize + 1);
-            p.colors.push(p.order.len() as u32);
+        ("blocks[1]: colors", |p, _| {
+            second_block(p);
+            // The contacts of the second end before they begin, and the joints begin there.
+            p.blocks[1].contacts[1] -= 1;
+            p.blocks[0].joints[0] -= 1;
         }),
         ("color 0: body", |p, _| second_block(p)),
         ("inertias[0]: body", |p, _| inertias_of_another_block(p)),
@@ -192,7 +191,7 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     assert!(problem.systems.terms.len() > 1 && problem.turning.len() > 1);
     type Break = fn(&mut StepProblem);
-    let cases: [(&str, Break); 18] = [
+    let cases: [(&str, Break); 19] = [
         ("systems: 1 with 0 softnesses", |p| p.systems.softness.clear()),
         ("systems: ", |p| p.systems.begins[1] -= 1),
         ("systems: ", |p| p.systems.begins[0] = 1),
@@ -210,6 +209,11 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
         ("order: system 999999, but there are", |p| put(p, 4, 0, 999_999)),
         ("order: turning 0 occurs twice", |p| put(p, 5, 1, 0)),
         ("order: ", |p| p.turning.push(p.turning[0])),
+        ("turning[0]: body", |p| {
+            first_block_of_nothing(p);
+            let own = p.blocks[0].turning as usize;
+            p.colors[own + 1] = p.colors[own + 2];
+        }),
         ("turning[1]: body", |p| p.turning[1].body = p.bodies.len() as u32),
     ];
     for (start, spoil) in cases {
