@@ -93,13 +93,29 @@ fn second_block(problem: &mut StepProblem) {
     problem.blocks.push(second);
 }
 
+/// Gives the second of two blocks everything.
+fn first_block_of_nothing(problem: &mut StepProblem) {
+    second_block(problem);
+    let [first, second] = &mut problem.blocks[..] else { unreachable!("two blocks") };
+    (second.contacts, first.contacts) = (first.contacts, [0; 2]);
+    (second.joints, first.joints) = (first.joints, [second.contacts[1]; 2]);
+    (second.direct, first.direct) = (first.direct, second.contacts[1]);
+}
+
+/// Gives the second of two blocks everything but the rows of inertia.
+fn inertias_of_another_block(problem: &mut StepProblem) {
+    first_block_of_nothing(problem);
+    let own = problem.blocks[0].inertias as usize;
+    problem.colors[own + 1] = problem.colors[own + 2];
+}
+
 #[test]
 fn what_is_not_there_is_refused_by_row_and_field() {
     let (problem, plan) = step(&[]);
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 34] = [
+    let cases: [(&str, Break); 37] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -107,6 +123,11 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("params.point_count: ", |p, _| p.params.point_count += 1),
         ("params.joint_count: ", |p, _| p.params.joint_count += 1),
         ("order: ", |p, _| p.inertias.push(p.inertias[0])),
+        ("order: ", |p, _| {
+            let bodies = p.blocks[0].bodies as usize;
+            p.order.remove(p.colors[bodies] as usize);
+            p.colors[bodies + 1..].iter_mut().for_each(|end| *end -= 1);
+        }),
         ("contacts[1]: bodies", |p, n| p.contacts[1].body_b = n),
         ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
@@ -127,7 +148,14 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("blocks[0]: colors", |p, _| p.blocks[0].bodies += 1),
         ("blocks[0]: colors", |p, _| p.blocks[0].inertias -= 1),
         ("blocks: 0 colors, but there are", |p, _| p.blocks.clear()),
+        ("blocks[1]: colors", |p, _| {
+            second_block(p);
+            // The contacts of the second end before they begin, and the joints begin there.
+            p.blocks[1].contacts[1] -= 1;
+            p.blocks[0].joints[0] -= 1;
+        }),
         ("color 0: body", |p, _| second_block(p)),
+        ("inertias[0]: body", |p, _| inertias_of_another_block(p)),
         ("colors: must ascend", |p, _| p.colors[1] = u32::MAX),
         ("colors: must ascend", |p, _| p.colors[0] = 1),
         ("colors: must ascend", |p, _| *p.colors.last_mut().expect("joints") += 1),
@@ -163,7 +191,7 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     assert!(problem.systems.terms.len() > 1 && problem.turning.len() > 1);
     type Break = fn(&mut StepProblem);
-    let cases: [(&str, Break); 18] = [
+    let cases: [(&str, Break); 19] = [
         ("systems: 1 with 0 softnesses", |p| p.systems.softness.clear()),
         ("systems: ", |p| p.systems.begins[1] -= 1),
         ("systems: ", |p| p.systems.begins[0] = 1),
@@ -181,6 +209,11 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
         ("order: system 999999, but there are", |p| put(p, 4, 0, 999_999)),
         ("order: turning 0 occurs twice", |p| put(p, 5, 1, 0)),
         ("order: ", |p| p.turning.push(p.turning[0])),
+        ("turning[0]: body", |p| {
+            first_block_of_nothing(p);
+            let own = p.blocks[0].turning as usize;
+            p.colors[own + 1] = p.colors[own + 2];
+        }),
         ("turning[1]: body", |p| p.turning[1].body = p.bodies.len() as u32),
     ];
     for (start, spoil) in cases {
@@ -248,4 +281,19 @@ fn a_pass_with_patches_over_rows_without_is_refused_and_the_other_way_round() {
         let line = refusal(problem, &[pass]).expect("refused");
         assert!(line.contains("patch = "), "{line}");
     }
+}
+
+#[test]
+fn momentum_over_several_blocks_is_refused_and_so_is_a_pass_of_no_block() {
+    let (mut problem, plan) = step(&["method=accelerated", "iterations=5"]);
+    assert_eq!(refusal(problem.clone(), &plan.passes), None);
+    let momentum = plan.passes.iter().find(|p| matches!(p.kernel, Kernel::Extrapolate { .. })).expect("a pass");
+    let mut beyond = momentum.clone();
+    beyond.block = 1;
+    let line = refusal(problem.clone(), &[beyond]).expect("refused");
+    assert!(line.starts_with("pass 0, extrapolate: block 1: there are 1"), "{line}");
+    first_block_of_nothing(&mut problem);
+    assert_eq!(refusal(problem.clone(), &[]), None);
+    let line = refusal(problem, std::slice::from_ref(momentum)).expect("refused");
+    assert!(line.contains("there is more than one block"), "{line}");
 }

@@ -5,8 +5,13 @@ mod efforts;
 
 use drystone::metrics::{in_place, rms_speed};
 
+use drystone::config::{Method, Stabilization};
+use drystone::glam::Vec3;
+use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::compare;
-use drystone::{Backend, Body, BodyKind, Cpu, Reference, Scene, Shape, Simulation, SolverConfig};
+use drystone::{
+    Backend, BallJoint, Body, BodyKind, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem,
+};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -151,4 +156,112 @@ fn an_island_goes_up_with_a_load_and_down_after_it() {
     assert_eq!(most_substeps(&simulation), 8, "the load is gone");
     assert!(own < 1.2 * of_fixed, "{own} m/s after the load was taken away, {of_fixed} with {under_load} substeps");
     assert_eq!(out_of_place(&find("stack", &["n=6"]), &simulation), 0);
+}
+
+/// Towers of five cubes side by side, the top of the first 1000 times as heavy as the others, on a plate of this speed (m/s).
+fn on_a_plate(speed: f32) -> Scene {
+    let mut scene = find("tower", &["n=1"]);
+    scene.world.bodies.clear();
+    let plate = Body::kinematic().shape(Shape::cuboid(9.0, 0.5, 3.0)).position(0.0, -0.5, 0.0);
+    scene.world.add(plate.velocity(speed * Vec3::X, Vec3::ZERO));
+    for (x, top) in [(-3.0, 1e6), (3.0, 1e3)] {
+        for i in 0..5 {
+            let density = if i == 4 { top } else { 1e3 };
+            let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(density);
+            scene.world.add(cube.position(x, 0.5 + i as f32, 0.0).restitution(0.5));
+        }
+    }
+    scene
+}
+
+#[test]
+fn a_plate_that_moves_ties_what_lies_on_it() {
+    for (speed, tied) in [(0.0, false), (0.01, true)] {
+        let mut simulation = started(&on_a_plate(speed), SolverConfig::default());
+        run(&mut simulation, 10);
+        let [plate, heavy, light] = [0, 1, 10].map(|body| simulation.substeps_of(body));
+        assert!(heavy >= 32, "{heavy} substeps");
+        assert_eq!(light, if tied { heavy } else { 8 }, "{speed} m/s");
+        assert!(!tied || plate == heavy, "{plate} and not {heavy} substeps of the plate");
+    }
+}
+
+/// Bodies and constraints of islands of several classes, tied by joints too, are of the same blocks.
+#[test]
+fn several_efforts_keep_what_backends_rely_on() {
+    let mut scene = efforts::islands();
+    let top = scene.world.bodies.iter().position(|b| b.position.x == 20.0 && b.position.y > 5.0).expect("a top");
+    let at = scene.world.bodies[top].position + Vec3::Y;
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y + 0.3, at.z);
+    let rod = scene.world.add(rod);
+    scene.world.join(BallJoint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    for step in 0..5 {
+        run(&mut simulation, 1);
+        let passes = simulation.plan().passes.clone();
+        let mut problem = simulation.problem().clone();
+        assert_eq!(problem.blocks.len(), 3);
+        let checked = CheckedStep::new(&mut problem, &passes);
+        assert!(checked.is_ok(), "step {step}: {checked:?}");
+    }
+}
+
+/// The classes of statics act from the first step, as far as the settings allow.
+#[test]
+fn settings_limit_the_classes_of_islands() {
+    let scene = on_a_plate(0.0);
+    let substeps = |change: fn(&mut SolverConfig)| {
+        let mut simulation = started(&scene, SolverConfig::default().with(change));
+        run(&mut simulation, 1);
+        most_substeps(&simulation)
+    };
+    assert!(substeps(|_| ()) >= 32);
+    assert_eq!(substeps(|c| c.max_substeps = 16), 16);
+    assert_eq!(substeps(|c| c.tolerance = 1e-3), 8);
+    assert_eq!(substeps(|c| c.method = Method::Accelerated), 8);
+    assert_eq!(substeps(|c| (c.stabilization, c.relax) = (Stabilization::Baumgarte, 0)), 8);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 1);
+    simulation.set_config(SolverConfig::default().with(|c| c.max_substeps = 16)).expect("a setting");
+    run(&mut simulation, 1);
+    assert!(most_substeps(&simulation) <= 16, "{} substeps", most_substeps(&simulation));
+}
+
+/// The first step of an island of some class is that of settings with as many substeps, to the last bit.
+#[test]
+fn the_rows_of_an_island_are_those_of_its_substeps() {
+    let mut scene = on_a_plate(0.0);
+    scene.world.bodies.truncate(6);
+    scene.world.bodies[1..].iter_mut().for_each(|body| body.linear_velocity.y = -1.0);
+    let next = |config: SolverConfig| started(&scene, config).next_problem(DT).expect("a step").0;
+    let ours = next(SolverConfig::default());
+    let substeps = ours.blocks[0].substeps;
+    assert!(substeps >= 32, "{substeps} substeps");
+    let fixed = |substeps| next(SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps)));
+    let (theirs, others) = (fixed(substeps), fixed(8));
+    let approaches = |p: &StepProblem| p.points.iter().map(|p| p.approach_velocity).collect::<Vec<_>>();
+    assert_eq!(ours.blocks, theirs.blocks);
+    assert_eq!(ours.points, theirs.points);
+    assert_ne!(approaches(&ours), approaches(&others));
+    let share = 8.0 / substeps as f32;
+    assert!(ours.contacts.iter().all(|contact| contact.substep_share == share), "{:?}", ours.contacts);
+}
+
+/// A joint bears the same force before and after its island has another class.
+#[test]
+fn the_impulse_of_a_joint_follows_the_class() {
+    let mut scene = on_a_plate(0.0);
+    scene.world.bodies.truncate(6);
+    let at = scene.world.bodies[5].position + Vec3::Y;
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z + 2.0);
+    let rod = scene.world.add(rod);
+    scene.world.join(BallJoint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 60);
+    let (before, substeps) = (simulation.joint_impulses()[0], most_substeps(&simulation));
+    assert!(substeps >= 32 && before.length() > 0.0, "{substeps} substeps, {before} N s");
+    simulation.set_config(SolverConfig::default().without_sleep().with(|c| c.max_substeps = 8)).expect("a setting");
+    let (next, _) = simulation.next_problem(DT).expect("a step");
+    assert_eq!(next.blocks[0].substeps, 8);
+    assert_eq!(Vec3::from_array(next.joint_impulses[0].linear), before * (substeps / 8) as f32);
 }

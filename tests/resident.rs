@@ -19,6 +19,7 @@ tests! {
         what_is_asked_for_has_the_bits_of_the_reference,
         what_somebody_changes_between_two_steps_reaches_the_device,
         islands_fall_asleep_and_wake_with_their_impulses,
+        an_island_with_another_class_begins_from_the_rows_of_the_device,
         a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
         impulses_at_the_wrong_points_are_found,
         rows_that_are_not_there_are_refused,
@@ -136,6 +137,31 @@ fn what_somebody_changes_between_two_steps_reaches_the_device() {
             assert_same(&mut both, &format!("step {step}"));
         }
     }
+}
+
+/// A load comes on a stack, stays and is taken away.
+fn an_island_with_another_class_begins_from_the_rows_of_the_device() {
+    let mut scene = Scene::find("stack", &["n=3".into()]).expect("a scene of the catalogue");
+    let load = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(3e5).position(9.0, 0.5, 0.0);
+    let load = scene.world.add(load);
+    let mut both = both(&scene, &SolverConfig::default().without_sleep());
+    let mut substeps = Vec::new();
+    for step in 1..=160 {
+        for simulation in &mut both {
+            match step {
+                20 => simulation.world.bodies[load].position = Vec3::new(0.0, 3.5, 0.0),
+                50 => simulation.world.bodies[load].position = Vec3::new(9.0, 0.5, 0.0),
+                _ => {}
+            }
+            simulation.step(scene.dt).expect("a step");
+        }
+        assert_together(&both, &format!("step {step}"));
+        substeps.push(both.each_ref().map(|s| s.substeps_of(1)));
+    }
+    assert_same(&mut both, "the last step");
+    substeps.dedup();
+    let ours: Vec<u32> = substeps.iter().map(|s| s[0]).collect();
+    assert!(substeps.iter().all(|s| s[0] == s[1]) && ours.len() > 2 && ours.iter().max() > ours.last(), "{substeps:?}");
 }
 
 fn islands_fall_asleep_and_wake_with_their_impulses() {
