@@ -148,6 +148,7 @@ fn a_plan_follows_spins_where_its_colors_stay() {
     run(&mut simulation, 60);
     assert!(simulation.is_asleep(ball) && simulation.problem().inertias.is_empty());
     let colors = simulation.problem().colors.clone();
+    assert_planned_anew(&mut simulation, &colors);
     simulation.wake(rod);
     run(&mut simulation, 1);
     assert!(!simulation.problem().inertias.is_empty());
