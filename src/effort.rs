@@ -184,9 +184,9 @@ impl Effort {
 
     /// The next class of an island, and for how long it has been calm.
     fn next(&self, island: &Island) -> (u8, u8) {
-        let (need, class) = (island.counted_need(), island.class);
+        let (need, class) = (island.counted_need(), island.class.min(self.highest));
         let wanted = class_for(need);
-        if wanted >= class || class > self.highest {
+        if wanted >= class {
             return (wanted.min(self.highest), 0);
         }
         if need > CALM_SHARE * sag_factor(class - 1) {
@@ -271,6 +271,8 @@ mod tests {
         let effort = Effort { highest: 3, ..Effort::default() };
         assert_eq!(effort.next(&island(20.0, 0, 0)), (3, 0));
         assert_eq!(effort.next(&island(1e9, 0, 0)), (3, 0), "no higher than the settings allow");
+        assert_eq!(effort.next(&island(40.0, 5, 0)).0, 3, "as high as the settings allow now");
+        assert_eq!(effort.next(&island(0.0, 5, 0)), (3, 1), "and no lower at once");
         assert_eq!(effort.next(&island(2.1, 2, 30)), (2, 0), "class 1 would be near its limit");
         assert_eq!(effort.next(&island(1.9, 2, 30)), (2, 31));
         assert_eq!(effort.next(&island(1.9, 2, CALM_STEPS - 1)), (1, 0));

@@ -133,9 +133,7 @@ impl Sleep {
             self.activity[i] = match body.kind {
                 BodyKind::Dynamic if self.asleep[i] => Activity::Still,
                 BodyKind::Dynamic => Activity::Awake,
-                BodyKind::Kinematic if body.linear_velocity != Vec3::ZERO || body.angular_velocity != Vec3::ZERO => {
-                    Activity::Moving
-                }
+                BodyKind::Kinematic if body.is_driven() => Activity::Moving,
                 _ if self.left[i] != Snapshot::of(body) => Activity::Moving,
                 _ => Activity::Still,
             };

@@ -186,6 +186,25 @@ fn a_plate_that_moves_ties_what_lies_on_it() {
     }
 }
 
+/// A rod that hangs from a plate which moves follows the plate's substeps, on lanes as on the reference.
+#[test]
+fn a_plate_that_moves_ties_what_hangs_from_it() {
+    let mut scene = on_a_plate(0.01);
+    let at = scene.world.bodies[0].position + Vec3::new(0.0, -3.0, 0.0);
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z);
+    let rod = scene.world.add(rod);
+    scene.world.join(BallJoint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 10);
+    assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(0));
+    assert!(simulation.substeps_of(rod) >= 32 && simulation.world.joint_gap() < 1e-3);
+    let mut open = |i: usize| {
+        Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<dyn Backend> } else { Box::new(Cpu::new()) })
+    };
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 20, || ()).expect("both run");
+    assert!(found.first.is_none(), "{:?}", found.first);
+}
+
 /// Bodies and constraints of islands of several classes, tied by joints too, are of the same blocks.
 #[test]
 fn several_efforts_keep_what_backends_rely_on() {

@@ -1,7 +1,5 @@
 //! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
-use glam::Vec3;
-
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
 use super::points_a_slot;
@@ -13,7 +11,7 @@ use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
 #[derive(Clone, Debug, Default)]
@@ -105,17 +103,14 @@ impl ContactRows {
         world: &'a World,
         detector: &'a Detector,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
-        let is_driven = |b: &Body| {
-            b.kind == BodyKind::Kinematic && (b.linear_velocity != Vec3::ZERO || b.angular_velocity != Vec3::ZERO)
-        };
-        let any_driven = world.bodies.iter().any(is_driven);
+        let any_driven = world.bodies.iter().any(Body::is_driven);
         let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
         all.map(move |(slot, edge)| {
             let (mut a, mut b) = (edge.a, edge.b);
             if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
                 let pair = detector.pair(slot.world, slot.pair);
                 for (end, body) in [(&mut a, pair.body_a), (&mut b, pair.body_b)] {
-                    if is_driven(&world.bodies[body as usize]) {
+                    if world.bodies[body as usize].is_driven() {
                         *end = body;
                     }
                 }

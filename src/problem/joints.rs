@@ -176,10 +176,19 @@ impl JointRows {
         self.needs.iter().any(|&need| need > 1.0)
     }
 
-    /// The joints that take part, for the effort of their islands.
+    /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
     pub fn interfaces(&self, world: &World, asleep: &[bool]) -> impl Iterator<Item = Interface> + Clone {
-        let awake = self.edges.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
-        awake.map(|(i, edge)| Interface { a: edge.a, b: edge.b, need: self.needs.get(i).copied().unwrap_or(0.0) })
+        let awake = self.joints.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
+        let end = |body: usize| match world.bodies[body].kind {
+            BodyKind::Dynamic => body as u32,
+            _ if world.bodies[body].is_driven() => body as u32,
+            _ => IMMOVABLE,
+        };
+        awake.map(move |(i, joint)| Interface {
+            a: end(joint.body_a),
+            b: joint.body_b.map_or(IMMOVABLE, end),
+            need: self.needs.get(i).copied().unwrap_or(0.0),
+        })
     }
 
     /// Whether a joint is solved at once with others, and not swept.

@@ -201,6 +201,11 @@ impl Body {
         self.mass = MassProperties::from_parry(&masses.sum(), self.density);
     }
 
+    /// Whether it is kinematic and moves.
+    pub fn is_driven(&self) -> bool {
+        self.kind == BodyKind::Kinematic && (self.linear_velocity != Vec3::ZERO || self.angular_velocity != Vec3::ZERO)
+    }
+
     /// Half of the smallest side of the thinnest of its shapes (m); infinite without shapes.
     pub fn smallest_half_extent(&self) -> f32 {
         self.colliders.iter().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)
