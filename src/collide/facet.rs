@@ -13,8 +13,9 @@ use parry3d::query::details::{NormalConstraints, contact_support_map_support_map
 use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
-use super::query::ask;
-use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, ParryManifold, Patch, Solid, add_above, clip, clip_to};
+use super::solid::{
+    ClipBuffers, ContactQuery, DEEP, EXACT, ParryManifold, Patch, Solid, add_above, ask, clip, clip_to,
+};
 
 /// The contact of a half-space with a convex shape at `pos12`; none for a ball.
 pub(super) fn half_space_contact(

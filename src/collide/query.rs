@@ -2,12 +2,11 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::details::{NormalConstraints, contact_manifold_cuboid_cuboid};
-use parry3d::query::{DefaultQueryDispatcher, PersistentQueryDispatcher};
-use parry3d::shape::{Shape, SharedShape};
+use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::shape::SharedShape;
 
 use super::facet::half_space_contact;
-use super::solid::{ClipBuffers, ContactQuery, DEEP, ParryManifold, Solid, add_above, clip_to};
+use super::solid::{ClipBuffers, ContactQuery, DEEP, ParryManifold, Solid, add_above, ask, clip_to};
 
 /// How far a distance may be from that along its normal, relative to the thinner shape's smallest half extent.
 const TRUE: f32 = 0.01;
@@ -117,17 +116,6 @@ fn searched_contact(
         None => {}
     }
     found
-}
-
-/// parry's answer, with normals of a within `cone`. Every pair of convex shapes is supported.
-pub(super) fn ask(
-    (a, b): (&dyn Shape, &dyn Shape),
-    pos12: &Pose,
-    cone: Option<&dyn NormalConstraints>,
-    prediction: f32,
-    found: &mut ParryManifold,
-) {
-    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
 }
 
 /// The contact of `other` across the face of `solid` with the unit normal `face`.

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::{ContactManifold, TrackedContact};
+use parry3d::query::details::NormalConstraints;
+use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
 
 /// parry's manifold, without data of drystone.
@@ -188,4 +189,15 @@ impl<'a> Solid<'a> {
             TrackedContact::new(at - normal * height, on_surface, features[0], features[1], height - self.radius)
         })
     }
+}
+
+/// parry's answer, with normals of a within `cone`. Every pair of convex shapes is supported.
+pub(super) fn ask(
+    (a, b): (&dyn Shape, &dyn Shape),
+    pos12: &Pose,
+    cone: Option<&dyn NormalConstraints>,
+    prediction: f32,
+    found: &mut ParryManifold,
+) {
+    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
 }

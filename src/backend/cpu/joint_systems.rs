@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::bodies::State;
-use super::lane_layout::LaneLayout;
+use super::lane_layout::{ImpulsePlace, LaneLayout};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::shared::Shared;
 use super::simd::{Lanes, WIDTH, Wide, Work};
@@ -15,15 +15,6 @@ use crate::kernels::joint_system::{
 use crate::kernels::{Joint, Mass, Pair, Sym3};
 use crate::math::{Vec3, vec3};
 use crate::problem::{JointRow, JointSystems, StepProblem};
-
-/// The place of the impulse of a joint among the lanes.
-#[derive(Clone, Copy, Default)]
-pub(super) struct ImpulsePlace {
-    /// Its sixteen impulses.
-    pub row: u32,
-    /// Its number among them.
-    pub lane: u32,
-}
 
 /// The systems of a step, and the places of their joints.
 #[derive(Default)]

@@ -7,7 +7,6 @@ use std::ops::Range;
 
 use super::bodies::place;
 use super::constraint::Constraint;
-use super::joint_systems::ImpulsePlace;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::shared::Shared;
 use super::simd::{Lanes, Portable, WIDTH, Wide};
@@ -29,6 +28,15 @@ pub(super) struct LaneGroup {
     first: u32,
     /// Impulses; one of them is the patch, if there are patches.
     count: u32,
+}
+
+/// The place of the impulse of a joint among the lanes.
+#[derive(Clone, Copy, Default)]
+pub(super) struct ImpulsePlace {
+    /// Its sixteen impulses.
+    pub row: u32,
+    /// Its number among them.
+    pub lane: u32,
 }
 
 /// The row of a lane without a constraint.

@@ -29,7 +29,8 @@ impl RunReport {
             row("asleep", all.unwrap_or_else(|| format!("{} of {} bodies", self.asleep, self.bodies)) + &first);
         }
         if self.most_substeps > substeps {
-            let each: Vec<_> = self.efforts.iter().map(|row| format!("{} with {}", row.bodies, row.substeps)).collect();
+            let each: Vec<_> =
+                self.efforts.iter().map(|row| format!("{} bodies with {}", row.bodies, row.substeps)).collect();
             let why = self.hardest_contact.filter(|hardest| hardest.need > 1.0).map_or_else(String::new, |hardest| {
                 let bodies: Vec<_> = hardest.bodies.iter().flatten().map(|body| format!("body {body}")).collect();
                 format!(
@@ -38,7 +39,7 @@ impl RunReport {
                     hardest.need
                 )
             });
-            row("substeps", format!("{} bodies, at most {}{why}", each.join(", "), self.most_substeps));
+            row("substeps", format!("{}, at most {}{why}", each.join(", "), self.most_substeps));
         }
         if let Some(gap) = self.joint_gap {
             row("joints", format!("{}, {:.3} mm apart at most", self.joints, gap * 1e3));
