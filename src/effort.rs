@@ -37,6 +37,8 @@ pub struct Effort {
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
     highest: u8,
+    /// Bodies that can be pushed, asleep or not.
+    movable: u32,
     /// Bodies that are awake and can be pushed, class by class.
     counts: [u32; EFFORT_CLASSES],
     islands: Islands,
@@ -98,27 +100,29 @@ impl Effort {
         (config.max_substeps / config.substeps).checked_ilog2().unwrap_or(0) as u8
     }
 
-    /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` are the contacts and joints between bodies that are
-    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives.
-    pub fn follow(
+    /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` gives the contacts and joints between bodies that are
+    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives. Where no body is
+    /// above class 0 and none has to be, nothing goes over them.
+    pub fn follow<I: Iterator<Item = Interface> + Clone>(
         &mut self,
         world: &World,
         asleep: &[bool],
         config: &SolverConfig,
         dt: f32,
         is_above: bool,
-        interfaces: impl Iterator<Item = Interface> + Clone,
+        interfaces: impl FnOnce() -> I,
     ) -> bool {
         self.highest = Self::highest(config);
         let is_first = self.classes.is_empty();
         if is_first {
             self.classes.resize(world.bodies.len(), 0);
             self.calm_for.resize(world.bodies.len(), 0);
+            self.movable = world.dynamic_count() as u32;
             if self.highest > 0 {
                 self.begin(world, config, dt);
             }
         }
-        (is_first || self.any_above || is_above) && self.follow_islands(world, asleep, interfaces)
+        (is_first || self.any_above || is_above) && self.follow_islands(world, asleep, interfaces())
     }
 
     /// Classes by the loads of statics.
@@ -195,13 +199,13 @@ impl Effort {
         if island.calm_for + 1 < CALM_STEPS { (class, island.calm_for + 1) } else { (class - 1, 0) }
     }
 
-    /// Bodies that are awake and can be pushed, class by class; `bodies` of them in all.
-    pub fn counts(&self, bodies: u32) -> [u32; EFFORT_CLASSES] {
-        if self.used.len() > 1 || self.used.last().is_some_and(|&class| class > 0) {
+    /// Bodies that are awake and can be pushed, class by class, where so many sleep.
+    pub fn counts(&self, asleep: usize) -> [u32; EFFORT_CLASSES] {
+        if self.any_above {
             return self.counts;
         }
         let mut counts = [0; EFFORT_CLASSES];
-        counts[0] = bodies;
+        counts[0] = self.movable - asleep as u32;
         counts
     }
 

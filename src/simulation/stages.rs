@@ -172,7 +172,7 @@ impl Stages {
                 contacts.sort(detector, problem);
             }
             let asleep = sleep.asleep();
-            let interfaces = contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
+            let interfaces = || contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
             effort.follow(world, asleep, config, dt, is_above, interfaces)
         })
@@ -195,8 +195,7 @@ impl Stages {
                 self.plan_key = Some(PlanKey::of(problem));
             }
         });
-        let awake = problem.masses.iter().filter(|mass| mass.inv_mass > 0.0).count();
-        stats.efforts = effort.counts(awake as u32);
+        stats.efforts = effort.counts(sleep.count());
         stats.pairs = found.pairs;
         stats.computed = found.computed;
         stats.manifolds = contacts.coloring.order.len();
