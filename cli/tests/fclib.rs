@@ -21,6 +21,15 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).expect("text")
 }
 
+/// Fails unless the program refuses the arguments in one line that names all of `named`.
+#[track_caller]
+fn refused(folder: &Path, arguments: &str, named: &[&str]) {
+    let output = run(folder, arguments);
+    let line = text(&output.stderr);
+    assert_eq!((output.status.code(), line.lines().count()), (Some(2), 1), "{arguments}: {line}");
+    assert!(named.iter().all(|part| line.contains(part)), "{arguments}: {line}");
+}
+
 #[test]
 fn an_exported_problem_is_the_same_problem() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -76,10 +85,7 @@ fn bad_input_ends_in_one_line_that_names_the_file_and_nothing_is_written() {
         ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: nothing touches"]),
         ("solve torn.hdf5", &["torn.hdf5: not a whole HDF5 file"]),
     ] {
-        let output = run(folder.path(), arguments);
-        let line = text(&output.stderr);
-        assert_eq!((output.status.code(), line.lines().count()), (Some(2), 1), "{arguments}: {line}");
-        assert!(named.iter().all(|part| line.contains(part)), "{arguments}: {line}");
+        refused(folder.path(), arguments, named);
     }
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), before);
 }
@@ -130,9 +136,6 @@ fn a_problem_without_bodies_is_solved_in_double_precision_and_refused_on_lanes_a
         ("solve rolling.hdf5", &["rolling.hdf5: fclib_local_rolling: rolling friction cannot be read"]),
         ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, and bodies are needed"]),
     ] {
-        let output = run(folder.path(), arguments);
-        let line = text(&output.stderr);
-        assert_eq!((output.status.code(), line.lines().count()), (Some(2), 1), "{arguments}: {line}");
-        assert!(named.iter().all(|part| line.contains(part)), "{arguments}: {line}");
+        refused(folder.path(), arguments, named);
     }
 }

@@ -69,11 +69,22 @@ pub fn lay_out(
     (contacts, joints): (&ContactRows, &JointRows),
     problem: &mut StepProblem,
 ) {
-    problem.order.clear();
-    problem.colors.clear();
-    problem.colors.push(0);
+    let StepProblem {
+        order,
+        colors,
+        blocks,
+        bodies,
+        inertias,
+        contacts: rows,
+        joints: joint_rows,
+        systems,
+        turning,
+        ..
+    } = problem;
+    order.clear();
+    colors.clear();
+    colors.push(0);
     let count = effort.block_count();
-    let mut blocks = std::mem::take(&mut problem.blocks);
     blocks.clear();
     blocks.extend((0..count).map(|block| {
         let substeps = config.substeps << effort.class_of_block(block);
@@ -83,49 +94,43 @@ pub fn lay_out(
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
     if count == 1 {
-        problem.order.extend_from_slice(&contacts.coloring.order);
-        problem.colors.clone_from(&contacts.coloring.offsets);
+        order.extend_from_slice(&contacts.coloring.order);
+        colors.clone_from(&contacts.coloring.offsets);
         blocks[0].contacts = [0, contacts.coloring.color_count() as u32];
     } else {
         for (i, block) in blocks.iter_mut().enumerate() {
-            block.contacts = deal_colors(&contacts.coloring, problem, |problem, row| {
-                let contact = &problem.contacts[row as usize];
-                block_of_pair([contact.body_a, contact.body_b]) == i
-            });
+            let is_of = |row: u32| block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
+            block.contacts = deal_colors(&contacts.coloring, order, colors, is_of);
         }
     }
     // The bodies of a joint that can move are of one island, and those of a system.
-    let is_of = |problem: &StepProblem, joint: u32, block: usize| {
-        let row = &problem.joints[joint as usize];
+    let is_of = |joint: u32, block: usize| {
+        let row = &joint_rows[joint as usize];
         takes_part(world, asleep, joint) && block_of_pair([row.body_a, row.body_b]) == block
     };
     for (i, block) in blocks.iter_mut().enumerate() {
-        let of_kind = |is_direct: bool| {
-            move |problem: &StepProblem, joint: u32| joints.is_direct(joint) == is_direct && is_of(problem, joint, i)
-        };
-        let [first, direct] = deal_colors(&joints.coloring, problem, of_kind(false));
-        let [_, end] = deal_colors(&joints.coloring, problem, of_kind(true));
+        let of_kind = |is_direct: bool| move |joint: u32| joints.is_direct(joint) == is_direct && is_of(joint, i);
+        let [first, direct] = deal_colors(&joints.coloring, order, colors, of_kind(false));
+        let [_, end] = deal_colors(&joints.coloring, order, colors, of_kind(true));
         (block.joints, block.direct) = ([first, end], direct);
     }
     for (i, block) in blocks.iter_mut().enumerate() {
-        let own = (0..problem.bodies.len() as u32).filter(|&body| count == 1 || block_of(body) == i);
-        block.bodies = push_color(&mut problem.order, &mut problem.colors, own);
+        let own = (0..bodies.len() as u32).filter(|&body| block_of(body) == i);
+        block.bodies = push_color(order, colors, own);
     }
     for (i, block) in blocks.iter_mut().enumerate() {
-        let own = (0..).zip(&problem.inertias).filter(|(_, row)| block_of(row.body) == i).map(|(row, _)| row);
-        block.inertias = push_color(&mut problem.order, &mut problem.colors, own);
+        let own = (0..).zip(&*inertias).filter(|(_, row)| block_of(row.body) == i).map(|(row, _)| row);
+        block.inertias = push_color(order, colors, own);
     }
     for (i, block) in blocks.iter_mut().enumerate() {
-        let first_joint = |system: u32| problem.systems.nodes[problem.systems.nodes_of(system as usize).start].joint;
-        let systems = 0..problem.systems.len() as u32;
-        let own: Vec<u32> = systems.filter(|&system| is_of(problem, first_joint(system), i)).collect();
-        block.systems = push_color(&mut problem.order, &mut problem.colors, own.into_iter());
+        let first_joint = |system: u32| systems.nodes[systems.nodes_of(system as usize).start].joint;
+        let own = (0..systems.len() as u32).filter(|&system| is_of(first_joint(system), i));
+        block.systems = push_color(order, colors, own);
     }
     for (i, block) in blocks.iter_mut().enumerate() {
-        let own = (0..).zip(&problem.turning).filter(|(_, row)| block_of(row.body) == i).map(|(row, _)| row);
-        block.turning = push_color(&mut problem.order, &mut problem.colors, own);
+        let own = (0..).zip(&*turning).filter(|(_, row)| block_of(row.body) == i).map(|(row, _)| row);
+        block.turning = push_color(order, colors, own);
     }
-    problem.blocks = blocks;
 }
 
 /// Makes a color of some rows; returns its number.
@@ -138,20 +143,18 @@ fn push_color(order: &mut Vec<u32>, colors: &mut Vec<u32>, rows: impl Iterator<I
 /// Adds the colors of a coloring that have wanted rows, with these rows only; returns the first of them and one past the last.
 fn deal_colors(
     coloring: &Coloring,
-    problem: &mut StepProblem,
-    is_wanted: impl Fn(&StepProblem, u32) -> bool,
+    order: &mut Vec<u32>,
+    colors: &mut Vec<u32>,
+    is_wanted: impl Fn(u32) -> bool,
 ) -> [u32; 2] {
-    let first = problem.colors.len() as u32 - 1;
+    let first = colors.len() as u32 - 1;
     for color in coloring.offsets.windows(2) {
-        let begin = problem.order.len();
-        for &row in &coloring.order[color[0] as usize..color[1] as usize] {
-            if is_wanted(problem, row) {
-                problem.order.push(row);
-            }
-        }
-        if problem.order.len() > begin {
-            problem.colors.push(problem.order.len() as u32);
+        let begin = order.len();
+        let rows = coloring.order[color[0] as usize..color[1] as usize].iter().copied();
+        order.extend(rows.filter(|&row| is_wanted(row)));
+        if order.len() > begin {
+            colors.push(order.len() as u32);
         }
     }
-    [first, problem.colors.len() as u32 - 1]
+    [first, colors.len() as u32 - 1]
 }

@@ -1,8 +1,7 @@
 //! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
 
 use super::StepProblem;
-use super::rows::{ContactRow, ImpulseRow, PointRow};
-use super::softness::contact_softness;
+use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
 
@@ -20,13 +19,8 @@ pub struct StepScale {
 impl StepScale {
     /// That of steps of `dt` seconds.
     pub fn new(config: &SolverConfig, dt: f32) -> Self {
-        let substep = dt / config.substeps as f32;
-        let compliance = |ratio| contact_softness(config, substep, ratio).compliance();
-        Self {
-            substep,
-            movable_compliance: compliance(1.0),
-            fixed_compliance: compliance(config.fixed_contact_frequency_ratio),
-        }
+        let Substep { length, movable, fixed, .. } = Substep::new(config, dt / config.substeps as f32);
+        Self { substep: length, movable_compliance: movable.compliance(), fixed_compliance: fixed.compliance() }
     }
 }
 

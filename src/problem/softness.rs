@@ -38,7 +38,7 @@ impl Substep {
 }
 
 /// How overlap is removed, for contacts of `ratio` times the frequency.
-pub(super) fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
+fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
     match config.stabilization {
         Stabilization::Soft => {
             softness(config.contact_frequency / h * ratio, config.contact_damping, h, config.push_limit)
