@@ -21,20 +21,8 @@ fn joint_column(pair: ptr<function, Pair>, anchors: Anchors, e: vec3f) -> vec3f 
 // Rounding changes the determinant of a block of trace 1 to 2 by 3e-7; this is 2^-19.
 const STIFFENING: f32 = 1.9073486328125e-6;
 
-// Solves the symmetric block with these columns for u, by Cramer's rule. The block is scaled to a trace of 1 to 2 before: the
-// determinant of that of 1e7 kg would leave single precision. One that rounding may make indefinite is made stiffer by a little.
+// Solves the symmetric block with these columns for u, by Cramer's rule.
 fn solve_block(column_x: vec3f, column_y: vec3f, column_z: vec3f, u: vec3f) -> vec3f {
-    let scale = inverse_power(column_x.x + column_y.y + column_z.z);
-    var x = column_x * scale;
-    var y = column_y * scale;
-    var z = column_z * scale;
-    let is_thin = STIFFENING > dot3(x, cross3(y, z));
-    let more = select(0.0, STIFFENING, is_thin);
-    x.x = x.x + more;
-    y.y = y.y + more;
-    z.z = z.z + more;
-    let c_x = cross3(y, z);
-    let c_y = cross3(z, x);
-    let c_z = cross3(x, y);
-    return vec3f(dot3(c_x, u), dot3(c_y, u), dot3(c_z, u)) * reciprocal(dot3(x, c_x)) * scale;
+    let c = cofactors(column_x, column_y, column_z, STIFFENING);
+    return vec3f(dot3(c.x, u), dot3(c.y, u), dot3(c.z, u)) * reciprocal(c.determinant) * c.scale;
 }

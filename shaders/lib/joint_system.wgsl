@@ -46,20 +46,9 @@ fn with_diagonal(m: mat3x3f, more: f32) -> mat3x3f {
 
 // The inverse of a pivot. A pivot that rounding may have made indefinite is made stiffer by a little.
 fn inverse_pivot(pivot: mat3x3f) -> mat3x3f {
-    let scale = inverse_power(pivot[0].x + pivot[1].y + pivot[2].z);
-    var x = pivot[0] * scale;
-    var y = pivot[1] * scale;
-    var z = pivot[2] * scale;
-    let is_thin = PIVOT_STIFFENING > dot3(x, cross3(y, z));
-    let more = select(0.0, PIVOT_STIFFENING, is_thin);
-    x.x = x.x + more;
-    y.y = y.y + more;
-    z.z = z.z + more;
-    let c_x = cross3(y, z);
-    let c_y = cross3(z, x);
-    let c_z = cross3(x, y);
-    let inverse = reciprocal(dot3(x, c_x)) * scale;
-    return mat3x3f(c_x * inverse, c_y * inverse, c_z * inverse);
+    let c = cofactors(pivot[0], pivot[1], pivot[2], PIVOT_STIFFENING);
+    let inverse = reciprocal(c.determinant) * c.scale;
+    return mat3x3f(c.x * inverse, c.y * inverse, c.z * inverse);
 }
 
 // The turn that a unit impulse at the arm r gives a body, axis by axis: I^-1 (r x e).

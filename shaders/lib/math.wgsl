@@ -69,3 +69,22 @@ fn renormalized(q: vec4f) -> vec4f {
     let s = 1.5 - 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     return vec4f(q.x * s, q.y * s, q.z * s, q.w * s);
 }
+
+// What the inverse of a symmetric block is made of.
+struct Cofactors { x: vec3f, y: vec3f, z: vec3f, determinant: f32, scale: f32 }
+
+// The cofactors of the symmetric block with these columns, scaled to a trace of 1 to 2 before. One whose determinant is below `stiffening`
+// is made stiffer by that. Double: src/kernels/joint.rs.
+fn cofactors(column_x: vec3f, column_y: vec3f, column_z: vec3f, stiffening: f32) -> Cofactors {
+    let scale = inverse_power(column_x.x + column_y.y + column_z.z);
+    var x = column_x * scale;
+    var y = column_y * scale;
+    var z = column_z * scale;
+    let is_thin = stiffening > dot3(x, cross3(y, z));
+    let more = select(0.0, stiffening, is_thin);
+    x.x = x.x + more;
+    y.y = y.y + more;
+    z.z = z.z + more;
+    let c_x = cross3(y, z);
+    return Cofactors(c_x, cross3(z, x), cross3(x, y), dot3(x, c_x), scale);
+}

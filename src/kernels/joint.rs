@@ -25,22 +25,38 @@ pub fn joint_column<L: Lane>(pair: &Pair<L>, anchors: [Vec3<L>; 2], e: Vec3<L>) 
     e * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning
 }
 
-/// Solves the symmetric block with these columns for u, by Cramer's rule. The block is scaled to a trace of 1 to 2 before: the
-/// determinant of that of 1e7 kg would leave single precision.
+/// Double of the WGSL struct `Cofactors`: what the inverse of a symmetric block is made of.
+pub(super) struct Cofactors<L> {
+    pub x: Vec3<L>,
+    pub y: Vec3<L>,
+    pub z: Vec3<L>,
+    pub determinant: L,
+    /// The factor that the block was scaled by.
+    pub scale: L,
+}
+
+/// The cofactors of the symmetric block with these columns. The block is scaled to a trace of 1 to 2 before: the determinant of that of
+/// 1e7 kg would leave single precision.
 ///
 /// A ball of 1 mm at the end of 1 m is 2.5e6 times as hard to move along the arm as across it: rounding makes such a block
-/// indefinite. One that is near to that is made stiffer by a little, so that corrections along the arm are too small, never too large.
+/// indefinite. One whose determinant is below `stiffening` is made stiffer by that, so that corrections along the arm are too small, never
+/// too large.
 #[inline(always)]
-fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<L> {
+pub(super) fn cofactors<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, stiffening: f64) -> Cofactors<L> {
     let scale = (x.x + y.y + z.z).inverse_power();
     let (mut x, mut y, mut z) = (x * scale, y * scale, z * scale);
-    let is_thin = L::constant(STIFFENING).gt(dot3(x, cross3(y, z)));
-    let more = L::select(L::constant(0.0), L::constant(STIFFENING), is_thin);
+    let is_thin = L::constant(stiffening).gt(dot3(x, cross3(y, z)));
+    let more = L::select(L::constant(0.0), L::constant(stiffening), is_thin);
     (x.x, y.y, z.z) = (x.x + more, y.y + more, z.z + more);
     let c_x = cross3(y, z);
-    let c_y = cross3(z, x);
-    let c_z = cross3(x, y);
-    vec3(dot3(c_x, u), dot3(c_y, u), dot3(c_z, u)) * reciprocal(dot3(x, c_x)) * scale
+    Cofactors { x: c_x, y: cross3(z, x), z: cross3(x, y), determinant: dot3(x, c_x), scale }
+}
+
+/// Solves the symmetric block with these columns for u, by Cramer's rule.
+#[inline(always)]
+fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<L> {
+    let c = cofactors(x, y, z, STIFFENING);
+    vec3(dot3(c.x, u), dot3(c.y, u), dot3(c.z, u)) * reciprocal(c.determinant) * c.scale
 }
 
 /// Rounding changes the determinant of a block of trace 1 to 2 by 3e-7; this is 2^-19.

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::Rules;
-use super::joint::current_anchors;
+use super::joint::{cofactors, current_anchors};
 use super::pair::{apply_impulse, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams, Sym3};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
@@ -95,16 +95,9 @@ const STIFFENING: f64 = 7.629_394_531_25e-6;
 #[inline(always)]
 pub fn inverse_pivot<L: Lane>(pivot: &Block<L>) -> Block<L> {
     let [x, y, z] = [pivot.column(0), pivot.column(1), pivot.column(2)];
-    let scale = (x.x + y.y + z.z).inverse_power();
-    let (mut x, mut y, mut z) = (x * scale, y * scale, z * scale);
-    let is_thin = L::constant(STIFFENING).gt(dot3(x, cross3(y, z)));
-    let more = L::select(L::constant(0.0), L::constant(STIFFENING), is_thin);
-    (x.x, y.y, z.z) = (x.x + more, y.y + more, z.z + more);
-    let c_x = cross3(y, z);
-    let c_y = cross3(z, x);
-    let c_z = cross3(x, y);
-    let inverse = reciprocal(dot3(x, c_x)) * scale;
-    Block::of(c_x * inverse, c_y * inverse, c_z * inverse)
+    let c = cofactors(x, y, z, STIFFENING);
+    let inverse = reciprocal(c.determinant) * c.scale;
+    Block::of(c.x * inverse, c.y * inverse, c.z * inverse)
 }
 
 /// An inverse inertia that turned with its body by q since the step began. Kernel `turn_inertias`.
