@@ -388,6 +388,20 @@ fn a_sweep_leaves_the_normal_velocity_that_closes_a_gap_or_pushes_out_overlap() 
     assert!((pressed(relax, &half, -0.01, 0.0).0 + 1.5).abs() < 1e-13, "half of the correction");
 }
 
+/// A spring that would push faster than the limit pushes with the limit, whatever the load: it gives nothing of its impulse back.
+#[test]
+fn a_contact_at_its_limit_of_speed_bears_its_whole_load() {
+    let softness = SoftnessOf { bias_rate: 50.0, mass_scale: 0.75, impulse_scale: 0.25, push_limit: 2.0 };
+    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, movable: softness, ..StepParams::default() };
+    let case = case();
+    let mass = 1.0 / case.dense(case.normal, case.normal);
+    for load in [0.0, 0.2, 7.0] {
+        let (_, impulse) = pressed(Rules { biased: true, ..Rules::default() }, &params, -10.0, load);
+        let change = 0.75 * mass * (3.0 + 2.0);
+        assert!((impulse - load - change).abs() < 1e-14 * (1.0 + load), "{load}: {impulse}");
+    }
+}
+
 /// u + bias_rate s + r / (mass ...) = 0: the share of the mass that acts, and the impulse that is given back.
 #[test]
 fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {

@@ -37,6 +37,20 @@ fn most_substeps(simulation: &Simulation) -> u32 {
     (0..simulation.world.bodies.len()).map(|body| simulation.substeps_of(body)).max().expect("a body")
 }
 
+/// The limit of the push is one of speed: a spring that it held to a force let every load above 1e4 times the mass sink through.
+#[test]
+fn a_cube_bears_one_of_a_million_times_its_mass() {
+    for (ratio, least) in [("top_ratio=1e5", 256), ("top_ratio=1e6", 1024)] {
+        let scene = find("tower", &["n=2", ratio]);
+        let mut simulation = started(&scene, SolverConfig::default());
+        run(&mut simulation, 600);
+        assert_eq!(out_of_place(&scene, &simulation), 0, "{ratio}");
+        assert!((least..=1024).contains(&most_substeps(&simulation)), "{ratio}: {}", most_substeps(&simulation));
+        let deepest = simulation.penetration().max;
+        assert!(deepest < 3e-3, "{ratio}: {deepest} m");
+    }
+}
+
 /// Towers that fall with 8 substeps stand at the default, and their cubes overlap by half a millimeter at most.
 #[test]
 fn heavy_tops_stand_with_the_substeps_that_they_need() {

@@ -34,12 +34,15 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
-    let pushed = larger(softness.bias_rate * smaller(s + params.slop, 0.0), -softness.push_limit);
+    let pushed = softness.bias_rate * smaller(s + params.slop, 0.0);
     let bias = select(select(0.0, pushed, rules.biased), s * pass_row.inverse_substep, apart);
     let mass_scale = select(select(1.0, softness.mass_scale, rules.biased), 1.0, apart);
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
-    let correction = -(point.normal_mass * mass_scale * (vn + bias)) - impulse_scale * (*impulse).normal;
+    let mass = point.normal_mass * mass_scale;
+    let spring = -(mass * (vn + bias)) - impulse_scale * (*impulse).normal;
+    // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
+    let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
     let sum = clamp_normal(rules, (*impulse).normal, params.relaxation * correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;

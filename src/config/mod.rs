@@ -135,7 +135,7 @@ impl Default for SolverConfig {
     fn default() -> Self {
         Self {
             substeps: 8,
-            max_substeps: 512,
+            max_substeps: 1024,
             max_penetration: 0.0,
             max_penetration_share: 0.015,
             iterations: 1,

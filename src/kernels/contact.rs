@@ -69,12 +69,15 @@ fn solve_normal<L: Lane>(
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s.gt(zero);
-    let pushed = larger(softness.bias_rate * smaller(s + params.slop, zero), -softness.push_limit);
+    let pushed = softness.bias_rate * smaller(s + params.slop, zero);
     let bias = L::select(if rules.biased { pushed } else { zero }, s * params.inverse_substep, apart);
     let mass_scale = L::select(if rules.biased { softness.mass_scale } else { one }, one, apart);
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
     let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
-    let correction = -(point.normal_mass * mass_scale * (vn + bias)) - impulse_scale * impulse.normal;
+    let mass = point.normal_mass * mass_scale;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
+    // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
+    let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
     let sum = clamp_normal(rules, impulse.normal, params.relaxation * correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
