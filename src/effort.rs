@@ -21,8 +21,10 @@ pub struct Interface {
     pub a: u32,
     /// The other one.
     pub b: u32,
-    /// How deep the contact would sag with the substeps of the settings, over the sag that they promise.
+    /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
     pub need: f32,
+    /// Whether it is a joint, which no other takes load from.
+    pub is_joint: bool,
 }
 
 /// The class of effort of each island.
@@ -51,6 +53,8 @@ pub struct Effort {
 struct Island {
     /// The largest need of its contacts.
     need: f32,
+    /// The largest need of its joints.
+    joint_need: f32,
     contacts: u32,
     bodies: u32,
     /// The highest class of its bodies, and the fewest steps for which any was calm.
@@ -59,12 +63,12 @@ struct Island {
 }
 
 impl Island {
-    const NONE: Self = Self { need: 0.0, contacts: 0, bodies: 0, class: 0, calm_for: u8::MAX };
+    const NONE: Self = Self { need: 0.0, joint_need: 0.0, contacts: 0, bodies: 0, class: 0, calm_for: u8::MAX };
 
     /// The need that counts. A column hands its load on through one contact a body and sways where that contact is soft; in a heap with several
     /// contacts a body, the load of a contact has other ways.
     fn counted_need(&self) -> f32 {
-        self.need * (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0)
+        (self.need * (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0)).max(self.joint_need)
     }
 }
 
@@ -136,7 +140,7 @@ impl Effort {
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
-            Interface { a, b, need: need as f32 }
+            Interface { a, b, need: need as f32, is_joint: false }
         };
         self.follow_islands(world, &[], loads.iter().filter(touches).map(interface));
     }
@@ -156,12 +160,13 @@ impl Effort {
         }
         self.of_root.clear();
         self.of_root.resize(bodies, Island::NONE);
-        for Interface { a, b, need } in interfaces {
+        for Interface { a, b, need, is_joint } in interfaces {
             let body = if a == IMMOVABLE { b } else { a };
             if body != IMMOVABLE {
                 let island = &mut self.of_root[self.islands.root(body) as usize];
-                island.need = island.need.max(need);
-                island.contacts += 1;
+                let of_kind = if is_joint { &mut island.joint_need } else { &mut island.need };
+                *of_kind = of_kind.max(need);
+                island.contacts += u32::from(!is_joint);
             }
         }
         let is_awake = |body: usize| asleep.get(body) != Some(&true) && world.bodies[body].kind != BodyKind::Fixed;
@@ -267,7 +272,7 @@ mod tests {
     }
 
     fn island(need: f32, class: u8, calm_for: u8) -> Island {
-        Island { need, contacts: 2, bodies: 2, class, calm_for }
+        Island { need, contacts: 2, bodies: 2, class, calm_for, ..Island::NONE }
     }
 
     #[test]
@@ -288,5 +293,6 @@ mod tests {
         assert_eq!(island(8.0, 0, 0).counted_need(), 8.0);
         assert_eq!(Island { contacts: 8, ..island(8.0, 0, 0) }.counted_need(), 2.0);
         assert_eq!(Island { contacts: 1, ..island(8.0, 0, 0) }.counted_need(), 8.0);
+        assert_eq!(Island { joint_need: 3.0, contacts: 8, ..island(8.0, 0, 0) }.counted_need(), 3.0);
     }
 }

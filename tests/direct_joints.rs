@@ -218,18 +218,18 @@ fn a_chain_that_falls_on_the_ground_lies_there() {
     let mut world = chain(30, 100.0);
     world.joints.remove(0);
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -0.6, 0.0));
-    let [direct, swept] = [JointSolver::Direct, JointSolver::Sweeps].map(|solver| {
+    for solver in [JointSolver::Direct, JointSolver::Sweeps] {
         let mut simulation = simulation(world.clone(), solver);
         let gap = largest_gap(&mut simulation, 900);
-        let fastest = simulation.world.bodies.iter().map(|b| b.linear_velocity.length()).fold(0.0, f32::max);
+        let speed = |body: usize| simulation.world.bodies[body].linear_velocity.length();
+        let (links, ball) = ((0..30).map(speed).fold(0.0, f32::max), speed(30));
         let overlap = simulation.penetration().max;
-        println!("{solver}: gap {gap} m, {fastest} m/s, overlap {overlap} m");
+        println!("{solver}: gap {gap} m, links {links} m/s, ball {ball} m/s, overlap {overlap} m");
         assert!(simulation.world.bodies[15].position.y < -0.4, "it did not fall");
         assert!(gap < 5e-3 && overlap < 5e-3, "gap {gap} m, overlap {overlap} m");
-        fastest
-    });
-    // The ball rolls on, with either.
-    assert!(direct < 2.0 * swept && direct < 0.05, "{direct} m/s, with sweeps {swept} m/s");
+        // The ball rolls on, with either.
+        assert!(links < 5e-3 && ball < 0.05, "{links} m/s, ball {ball} m/s");
+    }
 }
 
 fn joints_that_bear_little_are_swept_and_have_the_same_bits() {

@@ -51,6 +51,38 @@ fn a_cube_bears_one_of_a_million_times_its_mass() {
     }
 }
 
+/// Flat bodies sag by a share of their thickness: coins slide apart where cubes of the same load stand.
+#[test]
+fn sixty_coins_stand() {
+    let scene = find("coins", &[]);
+    let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+    run(&mut fixed, 1200);
+    assert!(out_of_place(&scene, &fixed) > 0, "coins stand with 8 substeps");
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 1200);
+    assert_eq!(out_of_place(&scene, &simulation), 0);
+    assert!((32..=64).contains(&most_substeps(&simulation)), "{}", most_substeps(&simulation));
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 0.05e-3, "{deepest} m");
+}
+
+/// The joints of a net are many for their bodies, and none takes load from another.
+#[test]
+fn a_net_under_a_heavy_ball_keeps_its_joints_closed() {
+    let scene = find("joint-grid", &["n=16", "ratio=300"]);
+    let largest_gap = |config: SolverConfig| {
+        let mut simulation = started(&scene, config);
+        (0..360).fold(0.0_f32, |gap, _| {
+            simulation.step(DT).expect("a step");
+            gap.max(simulation.world.joint_gap())
+        })
+    };
+    let fixed = largest_gap(SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+    assert!(fixed > 10e-3, "{fixed} m with 8 substeps");
+    let gap = largest_gap(SolverConfig::default());
+    assert!(gap < 1e-3, "{gap} m");
+}
+
 /// Towers that fall with 8 substeps stand at the default, and their cubes overlap by half a millimeter at most.
 #[test]
 fn heavy_tops_stand_with_the_substeps_that_they_need() {

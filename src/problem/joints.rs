@@ -41,6 +41,10 @@ pub struct JointRows {
 /// substeps are cheaper there.
 const MOST_TERMS_A_JOINT: usize = 24;
 
+/// The load on the joint of a pendulum that was let go level, at its lowest point, over its weight. Joints that bear many times the mass of
+/// their bodies are left to sweeps with this load in view.
+const SWING: f32 = 3.0;
+
 /// The system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;
 
@@ -97,7 +101,7 @@ impl JointRows {
             if problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
                 joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
             } else {
-                let need = gap / config.max_joint_gap_share;
+                let need = SWING * gap / config.max_joint_gap_share;
                 joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
             }
         }
@@ -188,6 +192,7 @@ impl JointRows {
             a: end(joint.body_a),
             b: joint.body_b.map_or(IMMOVABLE, end),
             need: self.needs.get(i).copied().unwrap_or(0.0),
+            is_joint: true,
         })
     }
 

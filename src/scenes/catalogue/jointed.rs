@@ -93,16 +93,18 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
 }
 
 /// `n` x `n` balls, each tied to its neighbors halfway between them, a plane sheet whose first row is tied to the world:
-/// it swings down from the horizontal.
-pub(super) fn grid(n: usize) -> Scene {
+/// it swings down from the horizontal. The ball in the middle of the last row has `ratio` times the mass of the others.
+pub(super) fn grid(n: usize, ratio: f32) -> Scene {
     const PITCH: f32 = 0.5;
     let mut world = World::new();
-    let ball = Body::dynamic().shape(Shape::ball(0.2));
+    let ball = |density: f32| Body::dynamic().shape(Shape::ball(0.2)).density(density);
+    let heavy = (n - 1) * n + n / 2;
     let (to_x, to_z) = (0.5 * PITCH * Vec3::X, 0.5 * PITCH * Vec3::Z);
     for i in 0..n * n {
         let (column, row) = (i % n, i / n);
         let place = Vec3::new((centered(column, n) * f64::from(PITCH)) as f32, 0.0, PITCH * (row as f32 + 0.5));
-        world.add(ball.clone().position(place.x, place.y, place.z));
+        let density = if i == heavy { 1000.0 * ratio } else { 1000.0 };
+        world.add(ball(density).position(place.x, place.y, place.z));
         if column > 0 {
             world.join(BallJoint::new(i - 1, to_x, i, -to_x));
         }
@@ -125,7 +127,7 @@ mod tests {
                 assert!(scene.world.joint_gap() < 1e-5, "{}: {}", scene.name, scene.world.joint_gap());
             }
         }
-        for scene in [bridge(1, 0), bridge(20, 5), bridge(7, 30), grid(1), grid(20)] {
+        for scene in [bridge(1, 0), bridge(20, 5), bridge(7, 30), grid(1, 300.0), grid(20, 1.0)] {
             assert!(scene.world.joint_gap() < 1e-5, "{}: {}", scene.name, scene.world.joint_gap());
         }
     }
@@ -134,7 +136,7 @@ mod tests {
     fn every_plank_has_four_joints_and_every_ball_of_the_grid_its_neighbors() {
         let count = |scene: Scene| (scene.world.dynamic_count(), scene.world.joints.len());
         assert_eq!(count(bridge(20, 5)), (25, 42));
-        assert_eq!(count(grid(20)), (400, 20 * 19 + 20 * 20));
+        assert_eq!(count(grid(20, 1.0)), (400, 20 * 19 + 20 * 20));
         assert_eq!(count(chain(20, 10.0, 90.0)), (21, 21));
     }
 }

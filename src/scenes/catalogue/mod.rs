@@ -114,6 +114,13 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| Ok(stacks::aligned(v[0] as usize)),
     },
     Entry {
+        name: "coins",
+        summary: "a straight stack of flat cylinders, 1 m wide and 4 cm thick: it stands",
+        parameters: &[Parameter::whole("n", 60, (1.0, 10_000.0), "number of coins")],
+        bodies: |v| v[0],
+        build: |v| Ok(stacks::coins(v[0] as usize)),
+    },
+    Entry {
         name: "misaligned",
         summary: "a stack of cubes, each off the axis by a fixed random shift: it stands",
         parameters: &[CUBES, Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]")],
@@ -208,9 +215,17 @@ pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "joint-grid",
         summary: "n x n balls on ball joints swing down from one edge: joints stay closed, energy does not grow",
-        parameters: &[Parameter::whole("n", 20, (1.0, 2000.0), "balls along each side")],
+        parameters: &[
+            Parameter::whole("n", 20, (1.0, 2000.0), "balls along each side"),
+            Parameter::real(
+                "ratio",
+                1.0,
+                (1e-6, 1e6),
+                "mass of the ball in the middle of the free edge relative to the others",
+            ),
+        ],
         bodies: |v| v[0] * v[0],
-        build: |v| Ok(jointed::grid(v[0] as usize)),
+        build: |v| Ok(jointed::grid(v[0] as usize, v[1] as f32)),
     },
     Entry {
         name: "arch",

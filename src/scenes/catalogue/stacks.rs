@@ -3,7 +3,7 @@
 use super::common::{centered, floor, unit_box};
 use crate::random::SplitMix64;
 use crate::scenes::scene::{Group, Scene};
-use crate::world::World;
+use crate::world::{Body, Shape, World};
 
 /// Adds `n` cubes on top of each other; `cube(k)` gives the k-th one's place along x and z (m) and its density (kg/m³).
 pub(super) fn stack(world: &mut World, n: usize, mut cube: impl FnMut(usize) -> ([f32; 2], f32)) {
@@ -28,6 +28,17 @@ fn in_turn(k: usize, offset: f32) -> f32 {
 /// A stack of `n` cubes, straight.
 pub(super) fn aligned(n: usize) -> Scene {
     standing("stack", n, |_| ([0.0; 2], 1000.0))
+}
+
+/// A straight stack of `n` cylinders, 1 m wide and 4 cm thick.
+pub(super) fn coins(n: usize) -> Scene {
+    const HALF: f32 = 0.02;
+    let mut world = floor(20.0, 20.0);
+    let coin = Body::dynamic().shape(Shape::cylinder(HALF, 0.5));
+    for k in 0..n {
+        world.add(coin.clone().position(0.0, (2 * k + 1) as f32 * HALF, 0.0));
+    }
+    Scene::new("coins", world, 600).standing()
 }
 
 /// A stack of `n` cubes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
