@@ -1,12 +1,15 @@
 //! `drystone report`: runs, stored rows, continued reports and pages.
 
 use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use drystone::{Error, Result, Scene, SolverConfig};
-use drystone_cli::report::comparison::{Contender, Drystone, Extent, Origin, Report, Survey, Team, scene};
+use drystone::{Error, Result, Scene, SolverConfig, World};
+use drystone_cli::report::comparison::{
+    Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, scene, scenes as all,
+};
 
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
@@ -98,6 +101,56 @@ fn rows_of_another_scene_program_or_setting_are_not_reused() {
     };
     assert_eq!(run(first(), &more, "a"), 5, "one more setting");
     assert_eq!(run(first(), &three, "a"), 5, "all of these are there");
+}
+
+#[test]
+fn a_brief_report_has_all_kinds_of_scenes_of_the_full_one_with_few_bodies() {
+    let kinds = |extent| -> BTreeSet<String> {
+        let name = |scene: Scene| scene.name.split(':').next().expect("a name").to_owned();
+        all(extent).unwrap().into_iter().map(name).collect()
+    };
+    let wanted = ["tower", "mass-ratio", "chain", "wall", "pile", "pile-mixed", "pyramid"].map(str::to_owned);
+    assert_eq!(kinds(Extent::Full), BTreeSet::from(wanted));
+    assert_eq!(kinds(Extent::Brief), kinds(Extent::Full));
+    assert!(all(Extent::Brief).unwrap().iter().all(|scene| scene.world.dynamic_count() <= 1000));
+}
+
+/// The same engine under another name: its rows are reached, but never overtaken for certain.
+#[test]
+fn a_report_with_another_engine_has_a_page_at_equal_error() {
+    struct Named(Drystone);
+    impl Contender for Named {
+        fn setting(&self) -> Setting {
+            Setting { engine: "other".into(), ..self.0.setting() }
+        }
+        fn step(&mut self) -> Result<()> {
+            self.0.step()
+        }
+        fn world(&mut self) -> &World {
+            self.0.world()
+        }
+    }
+    let other = |scene: &Scene, _: Extent| {
+        let config = SolverConfig::default().with(|c| c.substeps = 64);
+        Ok(vec![Box::new(Named(Drystone::new(scene, "cpu", &config)?)) as Box<dyn Contender>])
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("equal-error.md");
+    let alone = survey(&three, folder.path()).run(&origin("a"), &mut |_, _, _| ()).unwrap();
+    alone.write(folder.path()).unwrap();
+    assert!(!path.exists());
+    let both = Survey { teams: vec![&three, &other], ..survey(&three, folder.path()) };
+    both.run(&origin("a"), &mut |_, _, _| ()).unwrap().write(folder.path()).unwrap();
+    let text = std::fs::read_to_string(path).unwrap();
+    // 64 substeps leave less overlap than 4 while boxes settle.
+    assert!(
+        text.contains("| tower:n=2 | mean overlap | 1 | other cpu 64x1 |") && text.contains("not reached"),
+        "{text}"
+    );
+    assert!(
+        ["tower:n=2", "chain:links=2", "pile:n=8"].iter().all(|name| text.contains(&format!("## {name}\n"))),
+        "{text}"
+    );
 }
 
 #[test]

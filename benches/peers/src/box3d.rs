@@ -12,10 +12,8 @@ use drystone::{Body, Error, Result, Scene, World};
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::parry::shape::{TriMesh, TypedShape};
 
+use crate::round::{cone, cylinder};
 use crate::setting::setting;
-
-/// Sides of the hull that stands for something round.
-const SIDES: i32 = 32;
 
 /// Worlds are numbered in a table of the library that takes one caller at a time.
 static TABLE: Mutex<()> = Mutex::new(());
@@ -36,7 +34,7 @@ impl Box3d {
     /// A scene with everything at the library's defaults, but that nothing sleeps.
     pub(crate) fn new(scene: &Scene, substeps: u32, hertz: f32, threads: usize) -> Result<Self> {
         let world = scene.world.clone();
-        let _one_at_a_time = TABLE.lock().unwrap_or_else(|e| e.into_inner());
+        let one_at_a_time = TABLE.lock().unwrap_or_else(|e| e.into_inner());
         // SAFETY: definitions come from the library's own defaults, and nothing that they point to is dropped before the call returns.
         let mut new = unsafe {
             let mut def = b3DefaultWorldDef();
@@ -49,11 +47,10 @@ impl Box3d {
         };
         // Half a side of the box for a half-space: twice as far as anything is, and some.
         let reach = 2.0 * new.world.bodies.iter().map(|b| b.position.length()).fold(50.0, f32::max);
-        for index in 0..new.world.bodies.len() {
-            new.insert(index, reach)?;
-        }
-        new.join();
-        Ok(new)
+        let added = (0..new.world.bodies.len()).try_for_each(|index| new.insert(index, reach)).map(|()| new.join());
+        // A world that is dropped takes the lock.
+        drop(one_at_a_time);
+        added.map(|()| new)
     }
 
     fn insert(&mut self, index: usize, reach: f32) -> Result<()> {
@@ -165,16 +162,8 @@ unsafe fn add_shape(id: b3BodyId, body: &Body, collider: &Collider, reach: f32) 
                 let turn = rotation * Quat::from_rotation_arc(Vec3::Y, plane.normal);
                 add_box(Vec3::new(reach, 5.0, reach), position - turn * Vec3::new(0.0, 5.0, 0.0), turn);
             }
-            TypedShape::Cylinder(cylinder) => {
-                let ring = ring(cylinder.radius);
-                let both = ring.flat_map(|p| [p + cylinder.half_height * Vec3::Y, p - cylinder.half_height * Vec3::Y]);
-                return add_hull(&both.collect::<Vec<_>>());
-            }
-            TypedShape::Cone(cone) => {
-                let mut points: Vec<_> = ring(cone.radius).map(|p| p - cone.half_height * Vec3::Y).collect();
-                points.push(cone.half_height * Vec3::Y);
-                return add_hull(&points);
-            }
+            TypedShape::Cylinder(of) => return add_hull(&cylinder(of.radius, of.half_height)),
+            TypedShape::Cone(of) => return add_hull(&cone(of.radius, of.half_height)),
             TypedShape::ConvexPolyhedron(hull) => return add_hull(hull.points()),
             TypedShape::TriMesh(mesh) => return add_mesh(mesh),
             TypedShape::HeightField(field) => {
@@ -185,13 +174,6 @@ unsafe fn add_shape(id: b3BodyId, body: &Body, collider: &Collider, reach: f32) 
         }
     }
     Some(None)
-}
-
-/// The corners of a polygon around Y that is as large as the circle of `radius`.
-fn ring(radius: f32) -> impl Iterator<Item = Vec3> {
-    let turn = std::f32::consts::TAU / SIDES as f32;
-    let corner = radius * (turn / turn.sin()).sqrt();
-    (0..SIDES).map(move |i| Quat::from_rotation_y(turn * i as f32) * Vec3::new(corner, 0.0, 0.0))
 }
 
 impl Contender for Box3d {

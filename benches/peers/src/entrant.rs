@@ -1,5 +1,8 @@
 //! An engine and how it is set, before it has a scene.
 
+use clap::ValueEnum;
+#[cfg(not(feature = "physx"))]
+use drystone::Error;
 use drystone::{Result, Scene, SolverConfig};
 use drystone_cli::report::comparison::{Contender, Drystone};
 use drystone_cli::settings;
@@ -7,7 +10,7 @@ use drystone_cli::settings;
 use crate::{box3d::Box3d, rapier::Rapier};
 
 /// Who steps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Engine {
     /// drystone's CPU lanes.
     Drystone,
@@ -15,17 +18,30 @@ pub enum Engine {
     Rapier,
     /// Box3D, by the crate box3d-sys.
     Box3d,
+    /// PhysX with its TGS solver, by the crate physx-sys; only with the feature `physx`.
+    Physx,
 }
 
-/// An engine and the two settings that all three have.
+impl Engine {
+    /// The engines of this build.
+    pub fn built() -> Vec<Self> {
+        Self::value_variants()
+            .iter()
+            .copied()
+            .filter(|&engine| cfg!(feature = "physx") || engine != Self::Physx)
+            .collect()
+    }
+}
+
+/// An engine and its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entrant {
     /// The engine.
     pub engine: Engine,
-    /// Substeps of a step; Rapier calls them iterations.
+    /// Substeps of a step; Rapier calls them iterations, and PhysX position iterations.
     pub substeps: u32,
-    /// Frequency of the contact spring times the length of a substep; none is the engine's own: 0.125 for drystone, 30 Hz for the
-    /// others whatever the substeps. Box3D takes 0.125 for anything above.
+    /// Frequency of the contact spring times the length of a substep; none is the engine's own: 0.125 for drystone, 30 Hz for Rapier and
+    /// Box3D whatever the substeps. Box3D takes 0.125 for anything above. PhysX has no contact spring.
     pub frequency: Option<f32>,
     /// Other settings of drystone, as `key=value`.
     pub set: Vec<String>,
@@ -36,16 +52,17 @@ impl Entrant {
     pub fn default_of(engine: Engine) -> Self {
         let substeps = match engine {
             Engine::Drystone => SolverConfig::default().substeps,
-            Engine::Rapier | Engine::Box3d => 4,
+            Engine::Rapier | Engine::Box3d | Engine::Physx => 4,
         };
         Self { engine, substeps, frequency: None, set: Vec::new() }
     }
 
-    /// Frequency of the contact spring between two bodies that move [Hz], for steps of `dt` seconds.
+    /// Frequency of the contact spring between two bodies that move [Hz], for steps of `dt` seconds; 0 without a spring.
     pub fn hertz(&self, dt: f32) -> f32 {
         let at = |frequency: f32| frequency * self.substeps as f32 / dt;
         match (self.engine, self.frequency) {
             (Engine::Drystone, frequency) => at(frequency.unwrap_or(SolverConfig::default().contact_frequency)),
+            (Engine::Physx, _) => 0.0,
             (_, None) => 30.0,
             (Engine::Rapier, Some(frequency)) => at(frequency),
             (Engine::Box3d, Some(frequency)) => at(frequency.min(0.125)),
@@ -68,6 +85,10 @@ impl Entrant {
             }
             Engine::Rapier => Box::new(Rapier::new(scene, self.substeps, hertz, threads)?),
             Engine::Box3d => Box::new(Box3d::new(scene, self.substeps, hertz, threads)?),
+            #[cfg(feature = "physx")]
+            Engine::Physx => Box::new(crate::physx::Physx::new(scene, self.substeps, threads)?),
+            #[cfg(not(feature = "physx"))]
+            Engine::Physx => return Err(Error::input("PhysX is not in this build; build with --features physx")),
         })
     }
 }

@@ -7,7 +7,10 @@
 
 mod box3d;
 mod entrant;
+#[cfg(feature = "physx")]
+mod physx;
 mod rapier;
+mod round;
 mod setting;
 mod team;
 

@@ -1,4 +1,4 @@
-//! `drystone-peers SCENE...`: drystone, Rapier and Box3D on the same scenes, time beside errors.
+//! `drystone-peers SCENE...`: drystone, Rapier, Box3D and PhysX on the same scenes, time beside errors.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use drystone_cli::report::comparison::{Origin, Row, blocks, measure, scene};
 use drystone_peers::{Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Runs scenes with drystone, Rapier and Box3D, each at its defaults and at the settings asked for.
+/// Runs scenes with drystone, Rapier, Box3D and PhysX, each at its defaults and at the settings asked for.
 ///
 /// They step in turns. Time is the median over blocks of 10 steps, in brackets its quartiles; ratio is that to the first row in
 /// the same blocks. Times and overlaps are of the second half of a run.
@@ -24,8 +24,8 @@ struct Args {
     /// Scenes: names of the catalogue, as tower or tower:n=20,top_ratio=100, and paths of scene files.
     #[arg(required = true)]
     scenes: Vec<String>,
-    /// Who takes part.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Engine::Drystone, Engine::Rapier, Engine::Box3d])]
+    /// Engines that take part; PhysX needs a build with `--features physx`.
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = Engine::built())]
     engines: Vec<Engine>,
     /// Substeps to run besides the defaults.
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096))]
@@ -49,7 +49,7 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// The report of `drystone report`, with Rapier and Box3D on the same pictures.
+    /// The report of `drystone report`, with the other engines on the same pictures.
     Report(SurveyArgs),
 }
 

@@ -48,12 +48,18 @@ enum Page {
 /// A stopped report continues: it keeps the rows in DIR that the same program measured on the same machine.
 #[derive(Args)]
 pub struct SurveyArgs {
-    /// Directory for index.html, speed-against-error.svg, scenes.csv and problems.csv.
+    /// Directory for index.html, speed-against-error.svg, scenes.csv, problems.csv and, with other engines, equal-error.md.
     #[arg(long, default_value = "report")]
     out: PathBuf,
     /// Run fewer scenes and settings, within two minutes.
     #[arg(long)]
     quick: bool,
+    /// Run all kinds of scenes with few bodies and settings, and no contact problems: with other engines within a quarter of an hour.
+    #[arg(long, conflicts_with = "quick")]
+    brief: bool,
+    /// Steps of each scene at most.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: Option<u32>,
     /// Only this scene, as tower or tower:n=20,top_ratio=100 or a file; may be given several times.
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
@@ -64,7 +70,7 @@ pub struct SurveyArgs {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
     /// Draw the existing rows without running scenes.
-    #[arg(long, conflicts_with_all = ["quick", "scene", "problems", "threads"])]
+    #[arg(long, conflicts_with_all = ["quick", "brief", "steps", "scene", "problems", "threads"])]
     draw: bool,
 }
 
@@ -118,12 +124,17 @@ impl SurveyArgs {
     fn measure(&self, others: &[&Team]) -> Result<Report> {
         // Fails only if the pool exists already. This thread is one of its threads.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
-        let extent = if self.quick { Extent::Quick } else { Extent::Full };
-        let scenes = match self.scene.is_empty() {
+        let extent = match (self.quick, self.brief) {
+            (true, _) => Extent::Quick,
+            (_, true) => Extent::Brief,
+            _ => Extent::Full,
+        };
+        let mut scenes = match self.scene.is_empty() {
             true => scenes(extent)?,
             false => self.scene.iter().map(|word| scene(word)).collect::<Result<_>>()?,
         };
-        let some = self.scene.is_empty() || self.problems.is_some();
+        scenes.iter_mut().for_each(|scene| scene.steps = scene.steps.min(self.steps.unwrap_or(u32::MAX)));
+        let some = self.scene.is_empty() && extent != Extent::Brief || self.problems.is_some();
         let problems = if some { problems(self.problems.as_deref())? } else { Vec::new() };
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();

@@ -1,6 +1,7 @@
 //! `drystone report`: speed against error.
 
 mod contender;
+mod duels;
 mod html;
 mod measure;
 mod origin;

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::duels::OWN;
 use super::html::{cell, escape, grid, inline, number, profile_picture, table};
 use super::measure::Row;
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least};
@@ -17,8 +18,6 @@ pub struct Page {
     /// Time against error on every scene, as SVG.
     pub main: String,
 }
-
-const OWN: &str = "drystone";
 
 /// Errors of the profiles over the scenes (m).
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];

@@ -5,16 +5,34 @@ use crate::settings;
 use drystone::backend::gpu::adapters;
 use drystone::{Result, Scene, SolverConfig};
 
-const FULL: [&str; 9] = [
+const FULL: [&str; 12] = [
     "tower:n=20",
     "tower:n=10,top_ratio=1000",
+    "tower:n=20,top_ratio=1000",
+    "tower:n=30,top_ratio=100",
     "mass-ratio",
     "chain",
     "wall",
     "pile:n=512,ratio=100",
     "pile:n=1000",
+    "pile-mixed",
     "pyramid:base=100",
     "pile:n=5000",
+];
+
+/// The scenes of [`FULL`] with at most 1,000 bodies.
+const BRIEF: [&str; 11] = [
+    "tower:n=20",
+    "tower:n=10,top_ratio=1000",
+    "tower:n=20,top_ratio=1000",
+    "tower:n=30,top_ratio=100",
+    "mass-ratio",
+    "chain",
+    "wall",
+    "pile:n=512,ratio=100",
+    "pile:n=1000",
+    "pile-mixed",
+    "pyramid:base=40",
 ];
 
 const QUICK: [&str; 5] = ["tower:n=20", "tower:n=10,top_ratio=1000", "mass-ratio", "chain", "wall:rows=10,columns=10"];
@@ -26,7 +44,11 @@ const LARGE: usize = 2000;
 const LARGE_STEPS: u32 = 300;
 
 pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
-    let names = if extent == Extent::Quick { QUICK.as_slice() } else { &FULL };
+    let names = match extent {
+        Extent::Quick => QUICK.as_slice(),
+        Extent::Brief => &BRIEF,
+        Extent::Full => &FULL,
+    };
     let named = |name: &&str| {
         let scene = scene(name)?;
         let steps = if is_large(&scene) { scene.steps.min(LARGE_STEPS) } else { scene.steps };
@@ -62,11 +84,19 @@ const SWEEPS: [(u32, u32); 8] = [(1, 16), (4, 4), (1, 4), (2, 4), (2, 16), (4, 2
 /// they run at the defaults only, for their time.
 pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>> {
     let few = is_large(scene) || extent == Extent::Quick;
+    let brief = extent == Extent::Brief;
     let default = SolverConfig::default().substeps;
     // Times are relative to the first setting, the defaults.
     let mut points: Vec<(&str, String)> = vec![("cpu", String::new())];
     points.extend(substeps(scene, extent).filter(|&n| n != default).map(|n| ("cpu", format!("substeps={n}"))));
-    for (substeps, sweeps) in SWEEPS.into_iter().take(if few { 2 } else { SWEEPS.len() }) {
+    let sweeps = if brief {
+        0
+    } else if few {
+        2
+    } else {
+        SWEEPS.len()
+    };
+    for (substeps, sweeps) in SWEEPS.into_iter().take(sweeps) {
         let point = format!("substeps={substeps} iterations={sweeps} relax={sweeps}");
         if sweeps > 2 {
             // Momentum begins with the third sweep.
@@ -81,11 +111,32 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
         "preload_rate=0",
         "preload_rate=0 contact_frequency=0.25",
     ] {
-        let some: &[u32] = if few { &[8] } else { &[4, 8, 16] };
+        let some: &[u32] = if few {
+            &[8]
+        } else if brief {
+            &[4, 8, 16, 32]
+        } else {
+            &[4, 8, 16]
+        };
         points.extend(some.iter().map(|n| ("cpu", format!("substeps={n} {rule}"))));
     }
-    points.push(("reference", String::new()));
-    match adapters().first() {
+    if extent != Extent::Quick {
+        // The same substeps for all islands, whatever they bear.
+        for rule in ["", " preload_rate=0 contact_frequency=0.25"] {
+            points.extend([2, 4, 8, 16, 32].map(|n| ("cpu", format!("substeps={n} max_substeps={n}{rule}"))));
+        }
+        // A looser promise, and a tighter one.
+        points.extend([0.1, 0.001].map(|share| ("cpu", format!("max_penetration_share={share}"))));
+    }
+    if !scene.world.joints.is_empty() {
+        for solver in ["direct", "sweeps"] {
+            points.extend(substeps(scene, extent).map(|n| ("cpu", format!("substeps={n} joint_solver={solver}"))));
+        }
+    }
+    if !brief {
+        points.push(("reference", String::new()));
+    }
+    match adapters().first().filter(|_| !brief) {
         Some(adapter) if adapter.hardware => {
             points.extend(substeps(scene, extent).map(|n| ("gpu", format!("substeps={n}"))));
         }

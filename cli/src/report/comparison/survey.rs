@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::contender::{Extent, Setting, Team};
+use super::duels;
 use super::measure::{Row, blocks, measure};
 use super::origin::Origin;
 use super::page;
@@ -146,12 +147,16 @@ impl Report {
         Ok(Self { results, solves })
     }
 
-    /// Writes `index.html` and `speed-against-error.svg` into the folder and returns the path of the page.
+    /// Writes `index.html`, `speed-against-error.svg` and, with other engines, `equal-error.md` into the folder and returns the path of the
+    /// page.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let page = page::page(&self.results, &self.solves)?;
         let path = folder.join("index.html");
         files::write(&folder.join("speed-against-error.svg"), page.main.as_bytes())?;
         files::write(&path, page.html.as_bytes())?;
+        if let Some(text) = duels::page(&self.results)? {
+            files::write(&folder.join("equal-error.md"), text.as_bytes())?;
+        }
         Ok(path)
     }
 }
