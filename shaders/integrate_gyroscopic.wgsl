@@ -1,4 +1,5 @@
 // integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint.
+// With `is_from_start` velocities are changes since the step began, and `free` stays.
 // Reads inertias. Writes bodies and free; one thread a body.
 // Double: src/kernels/integrate.rs.
 
@@ -10,32 +11,44 @@ fn solve_3x3(row_0: vec3f, row_1: vec3f, row_2: vec3f, g: vec3f) -> vec3f {
     return (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0));
 }
 
-// One step of Newton's method on (next - spin) + h I^-1 (m x I m) = 0 with m midway.
-fn newton_step(inertia: Inertia, h: f32, spin: vec3f, next: vec3f) -> vec3f {
+// The correction of one step of Newton's method on change + h I^-1 (m x I m) = 0, where m is the spin midway.
+fn newton_step(inertia: Inertia, h: f32, m: vec3f, change: vec3f) -> vec3f {
     let p = inertia.principal;
     let k = inertia.inv_principal;
-    let m = (spin + next) * 0.5;
     let l = p * m;
-    let residual = (next - spin) + k * (cross3(m, l) * h);
+    let residual = change + k * (cross3(m, l) * h);
     let f = k * (h * 0.5);
     let row_0 = vec3f(1.0, f.x * (l.z - m.z * p.y), f.x * (m.y * p.z - l.y));
     let row_1 = vec3f(f.y * (m.z * p.x - l.z), 1.0, f.y * (l.x - m.x * p.z));
     let row_2 = vec3f(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), 1.0);
-    return next - solve_3x3(row_0, row_1, row_2, residual);
+    return solve_3x3(row_0, row_1, row_2, residual);
+}
+
+// The change of a spin in the time h, by some steps of Newton's method. The unknown is the spin after h, or with `is_from_start` the change
+// itself.
+fn spin_change(is_from_start: bool, steps: u32, inertia: Inertia, h: f32, spin: vec3f) -> vec3f {
+    if is_from_start {
+        var change = vec3f(0.0);
+        for (var step = 0u; step < steps; step++) {
+            change = change - newton_step(inertia, h, spin + change * 0.5, change);
+        }
+        return change;
+    }
+    var next = spin;
+    for (var step = 0u; step < steps; step++) {
+        next = next - newton_step(inertia, h, (spin + next) * 0.5, next - spin);
+    }
+    return next - spin;
 }
 
 // Square of the angle [rad] up to which two Newton steps leave no more than rounding.
 const SLOW: f32 = 0.0625;
 
 // The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
-fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
+fn fast_turn(is_from_start: bool, inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
     var h = pass_row.substep;
     if square > 1.0 { h = pass_row.substep * inverse_sqrt(square); }
-    var next = spin;
-    for (var step = 0u; step < 4u; step++) {
-        next = newton_step(inertia, h, spin, next);
-    }
-    let change = next - spin;
+    let change = spin_change(is_from_start, 4u, inertia, h, spin);
     let turn = x * change.x + y * change.y + z * change.z;
     // Axes that are not quite of unit length stretch a large change, always in the same sense: the energy E is set back, to
     // E (3 - E)^2 / 4 of what it was, which is never above 1. A spin whose energy is no number stays.
@@ -47,7 +60,7 @@ fn fast_turn(inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: 
     return select(vec3f(0.0), turn + changed * scale, 1.0 > scale * scale);
 }
 
-fn turn_spin(i: u32) {
+fn turn_spin(is_from_start: bool, i: u32) {
     let inertia = inertias[i];
     let p = inertia.principal;
     let k = inertia.inv_principal;
@@ -59,7 +72,8 @@ fn turn_spin(i: u32) {
     let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
     // The free spin: impulses come later.
-    let w = free[inertia.body].w;
+    var w = free[inertia.body].w;
+    if is_from_start { w = w + bodies[inertia.body].w; }
     let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
 
     // (h W)^2
@@ -71,13 +85,12 @@ fn turn_spin(i: u32) {
 
     var turn: vec3f;
     if SLOW > square {
-        let next = newton_step(inertia, pass_row.substep, spin, newton_step(inertia, pass_row.substep, spin, spin));
         // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
-        let change = next - spin;
+        let change = spin_change(is_from_start, 2u, inertia, pass_row.substep, spin);
         turn = x * change.x + y * change.y + z * change.z;
     } else {
-        turn = fast_turn(inertia, square, x, y, z, spin, w);
+        turn = fast_turn(is_from_start, inertia, square, x, y, z, spin, w);
     }
-    free[inertia.body].w = w + turn;
+    if !is_from_start { free[inertia.body].w = w + turn; }
     bodies[inertia.body].w += turn;
 }

@@ -1,8 +1,14 @@
 // integrate_positions: one thread moves one body by its velocity.
 // Writes bodies; no other thread writes the same one. Double: src/kernels/integrate.rs.
 
-fn integrate_position(i: u32) {
+fn integrate_position(is_from_start: bool, i: u32) {
     let body = bodies[i];
-    bodies[i].dp = body.dp + body.v * pass_row.substep;
-    bodies[i].dq = renormalized(quat_mul(exp_rotation(body.w * pass_row.substep), body.dq));
+    var v = body.v;
+    var w = body.w;
+    if is_from_start {
+        v = free[i].v + v;
+        w = free[i].w + w;
+    }
+    bodies[i].dp = body.dp + v * pass_row.substep;
+    bodies[i].dq = renormalized(quat_mul(exp_rotation(w * pass_row.substep), body.dq));
 }

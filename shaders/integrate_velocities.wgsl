@@ -1,8 +1,9 @@
 // integrate_velocities: one thread adds gravity and force to the velocity of one body. With `is_warm_start` it also adds the change of
-// velocity that the impulses of the substep before caused: the difference of the velocities from the free ones.
+// velocity that the impulses of the substep before caused: the difference of the velocities from the free ones. With `is_from_start`
+// velocities are changes since the step began, and `free` stays.
 // Reads masses. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
 
-fn integrate_velocity(is_warm_start: bool, i: u32) {
+fn integrate_velocity(is_warm_start: bool, is_from_start: bool, i: u32) {
     let free_v = bodies[i].v + masses[i].acceleration * pass_row.substep;
     let free_w = bodies[i].w;
     if is_warm_start {
@@ -13,5 +14,5 @@ fn integrate_velocity(is_warm_start: bool, i: u32) {
     } else {
         bodies[i].v = free_v;
     }
-    free[i] = Free(free_v, free_w);
+    if !is_from_start { free[i] = Free(free_v, free_w); }
 }

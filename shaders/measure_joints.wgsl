@@ -6,7 +6,7 @@ fn measure_joint(rules: Rules, i: u32) {
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
     let anchors = current_anchors(&pair, joint);
-    var wanted = relative_velocity(&pair, anchors.r_a, anchors.r_b);
+    var wanted = relative_velocity(rules, &pair, anchors.r_a, anchors.r_b);
     if rules.biased {
         wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * pass_row.joint.bias_rate;
     }

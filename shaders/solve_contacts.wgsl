@@ -23,7 +23,7 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
             lever += impulses[k].normal * points[k].slip_1;
         }
         var impulse = impulses[end];
-        solve_twist(pair, contact, points[end], lever, &impulse);
+        solve_twist(rules, pair, contact, points[end], lever, &impulse);
         solve_friction(rules, pair, contact, points[end], pressed, &impulse);
         impulses[end] = impulse;
     } else {

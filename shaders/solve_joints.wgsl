@@ -14,7 +14,7 @@ fn solve_joint(rules: Rules, i: u32) {
 
     // The gap is pulled shut softly, or not at all in a relax sweep.
     let before = joint_impulses[i].linear;
-    var wanted = relative_velocity(&pair, anchors.r_a, anchors.r_b);
+    var wanted = relative_velocity(rules, &pair, anchors.r_a, anchors.r_b);
     var mass_scale = 1.0;
     var impulse_scale = 0.0;
     if rules.biased {

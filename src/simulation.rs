@@ -83,13 +83,12 @@ impl Simulation {
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
-        let forces = |p: &&Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. } | Kernel::IntegrateGyroscopic);
-        let first: Vec<_> = self
-            .stages
-            .plan
-            .passes
-            .chunk_by(|p, q| p.block == q.block)
-            .flat_map(|own| own.iter().take_while(forces))
+        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateVelocities};
+        let forces =
+            |p: &&Pass| matches!(p.kernel, BeginChanges | IntegrateVelocities { .. } | IntegrateGyroscopic { .. });
+        let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);
+        let first: Vec<_> = blocks
+            .flat_map(|own| own.iter().take_while(forces).chain(own.iter().filter(|p| p.kernel == EndChanges)))
             .cloned()
             .collect();
         let mut problem = self.stages.problem.clone();

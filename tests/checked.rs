@@ -251,7 +251,7 @@ fn passes_over_colors_that_are_not_there_are_refused() {
     let of = |wanted: fn(Kernel) -> bool| plan.passes.iter().position(|p| wanted(p.kernel)).expect("a pass");
     let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
     let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));
-    let bodies = of(|k| matches!(k, Kernel::IntegratePositions));
+    let bodies = of(|k| matches!(k, Kernel::IntegratePositions { .. }));
     let (first_joint, all) = (problem.blocks[0].joints[0], problem.colors.len() as u32 - 1);
     #[allow(clippy::reversed_empty_ranges)]
     for (pass, colors) in [

@@ -73,7 +73,7 @@ impl Case {
             inv_mass: self.inverse_mass[i],
             acceleration: lane(DVec3::ZERO),
         };
-        Pair { a: body(0), b: body(1), mass_a: mass(0), mass_b: mass(1), moving: 0.0 }
+        Pair { a: body(0), b: body(1), mass_a: mass(0), mass_b: mass(1), ..Pair::default() }
     }
 
     fn separation(&self, pair: &Pair<f64>) -> f64 {
@@ -132,7 +132,7 @@ fn the_relative_velocity_is_the_row_times_the_velocities() {
     let v =
         [DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.1, 4.0), DVec3::new(-1.0, 0.2, 0.7), DVec3::new(2.0, 1.0, -3.0)];
     (pair.a.v, pair.a.w, pair.b.v, pair.b.w) = (lane(v[0]), lane(v[1]), lane(v[2]), lane(v[3]));
-    let u = relative_velocity(&pair, lane(case.r[0]), lane(case.r[1]));
+    let u = relative_velocity(Rules::default(), &pair, lane(case.r[0]), lane(case.r[1]));
     for (axis, component) in [(DVec3::X, u.x), (DVec3::Y, u.y), (DVec3::Z, u.z)] {
         let dense: f64 = case.row(axis).iter().zip(v).map(|(g, v)| g.dot(v)).sum();
         assert!((component - dense).abs() < 1e-14);
@@ -218,7 +218,7 @@ fn slipping() -> Slipping {
 impl Slipping {
     /// Velocity of the slip along both tangents.
     fn slip(&self) -> [f64; 2] {
-        let u = relative_velocity(&self.pair, self.point.r_a, self.point.r_b);
+        let u = relative_velocity(Rules::default(), &self.pair, self.point.r_a, self.point.r_b);
         self.tangents.map(|t| DVec3::new(u.x, u.y, u.z).dot(t))
     }
 
@@ -296,7 +296,7 @@ fn relaxation_scales_the_step_of_friction_and_of_twist() {
         let mut s = slipping();
         s.params.relaxation = relaxation;
         let mut impulse = Impulse::default();
-        solve_twist(&s.params, &mut s.pair, &s.contact, &s.point, 100.0, &mut impulse);
+        solve_twist(Rules::default(), &s.params, &mut s.pair, &s.contact, &s.point, 100.0, &mut impulse);
         impulse.normal
     };
     assert!(twisted(1.0).abs() > 0.1 && (twisted(0.5) - 0.5 * twisted(1.0)).abs() < 1e-15);
@@ -314,7 +314,7 @@ fn twist_takes_the_spin_about_the_normal_within_mu_times_the_lever() {
             1.0 / s.case.inverse_inertia.iter().map(|i| s.case.normal.dot(*i * s.case.normal)).sum::<f64>();
         let before = spin(&s);
         let mut impulse = Impulse::default();
-        solve_twist(&s.params, &mut s.pair, &s.contact, &s.point, lever, &mut impulse);
+        solve_twist(Rules::default(), &s.params, &mut s.pair, &s.contact, &s.point, lever, &mut impulse);
         (before, spin(&s), impulse.normal, s.point.normal_mass)
     };
     let (before, after, impulse, mass) = twisted(100.0);
@@ -351,7 +351,7 @@ fn pressed(rules: Rules, params: &StepParams<f64>, separation: f64, before: f64)
     let point = Point { r_a: lane(case.r[0]), r_b: lane(case.r[1]), separation, normal_mass, ..Point::default() };
     let mut impulses = [Impulse { normal: before, ..Impulse::default() }];
     solve_contact(rules, params, &mut pair, &contact, &[point], &mut impulses);
-    let u = relative_velocity(&pair, point.r_a, point.r_b);
+    let u = relative_velocity(Rules::default(), &pair, point.r_a, point.r_b);
     (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0].normal)
 }
 
@@ -443,7 +443,7 @@ fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_conta
         let point = Point { r_a, r_b, normal_mass: mass, approach_velocity, ..Point::default() };
         let mut impulses = [Impulse { normal: 0.1, peak, ..Impulse::default() }];
         restitute_contact(Rules::default(), &params, &mut pair, &contact, &[point], &mut impulses);
-        let u = relative_velocity(&pair, r_a, r_b);
+        let u = relative_velocity(Rules::default(), &pair, r_a, r_b);
         (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0])
     };
     let (u, impulse) = bounced(-3.0, 0.2);

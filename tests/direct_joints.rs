@@ -309,7 +309,8 @@ fn the_first_solve_leaves_no_velocity_between_anchors() {
     for (world, limit) in [(chain(40, 300.0), 1e-7), (triangle, 1e-3)] {
         let mut simulation = simulation(world, JointSolver::Direct);
         let (mut problem, plan) = simulation.next_problem(DT).expect("a step");
-        let end = plan.passes.iter().position(|p| matches!(p.kernel, Kernel::IntegratePositions)).expect("a substep");
+        let end =
+            plan.passes.iter().position(|p| matches!(p.kernel, Kernel::IntegratePositions { .. })).expect("a substep");
         let lacking = |passes: usize, problem: &mut drystone::StepProblem| {
             Reference::<f64>::new().run(problem, &plan.passes[..passes]).expect("it runs");
             let bodies = &problem.bodies;

@@ -45,6 +45,7 @@ const MEASURED: Rules = Rules {
     driven: false,
     passes: 1,
     measured: true,
+    from_start: false,
 };
 
 const SEEDS: std::ops::Range<u64> = 0..2;
@@ -69,21 +70,31 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         _ => {}
     }
     let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
-    if kernel == Kernel::IntegrateGyroscopic {
-        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
+    if kernel == (Kernel::IntegrateGyroscopic { from_start: false }) {
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
     }
     // Systems of joints: what one of these kernels leaves to the next is not read back.
     if let Kernel::MeasureJoints(rules) | Kernel::SolveJointSystems(rules) | Kernel::ApplyJointChanges(rules) = kernel {
-        return vec![system_sweep(rules, problem)];
+        let sweep = system_sweep(rules, problem);
+        let changes = [Kernel::BeginChanges, Kernel::EndChanges].map(|kernel| in_one_pass(kernel, problem));
+        let [begin, end] = changes.map(|passes| if rules.from_start { passes } else { Vec::new() });
+        return vec![[begin, sweep, end].concat()];
     }
     if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
         return vec![system_sweep(Rules::default(), problem)];
     }
     // What a warm start applies is what happened since it last ran.
-    if kernel == (Kernel::IntegrateVelocities { warm_start: true }) {
-        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false }, problem);
+    if kernel == (Kernel::IntegrateVelocities { warm_start: true, from_start: false }) {
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
+    }
+    // Changes are those since `BeginChanges`, and only their sums with the velocities from then stay.
+    if kernel.is_from_start() || kernel == Kernel::EndChanges {
+        let integrate = Kernel::IntegrateVelocities { warm_start: false, from_start: true };
+        let first = [Kernel::BeginChanges, integrate].map(|kernel| in_one_pass(kernel, problem)).concat();
+        let end = in_one_pass(Kernel::EndChanges, problem);
+        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &end].concat());
     }
     ways.dedup();
     ways
@@ -92,7 +103,8 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
 /// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
     let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
-    let first = [Kernel::IntegratePositions, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
+    let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
+    let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
     let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
     let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
     let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();
@@ -141,7 +153,7 @@ fn tiny_numbers_keep_their_bits_in_exact_mode() {
 
 /// The spins of a problem after the kernel, and its passes.
 fn spun(problem: &StepProblem) -> (StepProblem, Vec<Pass>) {
-    let passes = ways_to_run(Kernel::IntegrateGyroscopic, problem).remove(0);
+    let passes = ways_to_run(Kernel::IntegrateGyroscopic { from_start: false }, problem).remove(0);
     (by_the_reference(problem, &passes), passes)
 }
 

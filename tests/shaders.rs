@@ -84,16 +84,20 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
         let shared = Rules { measured, patch, friction, round: true, ..Rules::default() };
         let biased = Rules { biased: true, friction: FrictionRule::None, patch: false, ..shared };
         let mut kernels = vec![
-            Kernel::IntegrateVelocities { warm_start: false },
+            Kernel::IntegrateVelocities { warm_start: false, from_start: false },
             Kernel::WarmStart(shared.of_warm_start()),
             Kernel::SolveContacts(biased),
-            Kernel::IntegratePositions,
+            Kernel::IntegratePositions { from_start: false },
             Kernel::SolveContacts(shared),
-            Kernel::IntegrateVelocities { warm_start: true },
+            Kernel::IntegrateVelocities { warm_start: true, from_start: false },
             Kernel::ApplyRestitution(Rules { patch, ..Rules::default() }),
         ];
         // Eight buffers are enough for one or the other.
-        kernels.push(if measured { Kernel::BeginSweep { first: false } } else { Kernel::IntegrateGyroscopic });
+        kernels.push(if measured {
+            Kernel::BeginSweep { first: false }
+        } else {
+            Kernel::IntegrateGyroscopic { from_start: false }
+        });
         kernels
     };
     for (measured, patch, friction) in
@@ -110,7 +114,8 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
 /// missing barrier shows in no result.
 #[test]
 fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
-    let kernels = [Kernel::IntegrateVelocities { warm_start: false }, Kernel::SolveContacts(Rules::default())];
+    let kernels =
+        [Kernel::IntegrateVelocities { warm_start: false, from_start: false }, Kernel::SolveContacts(Rules::default())];
     let module = parsed(&Program::OneDispatch(kernels.into(), 16).source());
     let [entry] = &module.entry_points[..] else { panic!("one entry point") };
     let mut bodies = Vec::new();
@@ -192,7 +197,7 @@ fn every_rule_reaches_the_sweep_as_a_constant() {
 #[test]
 fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
     // The last ones are too small to show in the bits of a rotation.
-    let module = parsed(&Program::Pass(Kernel::IntegratePositions).source());
+    let module = parsed(&Program::Pass(Kernel::IntegratePositions { from_start: false }).source());
     let named = |f: &&naga::Function| f.name.as_deref() == Some("exp_rotation");
     let function = module.functions.iter().map(|(_, f)| f).find(named).expect("the function");
     let magnitude = |e: &naga::Expression| match e {

@@ -12,11 +12,6 @@ const FAILS: &[(&str, &str)] = &[
     ("H6", "largest gap"),
     ("H11", "way of what lies still"),
     ("H11", "speed at any time"),
-    ("flip", "spin (0.01, 10, 0): energy"),
-    ("flip", "spin (1, 10, 0): energy"),
-    ("rolling", "disc, 60 degrees"),
-    ("rolling", "disc, 90 degrees"),
-    ("rolling", "box, 90 degrees"),
 ];
 
 #[test]

@@ -38,7 +38,7 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     let bias = select(select(0.0, pushed, rules.biased), s * pass_row.inverse_substep, apart);
     let mass_scale = select(select(1.0, softness.mass_scale, rules.biased), 1.0, apart);
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
-    let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * (*impulse).normal;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.

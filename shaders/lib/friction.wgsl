@@ -15,7 +15,7 @@ fn allowed_friction(friction: u32, y: vec2f, limit: f32) -> vec2f {
 // tangents has one length: with a matrix step the clamped point would slip in a wrong direction.
 fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    let u = relative_velocity(pair, point.r_a, point.r_b);
+    let u = relative_velocity(rules, pair, point.r_a, point.r_b);
     var u_1 = dot3(u, contact.tangent);
     var u_2 = dot3(u, tangent_2);
     if rules.driven {
@@ -43,8 +43,10 @@ fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, poi
 }
 
 // Spin about the normal, limited by the normal impulses times their distance from the middle.
-fn solve_twist(pair: ptr<function, Pair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
-    let spin = dot3((*pair).b.w - (*pair).a.w, contact.normal);
+fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
+    var w = (*pair).b.w - (*pair).a.w;
+    if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }
+    let spin = dot3(w, contact.normal);
     let mass = params.relaxation * patch_point.normal_mass;
     let sum = clamp_abs((*impulse).normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - (*impulse).normal);

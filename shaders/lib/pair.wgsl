@@ -1,6 +1,6 @@
 // Two bodies while one thread works on them. Doubles: src/kernels/pair.rs.
 
-struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass }
+struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass, start_a: Free, start_b: Free }
 
 fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
     let p = m.inv_inertia_x;
@@ -21,8 +21,14 @@ fn apply_impulse(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f, p: vec3f) {
 }
 
 // Velocity of b at r_b relative to a at r_a.
-fn relative_velocity(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
-    return ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));
+fn relative_velocity(rules: Rules, pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
+    let u = ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));
+    if rules.from_start {
+        let a = (*pair).start_a;
+        let b = (*pair).start_b;
+        return u + ((b.v - a.v) + (cross3(b.w, r_b) - cross3(a.w, r_a)));
+    }
+    return u;
 }
 
 // Movement of b at r_b relative to a at r_a since the step began.
@@ -33,7 +39,7 @@ fn relative_movement(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f
 }
 
 fn load_pair(a: u32, b: u32) -> Pair {
-    return Pair(bodies[a], bodies[b], masses[a], masses[b]);
+    return Pair(bodies[a], bodies[b], masses[a], masses[b], load_start(masses[a], a), load_start(masses[b], b));
 }
 
 // A body that cannot move is never written: no color protects it.

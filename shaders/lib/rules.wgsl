@@ -12,6 +12,8 @@ struct Rules {
     passes: u32,
     driven: bool,
     measured: bool,
+    // Velocities of bodies are changes since the step began.
+    from_start: bool,
 }
 
 const FRICTION_NONE: u32 = 0u;

@@ -53,8 +53,11 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             Kernel::ClearImpulses => (contacts, None),
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (joints, None),
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
-            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => (bodies, None),
-            Kernel::IntegrateGyroscopic => (inertias, None),
+            Kernel::IntegrateVelocities { .. }
+            | Kernel::BeginChanges
+            | Kernel::EndChanges
+            | Kernel::IntegratePositions { .. } => (bodies, None),
+            Kernel::IntegrateGyroscopic { .. } => (inertias, None),
             Kernel::FactorJoints | Kernel::SolveJointSystems(_) => (systems, None),
             Kernel::TurnInertias => (turning, None),
             _ => (0..0, None),

@@ -73,7 +73,7 @@ fn solve_normal<L: Lane>(
     let bias = L::select(if rules.biased { pushed } else { zero }, s * params.inverse_substep, apart);
     let mass_scale = L::select(if rules.biased { softness.mass_scale } else { one }, one, apart);
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
-    let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
@@ -163,7 +163,7 @@ fn sweep_friction<L: Lane>(
             pressed = pressed + impulse.normal;
             lever = lever + impulse.normal * point.slip_1;
         }
-        solve_twist(params, pair, contact, &patch[0], lever, &mut patch_impulse[0]);
+        solve_twist(rules, params, pair, contact, &patch[0], lever, &mut patch_impulse[0]);
         solve_friction(rules, params, pair, contact, &patch[0], pressed, &mut patch_impulse[0]);
     } else {
         for (point, impulse) in points.iter().zip(impulses) {
@@ -187,7 +187,7 @@ pub fn restitute_contact<L: Lane>(
     for (point, impulse) in points[..contact_points].iter().zip(impulses) {
         let hit = (-params.restitution_threshold).gt(point.approach_velocity);
         let bounces = L::and(hit, impulse.peak.gt(zero));
-        let vn = dot3(relative_velocity(pair, point.r_a, point.r_b), contact.normal);
+        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
         let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
         let sum = L::select(impulse.normal, larger(impulse.normal + correction, zero), bounces);
         let change = sum - impulse.normal;

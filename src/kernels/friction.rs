@@ -39,7 +39,7 @@ pub fn solve_friction<L: Lane>(
     impulse: &mut Impulse<L>,
 ) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    let u = relative_velocity(pair, point.r_a, point.r_b);
+    let u = relative_velocity(rules, pair, point.r_a, point.r_b);
     let mut u_1 = dot3(u, contact.tangent);
     let mut u_2 = dot3(u, tangent_2);
     if rules.driven {
@@ -68,6 +68,7 @@ pub fn solve_friction<L: Lane>(
 /// Spin about the normal, limited by the normal impulses times their distance from the middle.
 #[inline(always)]
 pub fn solve_twist<L: Lane>(
+    rules: Rules,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
@@ -75,7 +76,11 @@ pub fn solve_twist<L: Lane>(
     lever: L,
     impulse: &mut Impulse<L>,
 ) {
-    let spin = dot3(pair.b.w - pair.a.w, contact.normal);
+    let mut w = pair.b.w - pair.a.w;
+    if rules.from_start {
+        w += pair.start_b.w - pair.start_a.w;
+    }
+    let spin = dot3(w, contact.normal);
     let mass = params.relaxation * patch.normal_mass;
     let sum = clamp_abs(impulse.normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - impulse.normal);

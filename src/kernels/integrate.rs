@@ -1,5 +1,9 @@
-//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic` and
-//! `integrate_positions`.
+//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic`, `integrate_positions`,
+//! `begin_changes` and `end_changes`.
+//!
+//! In a block of short substeps the velocities of a body are changes since the step began, and [`Free`] holds the velocities from
+//! then: `from_start`. A short substep changes a velocity by little more than the rounding error of the velocity, but by much more
+//! than that of the change.
 
 use super::rows::{Body, Free, Inertia, Mass, StepParams};
 use crate::math::{
@@ -14,6 +18,7 @@ use crate::math::{
 #[inline(always)]
 pub fn integrate_velocities<L: Lane>(
     warm_start: bool,
+    from_start: bool,
     params: &StepParams<L>,
     mass: &Mass<L>,
     body: &mut Body<L>,
@@ -21,6 +26,9 @@ pub fn integrate_velocities<L: Lane>(
 ) {
     let (warm_v, warm_w) = (body.v - free.v, body.w - free.w);
     body.v += mass.acceleration * params.substep;
+    if from_start {
+        return;
+    }
     (free.v, free.w) = (body.v, body.w);
     if warm_start {
         body.v += warm_v;
@@ -30,9 +38,41 @@ pub fn integrate_velocities<L: Lane>(
 
 /// Moves a body by its velocity.
 #[inline(always)]
-pub fn integrate_positions<L: Lane>(params: &StepParams<L>, body: &mut Body<L>) {
-    body.dp += body.v * params.substep;
-    body.dq = renormalized(quat_mul(exp_rotation(body.w * params.substep), body.dq));
+pub fn integrate_positions<L: Lane>(from_start: bool, params: &StepParams<L>, body: &mut Body<L>, free: &Free<L>) {
+    let (mut v, mut w) = (body.v, body.w);
+    if from_start {
+        (v, w) = (free.v + v, free.w + w);
+    }
+    body.dp += v * params.substep;
+    body.dq = renormalized(quat_mul(exp_rotation(w * params.substep), body.dq));
+}
+
+/// The velocities of a body become changes: none yet. A body that nothing pushes keeps its velocities: bodies that rest are in no block, and
+/// no pass writes their rows of `free`.
+#[inline(always)]
+pub fn begin_changes<L: Lane>(mass: &Mass<L>, body: &mut Body<L>, free: &mut Free<L>) {
+    *free = start_of(mass, &Free { v: body.v, w: body.w });
+    (body.v, body.w) = (body.v - free.v, body.w - free.w);
+}
+
+/// The changes of a body become velocities.
+#[inline(always)]
+pub fn end_changes<L: Lane>(body: &mut Body<L>, free: &Free<L>) {
+    (body.v, body.w) = (free.v + body.v, free.w + body.w);
+}
+
+/// The velocities that those of a body are changes of: zero for a body that nothing pushes.
+#[inline(always)]
+pub fn start_of<L: Lane>(mass: &Mass<L>, free: &Free<L>) -> Free<L> {
+    let is_movable = mass.inv_mass.gt(L::constant(0.0));
+    Free { v: vector_if(is_movable, free.v), w: vector_if(is_movable, free.w) }
+}
+
+/// The vector where the mask holds, else zero.
+#[inline(always)]
+fn vector_if<L: Lane>(mask: L::Mask, u: Vec3<L>) -> Vec3<L> {
+    let zero = L::constant(0.0);
+    vec3(L::select(zero, u.x, mask), L::select(zero, u.y, mask), L::select(zero, u.z, mask))
 }
 
 /// Solves rows x = g by Cramer's rule.
@@ -44,19 +84,37 @@ fn solve_3x3<L: Lane>(row_0: Vec3<L>, row_1: Vec3<L>, row_2: Vec3<L>, g: Vec3<L>
     (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0))
 }
 
-/// One step of Newton's method on (next - spin) + h I⁻¹ (m x I m) = 0 with m midway.
+/// The correction of one step of Newton's method on change + h I⁻¹ (m x I m) = 0, where m is the spin midway.
 #[inline(always)]
-fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, spin: Vec3<L>, next: Vec3<L>) -> Vec3<L> {
+fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, m: Vec3<L>, change: Vec3<L>) -> Vec3<L> {
     let (one, half) = (L::constant(1.0), L::constant(0.5));
     let (p, k) = (inertia.principal, inertia.inv_principal);
-    let m = (spin + next) * half;
     let l = p * m;
-    let residual = (next - spin) + k * (cross3(m, l) * h);
+    let residual = change + k * (cross3(m, l) * h);
     let f = k * (h * half);
     let row_0 = vec3(one, f.x * (l.z - m.z * p.y), f.x * (m.y * p.z - l.y));
     let row_1 = vec3(f.y * (m.z * p.x - l.z), one, f.y * (l.x - m.x * p.z));
     let row_2 = vec3(f.z * (l.y - m.y * p.x), f.z * (m.x * p.y - l.x), one);
-    next - solve_3x3(row_0, row_1, row_2, residual)
+    solve_3x3(row_0, row_1, row_2, residual)
+}
+
+/// The change of a spin in the time h, by `steps` steps of Newton's method. The unknown is the spin after h. With `from_start` the unknown
+/// is the change itself, because the rounding error of a spin is of the size of what a short substep changes.
+#[inline(always)]
+fn spin_change<S: Scalar>(from_start: bool, steps: u32, inertia: &Inertia<S>, h: S, spin: Vec3<S>) -> Vec3<S> {
+    let half = S::constant(0.5);
+    if from_start {
+        let mut change = Vec3::default();
+        for _ in 0..steps {
+            change -= newton_step(inertia, h, spin + change * half, change);
+        }
+        return change;
+    }
+    let mut next = spin;
+    for _ in 0..steps {
+        next -= newton_step(inertia, h, (spin + next) * half, next - spin);
+    }
+    next - spin
 }
 
 /// Square of the angle (rad) up to which two Newton steps leave no more than rounding.
@@ -67,6 +125,7 @@ const SLOW: f64 = 0.0625;
 #[cold]
 #[inline(never)]
 fn fast_turn<S: Scalar>(
+    from_start: bool,
     inertia: &Inertia<S>,
     substep: S,
     square: S,
@@ -76,11 +135,7 @@ fn fast_turn<S: Scalar>(
 ) -> Vec3<S> {
     let one = S::constant(1.0);
     let h = if square > one { substep * square.inverse_sqrt() } else { substep };
-    let mut next = spin;
-    for _ in 0..4 {
-        next = newton_step(inertia, h, spin, next);
-    }
-    let change = next - spin;
+    let change = spin_change(from_start, 4, inertia, h, spin);
     let turn = x * change.x + y * change.y + z * change.z;
     // Axes that are not quite of unit length stretch a large change, always in the same sense: the energy E is set back, to
     // E (3 - E)² / 4 of what it was, which is never above 1. A spin whose energy is no number stays.
@@ -104,6 +159,7 @@ fn fast_turn<S: Scalar>(
 /// at most.
 #[inline(always)]
 pub fn integrate_gyroscopic<S: Scalar>(
+    from_start: bool,
     params: &StepParams<S>,
     inertia: &Inertia<S>,
     body: &mut Body<S>,
@@ -120,7 +176,8 @@ pub fn integrate_gyroscopic<S: Scalar>(
     let z = turned(q, unit_z) + unit_z;
 
     // The free spin: impulses come after.
-    let spin = vec3(dot3(x, free.w), dot3(y, free.w), dot3(z, free.w));
+    let w = if from_start { free.w + body.w } else { free.w };
+    let spin = vec3(dot3(x, w), dot3(y, w), dot3(z, w));
 
     // (h W)²
     let a = vec3((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
@@ -130,13 +187,14 @@ pub fn integrate_gyroscopic<S: Scalar>(
     let square = dot3(sizes, angle * angle);
 
     let turn = if S::constant(SLOW) > square {
-        let next = newton_step(inertia, params.substep, spin, newton_step(inertia, params.substep, spin, spin));
         // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
-        let change = next - spin;
+        let change = spin_change(from_start, 2, inertia, params.substep, spin);
         x * change.x + y * change.y + z * change.z
     } else {
-        fast_turn(inertia, params.substep, square, [x, y, z], spin, free.w)
+        fast_turn(from_start, inertia, params.substep, square, [x, y, z], spin, w)
     };
-    free.w += turn;
+    if !from_start {
+        free.w += turn;
+    }
     body.w += turn;
 }

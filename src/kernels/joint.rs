@@ -86,7 +86,7 @@ pub fn solve_joint<L: Lane>(
 
     // The gap is pulled shut softly, or not at all in a relax sweep.
     let before = *impulse;
-    let mut wanted = relative_velocity(pair, anchors[0], anchors[1]);
+    let mut wanted = relative_velocity(rules, pair, anchors[0], anchors[1]);
     let (mut mass_scale, mut impulse_scale) = (one, zero);
     if rules.biased {
         wanted += (joint.gap + relative_movement(pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;

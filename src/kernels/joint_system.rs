@@ -293,7 +293,7 @@ pub fn factor_system<S: Scalar>(
 #[inline(always)]
 pub fn measure_joint<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, joint: &Joint<L>) -> Vec3<L> {
     let [r_a, r_b] = current_anchors(pair, joint);
-    let mut wanted = relative_velocity(pair, r_a, r_b);
+    let mut wanted = relative_velocity(rules, pair, r_a, r_b);
     if rules.biased {
         wanted += (joint.gap + relative_movement(pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
     }

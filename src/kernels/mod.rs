@@ -45,6 +45,8 @@ pub struct Rules {
     pub driven: bool,
     /// Whether corrections are held against the tolerance.
     pub measured: bool,
+    /// Whether velocities of bodies are changes since the step began.
+    pub from_start: bool,
 }
 
 impl Default for Rules {
@@ -60,6 +62,7 @@ impl Default for Rules {
             driven: false,
             passes: 1,
             measured: false,
+            from_start: false,
         }
     }
 }
@@ -72,7 +75,7 @@ impl Rules {
 
     /// The rules of joints.
     pub fn of_joints(self) -> Self {
-        Self { biased: self.biased, measured: self.measured, ..Self::default() }
+        Self { biased: self.biased, measured: self.measured, from_start: self.from_start, ..Self::default() }
     }
 
     /// How many of a manifold's rows are contact points; the patch is not.

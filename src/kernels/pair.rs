@@ -15,8 +15,13 @@ pub fn apply_impulse<L: Lane>(pair: &mut Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>, p:
 
 /// Velocity of b at r_b relative to a at r_a.
 #[inline(always)]
-pub fn relative_velocity<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
-    (pair.b.v + cross3(pair.b.w, r_b)) - (pair.a.v + cross3(pair.a.w, r_a))
+pub fn relative_velocity<L: Lane>(rules: Rules, pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
+    let u = (pair.b.v + cross3(pair.b.w, r_b)) - (pair.a.v + cross3(pair.a.w, r_a));
+    if rules.from_start {
+        let (a, b) = (&pair.start_a, &pair.start_b);
+        return u + ((b.v - a.v) + (cross3(b.w, r_b) - cross3(a.w, r_a)));
+    }
+    u
 }
 
 /// How far b at r_b moved relative to a at r_a since the step began.

@@ -18,7 +18,8 @@ pub struct Body<L> {
     pub dq: Quat<L>,
 }
 
-/// Double of the WGSL struct `Free`: velocities of a body as they would be without the impulses of this substep.
+/// Double of the WGSL struct `Free`: velocities of a body as they would be without the impulses of this substep; with
+/// `Rules::from_start`, as they were when the step began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Free<L> {
     /// Of the centre of mass.
@@ -204,6 +205,10 @@ pub struct Pair<L> {
     pub mass_a: Mass<L>,
     /// Mass of b.
     pub mass_b: Mass<L>,
+    /// Velocities of a when the step began, if those of `a` are changes since.
+    pub start_a: Free<L>,
+    /// Velocities of b when the step began.
+    pub start_b: Free<L>,
     /// 1 once a correction was above the tolerance.
     pub moving: L,
 }

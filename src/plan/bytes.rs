@@ -35,7 +35,8 @@ impl Pass {
         const MASS: usize = size_of::<MassRow>();
         // Velocities are the half of a body that a sweep writes.
         const VELOCITIES: usize = BODY / 2;
-        const PAIR: usize = 2 * (BODY + MASS + VELOCITIES);
+        let start = if self.kernel.reads_start() { 2 * size_of::<FreeRow>() } else { 0 };
+        let pair = 2 * (BODY + MASS + VELOCITIES) + start;
         const IMPULSE: usize = size_of::<ImpulseRow>();
         let rows = problem.rows_of(&self.colors);
         let points_of = |colors: &Range<u32>| {
@@ -43,11 +44,16 @@ impl Pass {
             end - first
         };
         let bytes = match self.kernel {
-            Kernel::IntegrateVelocities { warm_start } => {
-                rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * if warm_start { 2 } else { 1 })
+            Kernel::IntegrateVelocities { warm_start, from_start } => {
+                let free = usize::from(warm_start) + usize::from(!from_start);
+                rows.len() * (BODY + MASS / 3 + size_of::<FreeRow>() * free)
             }
-            Kernel::IntegratePositions => rows.len() * (BODY + BODY / 2),
-            Kernel::IntegrateGyroscopic => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
+            Kernel::BeginChanges => rows.len() * (2 * VELOCITIES + MASS / 3 + size_of::<FreeRow>()),
+            Kernel::EndChanges => rows.len() * (2 * VELOCITIES + size_of::<FreeRow>()),
+            Kernel::IntegratePositions { from_start } => {
+                rows.len() * (BODY + BODY / 2 + if from_start { size_of::<FreeRow>() } else { 0 })
+            }
+            Kernel::IntegrateGyroscopic { .. } => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
             Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes what was before, and writes where the sweep begins.
@@ -57,9 +63,9 @@ impl Pass {
                 problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * size_of::<StepLength<f32>>()
             }
             Kernel::MeasureJoints(_) | Kernel::WarmStartJoints | Kernel::ApplyJointChanges(_) => {
-                rows.len() * (PAIR + size_of::<JointRow>() + size_of::<JointImpulseRow>())
+                rows.len() * (pair + size_of::<JointRow>() + size_of::<JointImpulseRow>())
             }
-            Kernel::SolveJoints(_) => rows.len() * (PAIR + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::SolveJoints(_) => rows.len() * (pair + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
             Kernel::ClearImpulses => {
                 let patches = if problem.has_patches() { rows.len() } else { 0 };
@@ -72,7 +78,7 @@ impl Pass {
                 let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
                 // Friction at points goes over them a second time; per manifold it adds one row.
                 let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
-                contacts * (size_of::<ContactRow>() + PAIR) + (points + again + patches) * once
+                contacts * (size_of::<ContactRow>() + pair) + (points + again + patches) * once
             }
         };
         bytes as u64

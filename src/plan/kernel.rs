@@ -13,9 +13,18 @@ pub enum Kernel {
     IntegrateVelocities {
         /// Whether the impulses that the last substep ended with are applied as well, as velocities.
         warm_start: bool,
+        /// Whether velocities are changes since the step began, here and below.
+        from_start: bool,
     },
+    /// Velocities become changes since the step began; over bodies.
+    BeginChanges,
+    /// Changes become velocities; over bodies.
+    EndChanges,
     /// Free rotation of unequal moments of inertia; over `inertias`.
-    IntegrateGyroscopic,
+    IntegrateGyroscopic {
+        /// As of `IntegrateVelocities`.
+        from_start: bool,
+    },
     /// Forgets impulses; over contact colors, all at once.
     ClearImpulses,
     /// Inertia of bodies that turned; over `turning`.
@@ -53,7 +62,10 @@ pub enum Kernel {
     /// One sweep of the contacts; over contact colors.
     SolveContacts(Rules),
     /// Poses; over bodies.
-    IntegratePositions,
+    IntegratePositions {
+        /// As of `IntegrateVelocities`.
+        from_start: bool,
+    },
     /// Bounces; over contact colors.
     ApplyRestitution(Rules),
 }
@@ -63,7 +75,9 @@ impl Kernel {
     pub fn name(self) -> &'static str {
         match self {
             Self::IntegrateVelocities { .. } => "integrate_velocities",
-            Self::IntegrateGyroscopic => "integrate_gyroscopic",
+            Self::BeginChanges => "begin_changes",
+            Self::EndChanges => "end_changes",
+            Self::IntegrateGyroscopic { .. } => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
             Self::TurnInertias => "turn_inertias",
             Self::FactorJoints => "factor_joints",
@@ -78,7 +92,7 @@ impl Kernel {
             Self::SolveJointSystems(_) => "solve_joint_systems",
             Self::ApplyJointChanges(_) => "apply_joint_changes",
             Self::SolveContacts(_) => "solve_contacts",
-            Self::IntegratePositions => "integrate_positions",
+            Self::IntegratePositions { .. } => "integrate_positions",
             Self::ApplyRestitution(_) => "apply_restitution",
         }
     }
@@ -88,8 +102,10 @@ impl Kernel {
         matches!(
             self,
             Self::IntegrateVelocities { .. }
-                | Self::IntegrateGyroscopic
-                | Self::IntegratePositions
+                | Self::BeginChanges
+                | Self::EndChanges
+                | Self::IntegrateGyroscopic { .. }
+                | Self::IntegratePositions { .. }
                 | Self::TurnInertias
                 | Self::FactorJoints
                 | Self::SolveJointSystems(_)
@@ -110,6 +126,25 @@ impl Kernel {
         }
     }
 
+    /// Whether the kernel works with velocities that are changes since the step began.
+    pub fn is_from_start(self) -> bool {
+        match self {
+            Self::IntegrateVelocities { from_start, .. }
+            | Self::IntegrateGyroscopic { from_start }
+            | Self::IntegratePositions { from_start } => from_start,
+            _ => self.rules().is_some_and(|rules| rules.from_start),
+        }
+    }
+
+    /// Whether the kernel reads the velocities that the step began with, of pairs of bodies.
+    pub fn reads_start(self) -> bool {
+        let measures = matches!(
+            self,
+            Self::SolveJoints(_) | Self::MeasureJoints(_) | Self::SolveContacts(_) | Self::ApplyRestitution(_)
+        );
+        measures && self.is_from_start()
+    }
+
     /// Whether the kernel is left out where sweeps are no longer needed.
     pub fn is_measured(self) -> bool {
         match self {
@@ -127,8 +162,10 @@ impl Kernel {
 impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.name())?;
-        if matches!(self, Self::IntegrateVelocities { warm_start: true }) {
-            write!(f, "(warm start)")?;
+        match self {
+            Self::IntegrateVelocities { warm_start: true, .. } => write!(f, "(warm start)")?,
+            _ if self.rules().is_none() && self.is_from_start() => write!(f, "(from start)")?,
+            _ => {}
         }
         if let Some(r) = self.rules() {
             let friction = match r.friction {
@@ -147,6 +184,7 @@ impl fmt::Display for Kernel {
                 (r.driven, "driven"),
                 (r.passes > 1, "repeated"),
                 (r.measured, "measured"),
+                (r.from_start, "from start"),
             ];
             let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
             write!(f, "({})", on.join(", "))?;

@@ -12,7 +12,7 @@ use drystone::stages::plan::{Kernel, Pass};
 pub fn every_rules() -> Vec<Rules> {
     let mut all = Vec::new();
     for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
-        for bits in 0..128 {
+        for bits in 0..256 {
             let has = |bit: u32| bits >> bit & 1 == 1;
             let rules = Rules {
                 biased: has(0),
@@ -24,13 +24,19 @@ pub fn every_rules() -> Vec<Rules> {
                 measured: has(5),
                 driven: has(6),
                 passes: 1 + u8::from(has(6)),
+                from_start: has(7),
             };
+            // Velocities since the start of the step meet every sum of velocities without the rules below.
+            let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
             // Without friction it does not matter when it acts. Belts drive points only; with them, and with repeated passes,
             // the rest of the rules is not tried again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
                 && rules.accumulated
                 && !(rules.patch || rules.round || rules.measured);
-            if (friction != FrictionRule::None || !rules.friction_first) && (drivable || !rules.driven) {
+            if (friction != FrictionRule::None || !rules.friction_first)
+                && (drivable || !rules.driven)
+                && (plain || !rules.from_start)
+            {
                 all.push(rules);
             }
         }
@@ -41,10 +47,15 @@ pub fn every_rules() -> Vec<Rules> {
 /// Every kernel under every combination of rules.
 pub fn every_kernel() -> Vec<Kernel> {
     let mut all = vec![
-        Kernel::IntegrateVelocities { warm_start: false },
-        Kernel::IntegrateVelocities { warm_start: true },
-        Kernel::IntegrateGyroscopic,
-        Kernel::IntegratePositions,
+        Kernel::IntegrateVelocities { warm_start: false, from_start: false },
+        Kernel::IntegrateVelocities { warm_start: true, from_start: false },
+        Kernel::IntegrateVelocities { warm_start: false, from_start: true },
+        Kernel::BeginChanges,
+        Kernel::EndChanges,
+        Kernel::IntegrateGyroscopic { from_start: false },
+        Kernel::IntegrateGyroscopic { from_start: true },
+        Kernel::IntegratePositions { from_start: false },
+        Kernel::IntegratePositions { from_start: true },
         Kernel::ClearImpulses,
         Kernel::BeginSweep { first: true },
         Kernel::BeginSweep { first: false },
@@ -64,7 +75,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         all.push(Kernel::SolveJointSystems(rules.of_joints()));
         all.push(Kernel::ApplyJointChanges(rules.of_joints()));
         all.push(Kernel::SolveContacts(rules));
-        all.push(Kernel::ApplyRestitution(Rules { patch: rules.patch, ..Rules::default() }));
+        let Rules { patch, from_start, .. } = rules;
+        all.push(Kernel::ApplyRestitution(Rules { patch, from_start, ..Rules::default() }));
     }
     let mut known = HashSet::new();
     all.retain(|kernel| known.insert(*kernel));
@@ -92,8 +104,11 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
         Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
             contacts
         }
-        Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => bodies,
-        Kernel::IntegrateGyroscopic => inertias,
+        Kernel::IntegrateVelocities { .. }
+        | Kernel::BeginChanges
+        | Kernel::EndChanges
+        | Kernel::IntegratePositions { .. } => bodies,
+        Kernel::IntegrateGyroscopic { .. } => inertias,
         _ => 0..0,
     }
 }

@@ -133,9 +133,9 @@ fn indices(words: &[u32]) -> (usize, usize) {
 #[test]
 fn no_index_leaves_its_buffer() {
     let small_world: std::sync::Arc<[Kernel]> = [
-        Kernel::IntegrateVelocities { warm_start: false },
+        Kernel::IntegrateVelocities { warm_start: false, from_start: false },
         Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, round: true, ..Rules::default() }),
-        Kernel::IntegratePositions,
+        Kernel::IntegratePositions { from_start: false },
     ]
     .into();
     for program in every_program().into_iter().chain([Program::OneDispatch(small_world, 16)]) {

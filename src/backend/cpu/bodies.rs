@@ -6,7 +6,9 @@ use std::ops::Range;
 
 use super::shared::Shared;
 use super::simd::{Lanes, Row8, WIDTH, Work, lanes};
-use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
+use crate::kernels::integrate::{
+    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_velocities, start_of,
+};
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
@@ -97,7 +99,7 @@ pub(super) struct BodyWork<'a> {
     pub params: &'a Params,
     pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
-    /// v . w . of each without the impulses of the substep.
+    /// v . w . of each without the impulses of the substep, or when the step began.
     pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
 }
@@ -112,26 +114,36 @@ impl Work for BodyWork<'_> {
             let states = unsafe { self.bodies.slice(range.clone()) };
             // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
             let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
-            if let Kernel::IntegrateVelocities { warm_start } = self.kernel {
-                let accelerations = &self.accelerations[range.clone()];
-                // SAFETY: as above.
-                let rows = unsafe { self.free.slice(range) };
-                // SAFETY: `NEIGHBORING_ROWS` are the places of the sixteen rows of each slice.
-                let (acceleration, free) = unsafe {
-                    (
-                        L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS),
-                        L::gathered(rows.as_ptr(), &NEIGHBORING_ROWS),
-                    )
-                };
-                let ([x, y, z, ..], mut free) = (acceleration, free_body(free));
-                let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
-                integrate_velocities(warm_start, &params, &mass, &mut body, &mut free);
-                rows.copy_from_slice(&velocity_rows(free.v, free.w));
-            } else {
-                integrate_positions(&params, &mut body);
-                for (state, movement) in states.iter_mut().zip(movement_rows(&body)) {
-                    state.movement = movement;
+            let accelerations = &self.accelerations[range.clone()];
+            // SAFETY: as above.
+            let rows = unsafe { self.free.slice(range) };
+            // SAFETY: `NEIGHBORING_ROWS` are the places of the sixteen rows of the slice.
+            let mut free = free_body(unsafe { L::gathered(rows.as_ptr(), &NEIGHBORING_ROWS) });
+            match self.kernel {
+                Kernel::IntegrateVelocities { warm_start, from_start } => {
+                    // SAFETY: as above.
+                    let [x, y, z, ..] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS) };
+                    let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
+                    integrate_velocities(warm_start, from_start, &params, &mass, &mut body, &mut free);
+                    if !from_start {
+                        rows.copy_from_slice(&velocity_rows(free.v, free.w));
+                    }
                 }
+                Kernel::BeginChanges => {
+                    // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
+                    let mass = unsafe { wide_mass::<L>(states.as_ptr(), &NEIGHBORS) };
+                    begin_changes(&mass, &mut body, &mut free);
+                    rows.copy_from_slice(&velocity_rows(free.v, free.w));
+                }
+                Kernel::EndChanges => end_changes(&mut body, &free),
+                Kernel::IntegratePositions { from_start } => {
+                    integrate_positions(from_start, &params, &mut body, &free);
+                    for (state, movement) in states.iter_mut().zip(movement_rows(&body)) {
+                        state.movement = movement;
+                    }
+                    continue;
+                }
+                kernel => unreachable!("{kernel} goes over other rows"),
             }
             for (state, velocity) in states.iter_mut().zip(velocity_rows(body.v, body.w)) {
                 state.velocity = velocity;
@@ -172,6 +184,7 @@ impl Work for TurningWork<'_> {
 
 /// Turns the spins of some bodies with unequal moments of inertia, given with their slots.
 pub(super) fn integrate_spins(
+    from_start: bool,
     (params, substep): (&Params, &Substep),
     inertias: &[(usize, Inertia<f32>)],
     bodies: &Shared<State>,
@@ -182,7 +195,7 @@ pub(super) fn integrate_spins(
         // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
         let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
         let (mut body, mut free) = (state.load(), free_body(row.0));
-        integrate_gyroscopic(&params, inertia, &mut body, &mut free);
+        integrate_gyroscopic(from_start, &params, inertia, &mut body, &mut free);
         state.velocity = Row8(velocity_numbers(body.v, body.w));
         *row = Row8(velocity_numbers(free.v, free.w));
     }
@@ -226,6 +239,28 @@ pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WI
         (L::gathered(&raw const (*states).velocity, places), L::gathered(&raw const (*states).movement, places))
     };
     body(velocity, movement)
+}
+
+/// The masses of sixteen bodies at the given places.
+///
+/// # Safety
+/// As of [`wide_body`].
+#[inline(always)]
+pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
+    // SAFETY: the caller's promise.
+    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = unsafe { L::gathered(&raw const (*states).mass, places) };
+    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
+}
+
+/// The velocities of sixteen bodies when the step began, beside their states at the given places.
+///
+/// # Safety
+/// As of [`wide_body`], and `free` has a row for each state.
+#[inline(always)]
+pub(super) unsafe fn wide_start<L: Lanes>(free: *const Row8, places: &[u32; WIDTH], mass: &Mass<L>) -> Free<L> {
+    const ROWS: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;
+    // SAFETY: the caller's promise.
+    start_of(mass, &free_body(unsafe { L::gathered(free, &places.map(|place| place / ROWS)) }))
 }
 
 #[inline(always)]

@@ -115,7 +115,8 @@ impl SystemWork<'_> {
             let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
             (state.load(), Mass { inv_inertia, inv_mass, acceleration: Vec3::default() })
         });
-        (Joint::load(row), Pair { a, b, mass_a, mass_b, moving: 0.0 })
+        // A factorization reads no velocity.
+        (Joint::load(row), Pair { a, b, mass_a, mass_b, ..Pair::default() })
     }
 }
 

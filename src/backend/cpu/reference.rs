@@ -5,7 +5,9 @@ use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
 use crate::kernels::contact::clear_impulse;
 use crate::kernels::convergence::begin_sweep;
-use crate::kernels::integrate::{integrate_gyroscopic, integrate_positions, integrate_velocities};
+use crate::kernels::integrate::{
+    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_velocities, start_of,
+};
 use crate::kernels::joint_system::{JointChanges, JointFactors, factor_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
 use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
@@ -64,24 +66,34 @@ impl<S: Scalar> Reference<S> {
             return;
         }
         let params = self.rows.params[pass.block as usize];
+        self.free.resize(self.rows.bodies.len(), Free::default());
         match pass.kernel {
-            Kernel::IntegrateVelocities { warm_start } => {
-                self.free.resize(self.rows.bodies.len(), Free::default());
+            Kernel::IntegrateVelocities { warm_start, from_start } => {
                 for i in places(problem, pass) {
                     let (mass, body, free) = (&self.rows.masses[i], &mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_velocities(warm_start, &params, mass, body, free);
+                    integrate_velocities(warm_start, from_start, &params, mass, body, free);
                 }
             }
-            Kernel::IntegrateGyroscopic => {
+            Kernel::BeginChanges => {
+                for i in places(problem, pass) {
+                    begin_changes(&self.rows.masses[i], &mut self.rows.bodies[i], &mut self.free[i]);
+                }
+            }
+            Kernel::EndChanges => {
+                for i in places(problem, pass) {
+                    end_changes(&mut self.rows.bodies[i], &self.free[i]);
+                }
+            }
+            Kernel::IntegrateGyroscopic { from_start } => {
                 for row in places(problem, pass) {
                     let i = problem.inertias[row].body as usize;
                     let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
-                    integrate_gyroscopic(&params, &self.rows.inertias[row], body, free);
+                    integrate_gyroscopic(from_start, &params, &self.rows.inertias[row], body, free);
                 }
             }
-            Kernel::IntegratePositions => {
+            Kernel::IntegratePositions { from_start } => {
                 for i in places(problem, pass) {
-                    integrate_positions(&params, &mut self.rows.bodies[i]);
+                    integrate_positions(from_start, &params, &mut self.rows.bodies[i], &self.free[i]);
                 }
             }
             Kernel::ClearImpulses => {
@@ -183,7 +195,9 @@ impl<S: Scalar> Reference<S> {
     fn load_pair(&self, bodies: [u32; 2]) -> Pair<S> {
         let [a, b] = bodies.map(|body| body as usize);
         let (mass_a, mass_b) = (self.rows.masses[a], self.rows.masses[b]);
-        Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, moving: S::constant(0.0) }
+        let [start_a, start_b] = [(a, &mass_a), (b, &mass_b)].map(|(i, mass)| start_of(mass, &self.free[i]));
+        let moving = S::constant(0.0);
+        Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, start_a, start_b, moving }
     }
 
     /// A body that cannot move is never written.

@@ -47,15 +47,18 @@ impl SharedStep<'_> {
         let (kernel, params, bodies) = (pass.kernel, self.params, self.bodies);
         let substep = &self.blocks[pass.block as usize].substep;
         match kernel {
-            Kernel::IntegrateVelocities { .. } | Kernel::IntegratePositions => {
+            Kernel::IntegrateVelocities { .. }
+            | Kernel::BeginChanges
+            | Kernel::EndChanges
+            | Kernel::IntegratePositions { .. } => {
                 let work =
                     BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
                 spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
             }
-            Kernel::IntegrateGyroscopic => {
+            Kernel::IntegrateGyroscopic { from_start } => {
                 let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
                 let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
-                integrate_spins((params, substep), &self.inertias[first..end], &bodies, &self.free);
+                integrate_spins(from_start, (params, substep), &self.inertias[first..end], &bodies, &self.free);
             }
             Kernel::ClearImpulses => {
                 for color in pass.colors.clone() {
@@ -108,9 +111,9 @@ impl SharedStep<'_> {
         impulses: Shared<[Wide; 4]>,
         spread: Spread,
     ) {
-        let (kernel, params, bodies, moving) = (pass.kernel, self.params, self.bodies, self.moving);
+        let (kernel, params, bodies, free, moving) = (pass.kernel, self.params, self.bodies, self.free, self.moving);
         let substep = &self.blocks[pass.block as usize].substep;
-        let work = Sweep { kernel, params, substep, bodies, layout, impulses, moving };
+        let work = Sweep { kernel, params, substep, bodies, free, layout, impulses, moving };
         for color in pass.colors.clone() {
             spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
         }

@@ -5,13 +5,12 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bodies::{State, velocity_rows, wide_body};
+use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_layout::{BodyLanes, LaneGroup, LaneLayout};
 use super::shared::Shared;
-use super::simd::{Lanes, WIDTH, Wide, Work, row_at};
-use crate::kernels::{Body, Contact, Impulse, Joint, Mass, Pair, Point, StepParams, Sym3};
-use crate::math::{Vec3, vec3};
+use super::simd::{Lanes, Row8, WIDTH, Wide, Work, row_at};
+use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
 
@@ -21,6 +20,7 @@ pub(super) struct Sweep<'a, C> {
     pub params: &'a Params,
     pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
+    pub free: Shared<'a, Row8>,
     pub layout: &'a LaneLayout<C>,
     pub impulses: Shared<'a, [Wide; 4]>,
     /// Set if a correction was above the tolerance.
@@ -44,6 +44,14 @@ impl<C: Constraint> Sweep<'_, C> {
         // SAFETY: `BodyLanes::set` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
         // holds that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
+        if self.kernel.is_from_start() {
+            let free = self.free.as_ptr();
+            // SAFETY: as above, and each state has a row of `free`, which no sweep writes.
+            unsafe {
+                pair.start_a = wide_start(free, &group.a.places, &pair.mass_a);
+                pair.start_b = wide_start(free, &group.b.places, &pair.mass_b);
+            }
+        }
         let rows = group.impulses();
         // Impulses and rows are used in place: copies were most of what a sweep moved.
         // SAFETY: `Impulse` is `repr(C)` and holds lanes only; `LaneLayout::make_groups` gives each group impulses of its own.
@@ -93,18 +101,11 @@ unsafe fn wide_pair<L: Lanes>(states: *const State, a: &BodyLanes, b: &BodyLanes
             b: wide_body::<L>(states, &b.places),
             mass_a: wide_mass::<L>(states, &a.places),
             mass_b: wide_mass::<L>(states, &b.places),
+            start_a: Free::default(),
+            start_b: Free::default(),
             moving: L::constant(0.0),
         }
     }
-}
-
-/// # Safety
-/// As of [`wide_pair`].
-#[inline(always)]
-unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
-    // SAFETY: the caller's promise.
-    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = unsafe { L::gathered(&raw const (*states).mass, places) };
-    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
 }
 
 /// Writes the velocities of those that can move.

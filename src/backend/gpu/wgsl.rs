@@ -82,12 +82,18 @@ enum Over {
 fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
-        Kernel::IntegrateVelocities { warm_start } => {
-            let call = format!("integrate_velocity({warm_start}, row)");
+        Kernel::IntegrateVelocities { warm_start, from_start } => {
+            let call = format!("integrate_velocity({warm_start}, {from_start}, row)");
             (&[part!("integrate_velocities")], Over::Colors, call)
         }
-        Kernel::IntegrateGyroscopic => (&[part!("integrate_gyroscopic")], Over::Colors, "turn_spin(row)".into()),
-        Kernel::IntegratePositions => (&[part!("integrate_positions")], Over::Colors, "integrate_position(row)".into()),
+        Kernel::BeginChanges => (&[part!("begin_changes")], Over::Colors, "begin_change(row)".into()),
+        Kernel::EndChanges => (&[part!("end_changes")], Over::Colors, "end_change(row)".into()),
+        Kernel::IntegrateGyroscopic { from_start } => {
+            (&[part!("integrate_gyroscopic")], Over::Colors, format!("turn_spin({from_start}, row)"))
+        }
+        Kernel::IntegratePositions { from_start } => {
+            (&[part!("integrate_positions")], Over::Colors, format!("integrate_position({from_start}, row)"))
+        }
         Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
         Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
         Kernel::Extrapolate { first, measured } => {
@@ -130,15 +136,16 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
             (parts, Over::Colors, with("solve_contact", rules))
         }
-        Kernel::ApplyRestitution(_) => {
-            (&[part!("lib/pair"), part!("apply_restitution")], Over::Colors, "restitute_contact(row)".into())
+        Kernel::ApplyRestitution(rules) => {
+            (&[part!("lib/pair"), part!("apply_restitution")], Over::Colors, with("restitute_contact", rules))
         }
     }
 }
 
 /// A constant of the struct `Rules` of `lib/rules.wgsl`.
 fn rules_text(rules: Rules) -> String {
-    let Rules { biased, patch, friction_first, accumulated, round, passes, driven, measured, friction } = rules;
+    let Rules { biased, patch, friction_first, accumulated, round, passes, driven, measured, from_start, friction } =
+        rules;
     let friction = match friction {
         FrictionRule::None => "NONE",
         FrictionRule::Slip => "SLIP",
@@ -146,19 +153,22 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start})"
     )
 }
 
 /// The WGSL of some kernels. `colors` is the WGSL of the colors of a pass; `main` makes the body of the entry point of the calls.
 fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[String]) -> String) -> String {
-    // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections.
+    // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections, and `free` only
+    // where a kernel reads it.
     let is_measured = kernels.iter().any(|kernel| kernel.is_measured());
+    let reads_start = kernels.iter().any(|kernel| kernel.reads_start());
     let mut parts = vec![
         part!("lib/types"),
         part!("lib/math"),
         part!("lib/rules"),
         if is_measured { part!("lib/measured") } else { part!("lib/unmeasured") },
+        if reads_start { part!("lib/from_start") } else { part!("lib/whole") },
     ];
     let (mut calls, mut loops) = (Vec::new(), String::new());
     for (at, &kernel) in kernels.iter().enumerate() {
