@@ -162,7 +162,9 @@ impl Pair {
         let size = self.size;
         let approach = (b.v - a.v).length() + self.reach_b * (b.w - a.w).length();
         let base = margins.speculative * size + margins.fall;
-        let prediction = base + (approach * margins.dt).min(2.0 * size);
+        // A contact with a plane is true however far away it is seen; with others it would stop what passes by.
+        let farthest = if colliders[self.collider_a as usize].unbounded { f32::MAX } else { 2.0 * size };
+        let prediction = base + (approach * margins.dt).min(farthest);
 
         if let Some([a_then, b_then]) = &self.computed_at {
             let (a_now, b_now) = (Placed::of(a), Placed::of(b));
