@@ -13,7 +13,7 @@ use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
-use stages::Stages;
+use stages::{Changes, Stages};
 
 pub use manifolds::{SolvedManifold, SolvedPoint};
 
@@ -33,7 +33,8 @@ pub use manifolds::{SolvedManifold, SolvedPoint};
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies. Between steps may change: gravity; poses, velocities, forces, masses and materials of bodies; joints, which are
+    /// The bodies, with their moments of inertia raised where they are too small ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)).
+    /// Between steps may change: gravity; poses, velocities, forces, masses and materials of bodies; joints, which are
     /// told apart by their bodies and anchors. Number, kinds and shapes of bodies may not: the next step then is an error.
     pub world: World,
     config: SolverConfig,
@@ -49,9 +50,10 @@ impl Simulation {
     ///
     /// # Errors
     /// A setting is out of range or contradicts another; a body or joint of the world is not fit to be simulated.
-    pub fn new(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
+    pub fn new(mut world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
         world.check()?;
+        world.raise_inertias();
         Ok(Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false })
     }
 
@@ -98,10 +100,19 @@ impl Simulation {
         Ok((contacts, stats))
     }
 
+    /// The changes of the caller since the last step.
+    fn changes(&mut self, dt: f32) -> Result<Changes> {
+        let changes = self.stages.changes(&self.world, &self.config, dt)?;
+        if changes.surfaces() {
+            self.world.raise_inertias();
+        }
+        Ok(changes)
+    }
+
     /// Assembles a step; false if there is nothing to do in it.
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         check_step_length(dt)?;
-        let changes = timed(&mut stats.times.detect, || self.stages.changes(&self.world, &self.config, dt))?;
+        let changes = timed(&mut stats.times.detect, || self.changes(dt))?;
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.leave_device();
         }
@@ -147,8 +158,8 @@ impl Simulation {
     pub fn next_problem(&mut self, dt: f32) -> Result<(StepProblem, StepPlan)> {
         check_step_length(dt)?;
         self.fetch();
+        let changes = self.changes(dt)?;
         let mut next = self.stages.clone();
-        let changes = next.changes(&self.world, &self.config, dt)?;
         next.follow(&self.world, &self.config, dt, changes);
         next.is_everything_still(&self.world, &mut StepStats::default());
         next.find(&self.world, &self.config, dt, &mut StepStats::default());

@@ -164,6 +164,29 @@ fn effective_masses_are_entries_of_the_dense_product() {
     close(effective.twist(), 1.0 / spin);
 }
 
+/// A thin rod at the angle q on a floor: mu 3 sin q cos q/(1 + 3 cos² q), which is 1 at mu = 4/3 and tan q = 2 and below 1 elsewhere.
+#[test]
+fn friction_jams_a_rod_as_painleve_says() {
+    let ratio = |mu: f32, angle: f32| {
+        let (sin, cos) = angle.sin_cos();
+        let along = Vec3::new(cos, sin, 0.0);
+        let across = Mat3::IDENTITY - Mat3::from_cols(along * along.x, along * along.y, along * along.z);
+        let rod = InverseMass { mass: 2.0, inertia: across * (2.0 * 3.0) };
+        let floor = InverseMass { mass: 0.0, inertia: Mat3::ZERO };
+        let row = ContactRow { friction: mu, ..ContactRow::framed(Vec3::Y) };
+        EffectiveMass { inverse: &[floor, rod], row: &row }.jamming(Vec3::ZERO, -along)
+    };
+    for (mu, angle) in [(1.5, 1.0), (3.0, 0.7), (0.6, 1.2_f32)] {
+        let (sin, cos) = angle.sin_cos();
+        let exact = mu * 3.0 * sin * cos / (1.0 + 3.0 * cos * cos);
+        assert!((ratio(mu, angle) / exact - 1.0).abs() < 1e-5, "{mu}, {angle}: {} and not {exact}", ratio(mu, angle));
+    }
+    let critical = 2.0_f32.atan();
+    assert!((ratio(4.0 / 3.0, critical) - 1.0).abs() < 1e-5);
+    assert!([-0.1, 0.1].iter().all(|off| ratio(4.0 / 3.0, critical + off) < 0.999));
+    assert_eq!(ratio(0.53, critical), 0.0, "too little friction for any solid");
+}
+
 #[test]
 fn the_block_of_a_joint_is_the_dense_product() {
     let case = case();

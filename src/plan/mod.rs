@@ -39,7 +39,13 @@ struct Sweeps<'a> {
     systems: &'a [Range<u32>],
     direct: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
+    /// Contacts whose friction jams.
+    jamming: &'a [Range<u32>],
 }
+
+/// Sweeps over a contact that jams before the next contact. A rod whose tip is pushed into a floor (`drystone hard --case painleve`) gains
+/// up to 2.8e-2 of its energy in a step with 1 sweep, 7.7e-3 with 2, 5.4e-4 with 4 and 1e-5 with 8, at 4 to 128 substeps.
+const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -117,6 +123,7 @@ impl StepPlan {
         let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
         let (contacts, joints, direct) =
             (groups(&contact_colors), groups(&own.swept_joints()), groups(&own.direct_joints()));
+        let [swept_once, jamming] = own.contacts_by_jamming().map(|colors| groups(&colors));
         // A color without rows needs no pass.
         let kept = |color: &'_ Range<u32>| !problem.rows_of(color).is_empty();
         let [bodies, inertias, systems, turning] =
@@ -132,7 +139,8 @@ impl StepPlan {
             joints: &joints,
             systems,
             direct: &direct,
-            contacts: &contacts,
+            contacts: &swept_once,
+            jamming: &jamming,
         };
         // Friction needs some sweep to happen in.
         let relax_only = config.friction_sweeps == FrictionSweeps::Relax && config.relax > 0;
@@ -186,6 +194,7 @@ impl StepPlan {
             systems: &[],
             direct: &[],
             contacts: &contacts,
+            jamming: &[],
         };
         plan.sweeps(sweeps, rules);
         plan
@@ -220,6 +229,8 @@ impl StepPlan {
             }
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
+            let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
+            self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
                 self.over_all(Kernel::MeasureStep, block);
                 self.over_all(Kernel::UpdateMomentum, block);

@@ -13,7 +13,7 @@ use crate::effort::Effort;
 use crate::graph::Coloring;
 use crate::world::{BodyKind, World};
 
-/// Islands that take substeps of one length, by their colors, 96 B. No constraint holds bodies of two blocks that can move.
+/// Islands that take substeps of one length, by their colors, 100 B. No constraint holds bodies of two blocks that can move.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Block {
@@ -23,6 +23,8 @@ pub struct Block {
     pub substep: Substep,
     /// First color of the contacts, and one past the last.
     pub contacts: [u32; 2],
+    /// The first of those colors whose contacts jam, and are swept several times each.
+    pub jamming: u32,
     /// First color of the joints, and one past the last.
     pub joints: [u32; 2],
     /// The first of those colors whose joints are solved at once and not swept.
@@ -45,6 +47,12 @@ impl Block {
         let [bodies, inertias, systems, turning] =
             [self.bodies, self.inertias, self.systems, self.turning].map(|color| color..color + 1);
         [c..c_end, j..j_end, bodies, inertias, systems, turning]
+    }
+
+    /// Colors of the contacts that do not jam, and of those that do.
+    pub fn contacts_by_jamming(&self) -> [Range<u32>; 2] {
+        let [first, end] = self.contacts;
+        [first..self.jamming, self.jamming..end]
     }
 
     /// Colors of the joints that are swept.
@@ -74,7 +82,9 @@ pub fn lay_out(
         colors,
         blocks,
         bodies,
+        masses,
         inertias,
+        points,
         contacts: rows,
         joints: joint_rows,
         systems,
@@ -90,17 +100,22 @@ pub fn lay_out(
         let substeps = config.substeps << effort.class_of_block(block);
         Block { substeps, substep: Substep::new(config, dt / substeps as f32), ..Block::default() }
     }));
+    let jamming = contacts.jamming(world, rows, points, masses);
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
-    if count == 1 {
+    if count == 1 && jamming.is_empty() {
         order.extend_from_slice(&contacts.coloring.order);
         colors.clone_from(&contacts.coloring.offsets);
         blocks[0].contacts = [0, contacts.coloring.color_count() as u32];
+        blocks[0].jamming = blocks[0].contacts[1];
     } else {
         for (i, block) in blocks.iter_mut().enumerate() {
             let is_of = |row: u32| block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
-            block.contacts = deal_colors(&contacts.coloring, order, colors, is_of);
+            let jams = |row: u32| jamming.binary_search(&row).is_ok();
+            let [first, jamming] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && !jams(row));
+            let [_, end] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && jams(row));
+            (block.contacts, block.jamming) = ([first, end], jamming);
         }
     }
     // The bodies of a joint that can move are of one island, and those of a system.

@@ -2,8 +2,9 @@
 
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
+use super::effective::{EffectiveMass, InverseMass, LEAST_JAMMING};
 use super::points_a_slot;
-use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
+use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow, Substep};
 use super::slots::{Slots, Write};
 use super::write::{Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};
@@ -117,6 +118,21 @@ impl ContactRows {
             }
             Interface { a, b, need: slot.need, is_joint: false }
         })
+    }
+
+    /// The contacts that take part and jam, ascending: those with a point of [`EffectiveMass::jamming`] above 1.
+    pub fn jamming(&self, world: &World, rows: &[ContactRow], points: &[PointRow], masses: &[MassRow]) -> Vec<u32> {
+        if world.bodies.iter().all(|body| body.material.friction <= LEAST_JAMMING) {
+            return Vec::new();
+        }
+        let jams = |&row: &u32| {
+            let row = &rows[row as usize];
+            let inverse = [row.body_a, row.body_b].map(|body| InverseMass::of(&masses[body as usize]));
+            let effective = EffectiveMass { inverse: &inverse, row };
+            let own = &points[row.first_point as usize..][..row.point_count as usize];
+            own.iter().any(|p| effective.jamming(p.r_a.into(), p.r_b.into()) > 1.0)
+        };
+        self.slots.taking_part().filter(jams).collect()
     }
 
     /// Writes the rows of a step of `dt` seconds, after those of bodies.

@@ -2,10 +2,14 @@
 
 use std::ops::Div;
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 use super::rows::{ContactRow, MassRow};
 use crate::math::Scalar;
+
+/// Friction up to which no solid of even density jams. A point at the lever r from the center of such a solid has m r²/I <= 15, and friction
+/// below 2/√14 jams no point with that (docs/derivation.md, section 6).
+pub const LEAST_JAMMING: f32 = 0.53;
 
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +65,18 @@ impl EffectiveMass<'_> {
     pub fn twist(&self) -> f32 {
         let n = Vec3::from_array(self.row.normal);
         inverse_or_zero(self.inverse.iter().map(|i| n.dot(i.inertia * n)).sum())
+    }
+
+    /// The largest change of the normal velocity by friction, for a normal impulse of 1, over that by the impulse itself. Where the ratio is above
+    /// 1, friction that slides can press the surfaces together faster than the normal impulse parts them (Painlevé).
+    pub fn jamming(&self, r_a: Vec3, r_b: Vec3) -> f32 {
+        if self.row.friction <= LEAST_JAMMING {
+            return 0.0;
+        }
+        let n = Vec3::from_array(self.row.normal);
+        let (t_1, t_2) = self.row.tangents();
+        let [parted, pressed_1, pressed_2] = [n, t_1, t_2].map(|d| self.entry(r_a, r_b, n, d));
+        self.row.friction * Vec2::new(pressed_1, pressed_2).length() * inverse_or_zero(parted)
     }
 
     /// The entry of the directions `d` and `e` at arms `r_a`, `r_b`.

@@ -129,8 +129,18 @@ impl StepProblem {
         }
         let [bodies, inertias, systems, turning] = [0, 1, 2, 3].map(|kind| joints[1] + kind);
         let contacts = [0, contact_colors];
-        self.blocks =
-            vec![Block { substeps: 1, substep, contacts, joints, direct, bodies, inertias, systems, turning }];
+        self.blocks = vec![Block {
+            substeps: 1,
+            substep,
+            contacts,
+            jamming: contact_colors,
+            joints,
+            direct,
+            bodies,
+            inertias,
+            systems,
+            turning,
+        }];
     }
 
     /// Whether a patch follows the points of every contact.

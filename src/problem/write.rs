@@ -146,11 +146,15 @@ impl Writer<'_> {
                 FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
                 FrictionRule::None | FrictionRule::Slip => 0.0,
             };
+            // Normal impulse and friction in turn swing about their solution where friction lifts more than the impulse does. Shorter
+            // steps end that.
+            let jamming = effective.jamming(p.r_a, p.r_b);
+            let normal_step = if jamming > 1.0 { 1.0 / (1.0 + jamming) } else { 1.0 };
             *computed = p.separation;
             *point = PointRow {
                 r_a: p.r_a.to_array(),
                 r_b: p.r_b.to_array(),
-                normal_mass: effective.normal(p.r_a, p.r_b),
+                normal_mass: effective.normal(p.r_a, p.r_b) * normal_step,
                 tangent_mass,
                 ..PointRow::default()
             };

@@ -53,6 +53,11 @@ pub(super) struct Changes {
 }
 
 impl Changes {
+    /// Whether masses or materials changed.
+    pub fn surfaces(self) -> bool {
+        self.surfaces
+    }
+
     /// Whether all rows of contacts change with it, so that a device cannot go on from those that it has.
     pub fn all_rows(self) -> bool {
         self.settings || self.surfaces || self.step

@@ -78,7 +78,8 @@ pub struct Body {
     pub angular_velocity: Vec3,
     /// Force through the center of mass, besides gravity, constant until changed (N).
     pub force: Vec3,
-    /// Mass, center of mass and inertia; zero unless dynamic.
+    /// Mass, center of mass and inertia; zero unless dynamic. A simulation raises moments of inertia that are less than a 32nd of the mass
+    /// times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
     pub mass: MassProperties,
     /// Surface.
     pub material: Material,
@@ -194,11 +195,11 @@ impl Body {
         if self.kind != BodyKind::Dynamic {
             return;
         }
-        let masses = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
+        let solids = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
             let own = c.shape.0.mass_properties(1.0);
             own.transform_by(&pose(c.position, c.rotation))
         });
-        self.mass = MassProperties::from_parry(&masses.sum(), self.density);
+        self.mass = MassProperties::of_solids(&solids.collect::<Vec<_>>(), self.density);
     }
 
     /// Whether it is kinematic and moves.
@@ -249,6 +250,13 @@ impl Body {
     /// Angular velocity along the principal axes.
     fn principal_spin(&self) -> DVec3 {
         (self.rotation * self.mass.principal_frame).as_dquat().inverse() * self.angular_velocity.as_dvec3()
+    }
+
+    /// Raises moments of inertia that are too small beside its mass and its shapes: [`MassProperties::MOST_LEVERAGE`].
+    pub(crate) fn raise_inertia(&mut self) {
+        if self.kind == BodyKind::Dynamic {
+            self.mass = self.mass.raised(&self.colliders);
+        }
     }
 
     /// Refuses a body that cannot be simulated.

@@ -2,10 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
 
+use super::body::Collider;
 use super::limits::{is_place, is_rotation};
+use super::shape::pose;
 use crate::error::{Result, ensure};
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
@@ -33,6 +35,18 @@ impl MassProperties {
     /// Largest ratio of two moments of a body; that of a rod is a sixth of the square of its length over its radius.
     pub const MOST_RATIO: f32 = 1e12;
 
+    /// Largest ratio of m r² to a moment of inertia that a simulation takes, r the lever of the shapes about that axis. The ratio is 3 for
+    /// boxes, 2.5 for balls and 20 at most for cones. From about 100 on sweeps point by point never bring a body to rest
+    /// (docs/derivation.md, section 3).
+    pub const MOST_LEVERAGE: f32 = 32.0;
+
+    /// These, with every moment of inertia raised to what [`Self::MOST_LEVERAGE`] asks for.
+    pub(super) fn raised(mut self, colliders: &[Collider]) -> Self {
+        let least = squared_levers(&self, colliders) * (self.mass / Self::MOST_LEVERAGE);
+        self.principal_inertia = self.principal_inertia.max(least);
+        self
+    }
+
     /// Refuses a mass or an inertia that no dynamic body can have.
     pub(crate) fn check(&self) -> Result<()> {
         self.check_frame()?;
@@ -58,13 +72,32 @@ impl MassProperties {
         ensure(is_place(center) && is_rotation(principal_frame), message)
     }
 
-    /// Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the last bit.
-    pub(super) fn from_parry(m: &ParryMass, density: f32) -> Self {
+    /// Those of some solids of density 1, times `density`. Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its
+    /// density to the last bit.
+    ///
+    /// Parry finds wrong principal axes where the smallest moment is a double one whose plane is not that of x, or where moments are below
+    /// 1e-5 kg m²: its tensor is compared with the sum of the tensors of the solids.
+    pub(super) fn of_solids(solids: &[ParryMass], density: f32) -> Self {
+        let all: ParryMass = solids.iter().copied().sum();
+        let about_center = |m: &ParryMass| tensor(m.principal_inertia(), m.principal_inertia_local_frame);
+        let own = |m: &ParryMass| {
+            let out = (all.local_com - m.local_com).as_dvec3();
+            let across =
+                DMat3::IDENTITY * out.length_squared() - DMat3::from_cols(out * out.x, out * out.y, out * out.z);
+            about_center(m) + across * f64::from(m.mass())
+        };
+        let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
+        let (mut moments, mut frame) = (all.principal_inertia(), all.principal_inertia_local_frame);
+        let error = about_center(&all) - exact;
+        let largest = |m: DMat3| m.abs().to_cols_array().into_iter().fold(0.0, f64::max);
+        if !(largest(error) <= 1e-4 * largest(exact)) {
+            (moments, frame) = diagonalized(exact);
+        }
         Self {
-            mass: m.mass() * density,
-            center: m.local_com,
-            principal_inertia: m.principal_inertia() * density,
-            principal_frame: m.principal_inertia_local_frame,
+            mass: all.mass() * density,
+            center: all.local_com,
+            principal_inertia: moments * density,
+            principal_frame: frame,
         }
     }
 
@@ -92,4 +125,47 @@ impl MassProperties {
         let i = self.principal_inertia;
         i.max_element() - i.min_element() > 1e-6 * i.max_element()
     }
+}
+
+/// The square of the largest distance of a point of the shapes from each principal axis, or a little more (m²).
+fn squared_levers(mass: &MassProperties, colliders: &[Collider]) -> Vec3 {
+    let to_axes = pose(mass.center, mass.principal_frame).inverse();
+    let of_one = |collider: &Collider| {
+        let at = to_axes * pose(collider.position, collider.rotation);
+        let (aabb, sphere) = (collider.shape.0.compute_aabb(&at), collider.shape.0.compute_bounding_sphere(&at));
+        let squared = |v: Vec3| Vec3::new(v.y * v.y + v.z * v.z, v.z * v.z + v.x * v.x, v.x * v.x + v.y * v.y);
+        let in_box = squared(aabb.mins.abs().max(aabb.maxs.abs()));
+        let to_sphere = squared(sphere.center).map(f32::sqrt) + sphere.radius;
+        in_box.min(to_sphere * to_sphere)
+    };
+    colliders.iter().map(of_one).fold(Vec3::ZERO, Vec3::max)
+}
+
+/// The tensor with some moments along the axes of a frame.
+fn tensor(moments: Vec3, frame: Quat) -> DMat3 {
+    let axes = DMat3::from_quat(frame.as_dquat().normalize());
+    axes * DMat3::from_diagonal(moments.as_dvec3()) * axes.transpose()
+}
+
+/// Principal moments of a symmetric tensor, and the rotation from its principal axes. Jacobi's method: each turn about one axis removes one
+/// entry beside the diagonal, and the others get smaller.
+fn diagonalized(tensor: DMat3) -> (Vec3, Quat) {
+    const SWEEPS: usize = 8;
+    let (mut diagonal, mut axes) = (tensor, DMat3::IDENTITY);
+    for axis in (0..3).cycle().take(3 * SWEEPS) {
+        let (p, q) = ((axis + 1) % 3, (axis + 2) % 3);
+        let beside = diagonal.col(q)[p];
+        if beside != 0.0 {
+            let ratio = (diagonal.col(q)[q] - diagonal.col(p)[p]) / (2.0 * beside);
+            let tan = ratio.signum() / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
+            let cos = (tan * tan + 1.0).sqrt().recip();
+            let mut turn = DMat3::IDENTITY;
+            (turn.col_mut(p)[p], turn.col_mut(q)[q]) = (cos, cos);
+            (turn.col_mut(q)[p], turn.col_mut(p)[q]) = (tan * cos, -tan * cos);
+            diagonal = turn.transpose() * diagonal * turn;
+            axes *= turn;
+        }
+    }
+    let moments = DVec3::new(diagonal.x_axis.x, diagonal.y_axis.y, diagonal.z_axis.z);
+    (moments.as_vec3(), DQuat::from_mat3(&axes).normalize().as_quat())
 }

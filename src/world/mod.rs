@@ -120,6 +120,11 @@ impl World {
         self.check_joints()
     }
 
+    /// Raises the moments of inertia that no sweep can work with: [`MassProperties::MOST_LEVERAGE`].
+    pub(crate) fn raise_inertias(&mut self) {
+        self.bodies.iter_mut().for_each(Body::raise_inertia);
+    }
+
     /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
     pub(crate) fn check_gravity(&self) -> Result<()> {
         let gravity = self.gravity;
