@@ -49,7 +49,7 @@ fn heavy_tops_stand_with_the_substeps_that_they_need() {
         let mut scene = find(name, &parameters);
         // Bodies that move begin without impulses, so that the load comes on at once.
         for body in scene.world.bodies.iter_mut().filter(|b| b.kind == BodyKind::Dynamic) {
-            body.linear_velocity = 1e-3 * Vec3::NEG_Y;
+            body.linear_velocity = 1e-9 * Vec3::NEG_Y;
         }
         let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
         run(&mut fixed, 1200);
