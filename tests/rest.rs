@@ -73,7 +73,7 @@ fn structures_that_are_built_in_place_do_not_sink_and_come_up_again() {
         let mut simulation = started(&scene.world, awake());
         for step in 0..60 {
             simulation.step(DT).expect("a step");
-            let (deepest, rms) = (f64::from(simulation.solved_penetration().max), rms_speed(&simulation.world));
+            let (deepest, rms) = (simulation.solved_penetration().max, rms_speed(&simulation.world));
             assert!(deepest < overlap && rms < speed, "{name} {parameters}, step {step}: {deepest} m, {rms} m/s");
             let borne = share_borne_by_the_floor(&mut simulation);
             assert!((borne - 1.0).abs() < 0.02, "{name} {parameters}, step {step}: {borne} of its weight");
