@@ -56,6 +56,7 @@ pub mod preset;
 mod problem;
 mod random;
 pub mod residuals;
+mod rest;
 pub mod scenes;
 mod simulation;
 mod sleep;

@@ -92,7 +92,11 @@ fn heavy_tops_stand_with_the_substeps_that_they_need() {
         ("tower", vec!["n=30", "top_ratio=100"], 16),
         ("mass-ratio", vec!["n=20", "ratio=1000"], 64),
     ] {
-        let scene = find(name, &parameters);
+        let mut scene = find(name, &parameters);
+        // Bodies that move begin without impulses, so that the load comes on at once.
+        for body in scene.world.bodies.iter_mut().filter(|b| b.kind == BodyKind::Dynamic) {
+            body.linear_velocity = 1e-9 * Vec3::NEG_Y;
+        }
         let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
         run(&mut fixed, 1200);
         assert!(out_of_place(&scene, &fixed) > 0, "{name} {parameters:?} stands with 8 substeps");
@@ -120,7 +124,7 @@ fn an_island_without_need_keeps_its_substeps() {
         all
     };
     assert_eq!(substeps(|b| b.position.x < 15.0), [8], "the pile");
-    assert_eq!(substeps(|b| (19.0..25.0).contains(&b.position.x)), [64], "the tower under 1000 times");
+    assert_eq!(substeps(|b| (19.0..25.0).contains(&b.position.x)), [32], "the tower under 1000 times");
     assert_eq!(substeps(|b| (29.0..35.0).contains(&b.position.x)), [16], "the tower under 60 times");
     assert_eq!(substeps(|b| (35.0..65.0).contains(&b.position.x)), [8], "what hangs free");
     let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));

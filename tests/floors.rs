@@ -10,7 +10,7 @@ const LIBRARY: &[&[&str]] = &[
     &["collide", "graph", "scenes", "load"],
     &["effort"],
     &["problem", "contacts"],
-    &["kernels", "plan", "metrics", "residuals", "sleep"],
+    &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
     &["backend", "solver"],
     &["simulation"],
     &["compare"],

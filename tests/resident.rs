@@ -26,6 +26,7 @@ tests! {
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
         a_device_carries_no_friction_that_a_surface_lost,
         a_device_takes_the_points_that_are_sent,
+        a_body_that_is_placed_on_a_tower_begins_on_a_device_with_what_it_rests_with,
     }
     any_gpu {
         the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart,
@@ -366,4 +367,24 @@ fn a_device_takes_the_points_that_are_sent() {
     same_on_a_device(bouncing, &SolverConfig::default().without_sleep(), 40, |_, _| ());
     let config = SolverConfig::default().without_sleep().with(|c| c.rules.slip_friction = true);
     same_on_a_device(sliding(), &config, 40, |_, _| ());
+}
+
+/// The impulses and preloads of such a body, and what they add to those below, are made by the processor.
+fn a_body_that_is_placed_on_a_tower_begins_on_a_device_with_what_it_rests_with() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
+    for k in 0..4 {
+        world.add(cube.clone().position(0.0, 0.5 + k as f32, 0.0));
+    }
+    let late = world.add(cube.position(5.0, 0.5, 0.0));
+    for config in [SolverConfig::default(), SolverConfig::default().without_sleep()] {
+        same_on_a_device(world.clone(), &config, 80, |step, world| {
+            if step == 60 {
+                let body = &mut world.bodies[late];
+                (body.position, body.linear_velocity, body.angular_velocity) =
+                    (Vec3::new(0.2, 4.5, 0.0), Vec3::ZERO, Vec3::ZERO);
+            }
+        });
+    }
 }

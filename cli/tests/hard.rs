@@ -5,9 +5,7 @@ use drystone::{Backend, Cpu};
 use drystone_cli::hard::{Case, Limit, Setup};
 
 /// Checks that fail, by the beginning of their names. docs/hard-cases.md gives numbers for all presets and reasons.
-const FAILS: &[(&str, &str)] = &[
-    ("H4", "64 points: asymmetry"),
-];
+const FAILS: &[(&str, &str)] = &[("H4", "64 points: asymmetry")];
 
 #[test]
 fn what_passes_passes_and_what_fails_is_known_to() {

@@ -61,7 +61,7 @@ impl Preload {
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The
     /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
     /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
-    pub(super) fn yielding(&self, share: f32, both_movable: bool, pressed: f32) -> f32 {
+    pub(crate) fn yielding(&self, share: f32, both_movable: bool, pressed: f32) -> f32 {
         let compliance = if both_movable { self.movable_compliance } else { self.fixed_compliance };
         // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
         pressed * (compliance * share)

@@ -1,11 +1,13 @@
 //! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
+use glam::Vec3;
+
 use super::StepProblem;
 use super::carry::{Carry, NO_POINT, Preload, Written};
 use super::effective::{EffectiveMass, InverseMass, LEAST_JAMMING};
 use super::points_a_slot;
 use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow, Substep};
-use super::slots::{Slots, Write};
+use super::slots::{Slot, Slots, Write};
 use super::write::{Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
@@ -25,6 +27,8 @@ pub struct ContactRows {
     patches: bool,
     /// Separation of each point when its manifold was computed, [`MAX_POINTS`] a slot (m).
     computed: Vec<f32>,
+    /// The bodies that lie still and touch nothing that they touched before.
+    new_bodies: Vec<bool>,
     /// How the rows follow from those of the step before.
     pub carry: Carry,
 }
@@ -133,6 +137,34 @@ impl ContactRows {
             own.iter().any(|p| effective.jamming(p.r_a.into(), p.r_b.into()) > 1.0)
         };
         self.slots.taking_part().filter(jams).collect()
+    }
+
+    /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
+    pub fn note_new_bodies(&mut self, world: &World) -> bool {
+        self.new_bodies.clear();
+        let slots = || self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
+        let lies = |body: u32| {
+            let body = world.bodies.get(body as usize);
+            body.is_some_and(|b| b.linear_velocity == Vec3::ZERO && b.angular_velocity == Vec3::ZERO)
+        };
+        let is_new = |slot: &Slot| slot.write == Write::New;
+        if !slots().any(|(slot, edge)| is_new(slot) && (lies(edge.a) || lies(edge.b))) {
+            return false;
+        }
+        self.new_bodies.resize(world.bodies.len(), false);
+        for wanted in [true, false] {
+            for (_, edge) in slots().filter(|(slot, _)| is_new(slot) == wanted) {
+                for body in [edge.a, edge.b].into_iter().filter(|&body| lies(body)) {
+                    self.new_bodies[body as usize] = wanted;
+                }
+            }
+        }
+        self.new_bodies.contains(&true)
+    }
+
+    /// The bodies that [`Self::note_new_bodies`] noted; empty if there is none.
+    pub fn new_bodies(&self) -> &[bool] {
+        &self.new_bodies
     }
 
     /// Writes the rows of a step of `dt` seconds, after those of bodies.

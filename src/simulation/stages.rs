@@ -6,6 +6,7 @@ use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
+use crate::rest;
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::{MassProperties, Material, World};
@@ -147,7 +148,8 @@ impl Stages {
         self.sleep.is_everything_still()
     }
 
-    /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class.
+    /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
+    /// or a body lies where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
         let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
         let times = &mut stats.times;
@@ -176,10 +178,11 @@ impl Stages {
             if are_sorted_anew {
                 contacts.sort(detector, problem);
             }
+            let has_new_bodies = contacts.note_new_bodies(world);
             let asleep = sleep.asleep();
             let interfaces = || contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
-            effort.follow(world, asleep, config, dt, is_above, interfaces)
+            effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         })
     }
 
@@ -190,6 +193,7 @@ impl Stages {
             problem::begin(world, sleep.asleep(), config, problem);
             contacts.carry.on_device = on_device;
             contacts.write(world, detector, config, effort, dt, problem);
+            rest::begin(world, config, dt / config.substeps as f32, contacts, problem);
             joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));

@@ -1,0 +1,252 @@
+//! The impulses and preloads with which a structure that is built in place begins.
+//!
+//! Sweeps hand a load on by one contact a sweep, so that a tall structure sinks in and comes up again before its foot bears it. Statics knows
+//! the loads before the first step. Bodies are gone through from the top: each hands its weight, and the load that it bears, on to the points
+//! that it rests on ([`bearing::balance`]). A body that no such forces balance is about to fall: it begins without impulses, and so does
+//! everything that rests on it.
+//!
+//! A body is new that lies still and touches nothing that it touched before: all bodies in the first step, and later those that the caller
+//! places. Bodies under it that lie there already hand its load on, beside the impulses that they have. Derivation: docs/derivation.md.
+
+mod bearing;
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use crate::config::{FrictionRule, SolverConfig, Stabilization};
+use crate::problem::{BodyRow, ContactRow, ContactRows, PointRow, StepProblem};
+use crate::world::World;
+use bearing::{Balance, Point, Wrench};
+
+/// Sine of the slope above which a contact does not bear: its normal rises by less.
+const LEAST_RISE: f64 = 0.01;
+/// Most rounds in which everything that rests on falling bodies is let go.
+const ROUNDS: usize = 16;
+
+/// Gives the contacts of new bodies, and those that bear them, the impulses and preloads that they rest with. The rows are written. `substep` is
+/// the length of a substep of class 0 (s).
+pub(crate) fn begin(
+    world: &World,
+    config: &SolverConfig,
+    substep: f32,
+    contacts: &ContactRows,
+    problem: &mut StepProblem,
+) {
+    if !config.warm_start || world.gravity == Vec3::ZERO || !contacts.new_bodies().contains(&true) {
+        return;
+    }
+    let mut structure = Structure::new(world, config, substep, contacts, problem);
+    if !structure.bearings.is_empty() && (0..ROUNDS).any(|_| structure.hand_down(contacts.new_bodies(), problem)) {
+        structure.write(config, substep, contacts, problem);
+    }
+}
+
+/// A contact through which one body bears another.
+#[derive(Clone, Copy)]
+struct Bearing {
+    row: u32,
+    upper: u32,
+    lower: u32,
+    /// 1 if the upper body is b of the row, else -1: the impulses of a row act on b.
+    sign: f64,
+}
+
+/// The bodies that lie, and the contacts that bear them.
+struct Structure {
+    /// Those of one upper body after those of another.
+    bearings: Vec<Bearing>,
+    /// Where the bearings of each upper body begin.
+    bearings_of: Vec<u32>,
+    /// The points of the bearings, and where those of each begin.
+    points: Vec<Point>,
+    points_of: Vec<u32>,
+    /// Forces on the upper bodies along the axes of the points (N).
+    forces: Vec<[f64; 3]>,
+    /// Bodies that begin without impulses.
+    falls: Vec<bool>,
+}
+
+impl Structure {
+    fn new(world: &World, config: &SolverConfig, substep: f32, contacts: &ContactRows, problem: &StepProblem) -> Self {
+        let bodies = problem.bodies.len();
+        let gravity = world.gravity.as_dvec3();
+        // Bodies that are slower are held by something: gravity makes them faster in a substep.
+        let slow = gravity.length() * f64::from(substep);
+        let omega = TAU * f64::from(config.contact_frequency) / f64::from(substep);
+        // How deep a body sags by its own weight: so far apart may surfaces be that bear.
+        let sag = gravity.length() / (omega * omega);
+        let mut bearings: Vec<Bearing> =
+            contacts.coloring.order.iter().filter_map(|&row| bearing(row, gravity, slow, problem)).collect();
+        bearings.sort_unstable_by_key(|bearing| (bearing.upper, bearing.row));
+        let mut bearings_of = vec![0; bodies + 1];
+        bearings.iter().for_each(|bearing| bearings_of[bearing.upper as usize + 1] += 1);
+        (0..bodies).for_each(|i| bearings_of[i + 1] += bearings_of[i]);
+        let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);
+        let (mut points, mut points_of) = (Vec::new(), vec![0]);
+        for (i, bearing) in bearings.iter().enumerate() {
+            let contact = &problem.contacts[bearing.row as usize];
+            let first_of_body = points_of[bearings_of[bearing.upper as usize] as usize];
+            let (reach, is_new) =
+                (sag * f64::from(contact.substep_share).powi(2), contacts.new_bodies()[bearing.upper as usize]);
+            let (tangent_1, tangent_2) = contact.tangents();
+            let axes = [contact.normal.into(), tangent_1, tangent_2].map(|axis| axis.as_dvec3() * bearing.sign);
+            let (rows, impulses) = (points_of_row(contact, &problem.points), points_of_row(contact, &problem.impulses));
+            points.extend(rows.iter().zip(impulses).map(|(row, impulse)| Point {
+                arm: arms(row, bearing).0,
+                axes,
+                mass: row.normal_mass.into(),
+                friction: if has_friction { contact.friction.into() } else { 0.0 },
+                manifold: points_of[i] - first_of_body,
+                bears: if is_new { f64::from(row.separation.abs()) <= reach } else { impulse.normal > 0.0 },
+            }));
+            points_of.push(points.len() as u32);
+        }
+        let mut falls = vec![false; bodies];
+        for joint in &world.joints {
+            falls[joint.body_a] = true;
+            joint.body_b.iter().for_each(|&body| falls[body] = true);
+        }
+        let forces = vec![[0.0; 3]; points.len()];
+        Self { bearings, bearings_of, points, points_of, forces, falls }
+    }
+
+    fn bearings_of(&self, upper: u32) -> Range<usize> {
+        self.bearings_of[upper as usize] as usize..self.bearings_of[upper as usize + 1] as usize
+    }
+
+    fn points_of(&self, bearings: Range<usize>) -> Range<usize> {
+        self.points_of[bearings.start] as usize..self.points_of[bearings.end] as usize
+    }
+
+    /// Hands the weights of new bodies down. False if something rests on a body that falls, so that it falls too: its load is then to be left
+    /// out.
+    fn hand_down(&mut self, is_new: &[bool], problem: &StepProblem) -> bool {
+        let mut loads = vec![Wrench::default(); is_new.len()];
+        for ((load, mass), _) in loads.iter_mut().zip(&problem.masses).zip(is_new).filter(|(_, is_new)| **is_new) {
+            load.force = Vec3::from_array(mass.acceleration).as_dvec3() / f64::from(mass.inv_mass);
+        }
+        let is_movable = |body: u32| problem.masses[body as usize].inv_mass > 0.0;
+        let mut above = vec![0_u32; is_new.len()];
+        self.bearings.iter().for_each(|bearing| above[bearing.lower as usize] += 1);
+        let mut ready: Vec<u32> =
+            (0..above.len() as u32).filter(|&body| is_movable(body) && above[body as usize] == 0).collect();
+        let mut is_done = vec![false; above.len()];
+        let mut balance = Balance::default();
+        self.forces.fill([0.0; 3]);
+        while let Some(upper) = ready.pop() {
+            let body = upper as usize;
+            let own = self.bearings_of(upper);
+            let points = self.points_of(own.clone());
+            is_done[body] = true;
+            if !self.falls[body] && loads[body] != Wrench::default() {
+                match balance.of(&loads[body], &self.points[points.clone()]) {
+                    Some(forces) => self.forces[points].copy_from_slice(forces),
+                    None => self.falls[body] = true,
+                }
+            }
+            for i in own {
+                let bearing = self.bearings[i];
+                let lower = bearing.lower as usize;
+                let rows = points_of_row(&problem.contacts[bearing.row as usize], &problem.points);
+                for (k, row) in self.points_of(i..i + 1).zip(rows) {
+                    loads[lower].add(-self.points[k].force(&self.forces[k]), arms(row, &bearing).1);
+                }
+                above[lower] -= 1;
+                if above[lower] == 0 && is_movable(bearing.lower) {
+                    ready.push(bearing.lower);
+                }
+            }
+        }
+        // Bodies that bear each other in a circle are never ready.
+        for (body, is_done) in (0..).zip(is_done) {
+            self.falls[body as usize] |= !is_done && is_movable(body);
+        }
+        !self.let_go()
+    }
+
+    /// Lets everything fall that rests on what falls; whether there was anything.
+    fn let_go(&mut self) -> bool {
+        let mut any = false;
+        loop {
+            let mut more = false;
+            for i in 0..self.bearings.len() {
+                let Bearing { upper, lower, .. } = self.bearings[i];
+                let bears = self.forces[self.points_of(i..i + 1)].iter().any(|force| force[0] > 0.0);
+                if bears && self.falls[lower as usize] && !self.falls[upper as usize] {
+                    self.falls[upper as usize] = true;
+                    more = true;
+                }
+            }
+            any |= more;
+            if !more {
+                return any;
+            }
+        }
+    }
+
+    /// Adds the impulses of a substep and the preloads to the rows.
+    fn write(&self, config: &SolverConfig, substep: f32, contacts: &ContactRows, problem: &mut StepProblem) {
+        let has_preloads = config.stabilization == Stabilization::Soft && config.preload_rate > 0.0;
+        let has_patches = problem.has_patches();
+        for (i, bearing) in self.bearings.iter().enumerate() {
+            let forces = &self.forces[self.points_of(i..i + 1)];
+            if forces.iter().all(|force| force[0] == 0.0) {
+                continue;
+            }
+            let are_movable =
+                [bearing.upper, bearing.lower].map(|body| problem.masses[body as usize].inv_mass > 0.0) == [true; 2];
+            let contact = &mut problem.contacts[bearing.row as usize];
+            let length = f64::from(substep * contact.substep_share);
+            let rows = points_of_row(contact, &problem.points);
+            let first = contact.first_point as usize;
+            let (impulses, patch) = problem.impulses[first..].split_at_mut(forces.len());
+            let (mut pressed, mut mass, mut apart) = (0.0, 0.0, 0.0);
+            for ((impulse, force), row) in impulses.iter_mut().zip(forces).zip(rows) {
+                let [normal, tangent_1, tangent_2] = force.map(|force| (force * length) as f32);
+                impulse.normal += normal;
+                let friction = if has_patches { &mut patch[0] } else { impulse };
+                friction.tangent_1 += tangent_1;
+                friction.tangent_2 += tangent_2;
+                pressed += normal;
+                mass += row.normal_mass;
+                apart += row.normal_mass * row.separation;
+            }
+            if has_preloads {
+                // The surfaces stay as far apart as they are.
+                let apart = if contacts.new_bodies()[bearing.upper as usize] { apart } else { 0.0 };
+                let yielding = contacts.carry.preload.yielding(contact.substep_share, are_movable, pressed);
+                contact.preload += (yielding + apart) / mass;
+            }
+        }
+    }
+}
+
+/// The contact in a row, if one of its bodies lies on the other.
+fn bearing(row: u32, gravity: DVec3, slow: f64, problem: &StepProblem) -> Option<Bearing> {
+    let contact = &problem.contacts[row as usize];
+    let (a, b) = (contact.body_a, contact.body_b);
+    let rise = -Vec3::from_array(contact.normal).as_dvec3().dot(gravity.normalize());
+    let (upper, lower, sign) = if rise > 0.0 { (b, a, 1.0) } else { (a, b, -1.0) };
+    let is_slow = |body: u32, arm: [f32; 3]| {
+        let row: &BodyRow = &problem.bodies[body as usize];
+        let velocity = Vec3::from_array(row.v) + Vec3::from_array(row.w).cross(Vec3::from_array(arm));
+        let most = if problem.masses[body as usize].inv_mass > 0.0 { slow } else { 0.0 };
+        f64::from(velocity.length()) <= most
+    };
+    let point = &problem.points[contact.first_point as usize];
+    let bears = rise.abs() >= LEAST_RISE && problem.masses[upper as usize].inv_mass > 0.0;
+    (bears && is_slow(a, point.r_a) && is_slow(b, point.r_b)).then_some(Bearing { row, upper, lower, sign })
+}
+
+/// The arms of a point on the upper and on the lower body.
+fn arms(row: &PointRow, bearing: &Bearing) -> (DVec3, DVec3) {
+    let [a, b] = [row.r_a, row.r_b].map(|arm| Vec3::from_array(arm).as_dvec3());
+    if bearing.sign > 0.0 { (b, a) } else { (a, b) }
+}
+
+/// The rows of the points of a contact.
+fn points_of_row<'a, T>(contact: &ContactRow, rows: &'a [T]) -> &'a [T] {
+    &rows[contact.first_point as usize..][..contact.point_count as usize]
+}
