@@ -73,7 +73,9 @@ impl PlanKey {
     }
 }
 
-/// Substeps shorter than this (s) find changes of velocities since the step began.
+/// Substeps shorter than this (s) find changes of velocities since the step began. Sums of velocities have a squared error of 3e-6 m²/s² in
+/// the scene `rolling` at 1/8000 s and 3e-4 at 1/32,000 s, and they change the energy of a free rotation by 8e-6 in 20 s at 1/480 s and by 3e-5
+/// at 1/1920 s.
 const LONGEST_FROM_START: f32 = 1.0 / 1000.0;
 
 impl StepPlan {
