@@ -14,6 +14,7 @@ tests! {
     }
     no_gpu {
         a_rod_gains_no_energy_with_any_number_of_substeps,
+        a_plane_is_touched_without_a_margin,
         a_tip_that_swings_onto_a_plane_does_not_sink_in,
         contacts_that_do_not_jam_are_swept_once,
         lanes_have_the_bits_of_the_reference,
@@ -87,6 +88,17 @@ fn a_tip_that_swings_onto_a_plane_does_not_sink_in() {
         touched |= simulation.manifolds().any(|m| m.points().len() == 2 && m.normal_impulse() > 0.0);
     }
     assert!(touched && deepest < 2e-3, "{deepest} m");
+}
+
+fn a_plane_is_touched_without_a_margin() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.6, 0.0));
+    let config = SolverConfig::default().with(|c| c.speculative_margin = 0.0);
+    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    (0..60).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    let height = simulation.world.bodies[1].position.y;
+    assert!((height - 0.5).abs() < 1e-3, "{height} m");
 }
 
 /// How many passes of the next step sweep contacts, and how many of them several times.

@@ -98,7 +98,9 @@ impl WorldContacts {
         let tight = |c: &ColliderInfo| {
             let body = &input.moving[c.body as usize];
             let pose = Pose::from_parts(body.position, body.rotation);
-            let mut aabb = c.aabb(pose).loosened(input.margins.speculative * c.size + input.margins.fall);
+            // The size of a half-space is infinite, and no margin at all of it no number.
+            let margin = input.margins.speculative * c.size.min(FARTHEST) + input.margins.fall;
+            let mut aabb = c.aabb(pose).loosened(margin);
             let sweep = body.v * input.margins.dt;
             // A collider that turns reaches no further out than from one side of the body to the other, and its box no further than its
             // longest half diagonal.

@@ -252,13 +252,6 @@ impl Body {
         (self.rotation * self.mass.principal_frame).as_dquat().inverse() * self.angular_velocity.as_dvec3()
     }
 
-    /// Raises moments of inertia that are too small beside its mass and its shapes: [`MassProperties::MOST_LEVERAGE`].
-    pub(crate) fn raise_inertia(&mut self) {
-        if self.kind == BodyKind::Dynamic {
-            self.mass = self.mass.raised(&self.colliders);
-        }
-    }
-
     /// Refuses a body that cannot be simulated.
     pub(crate) fn check(&self) -> Result<()> {
         self.check_motion()?;

@@ -5,10 +5,9 @@ use std::ops::RangeInclusive;
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
 
-use super::body::Collider;
 use super::limits::{is_place, is_rotation};
-use super::shape::pose;
 use crate::error::{Result, ensure};
+use crate::stats::largest;
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,13 +38,6 @@ impl MassProperties {
     /// boxes, 2.5 for balls and 20 at most for cones. From about 100 on sweeps point by point never bring a body to rest
     /// (docs/derivation.md, section 3).
     pub const MOST_LEVERAGE: f32 = 32.0;
-
-    /// These, with every moment of inertia raised to what [`Self::MOST_LEVERAGE`] asks for.
-    pub(super) fn raised(mut self, colliders: &[Collider]) -> Self {
-        let least = squared_levers(&self, colliders) * (self.mass / Self::MOST_LEVERAGE);
-        self.principal_inertia = self.principal_inertia.max(least);
-        self
-    }
 
     /// Refuses a mass or an inertia that no dynamic body can have.
     pub(crate) fn check(&self) -> Result<()> {
@@ -89,8 +81,9 @@ impl MassProperties {
         let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
         let (mut moments, mut frame) = (all.principal_inertia(), all.principal_inertia_local_frame);
         let error = about_center(&all) - exact;
-        let largest = |m: DMat3| m.abs().to_cols_array().into_iter().fold(0.0, f64::max);
-        if !(largest(error) <= 1e-4 * largest(exact)) {
+        let size = |m: DMat3| largest(0.0, m.abs().to_cols_array());
+        let is_right = size(error) <= 1e-4 * size(exact);
+        if !is_right {
             (moments, frame) = diagonalized(exact);
         }
         Self {
@@ -125,20 +118,6 @@ impl MassProperties {
         let i = self.principal_inertia;
         i.max_element() - i.min_element() > 1e-6 * i.max_element()
     }
-}
-
-/// The square of the largest distance of a point of the shapes from each principal axis, or a little more (m²).
-fn squared_levers(mass: &MassProperties, colliders: &[Collider]) -> Vec3 {
-    let to_axes = pose(mass.center, mass.principal_frame).inverse();
-    let of_one = |collider: &Collider| {
-        let at = to_axes * pose(collider.position, collider.rotation);
-        let (aabb, sphere) = (collider.shape.0.compute_aabb(&at), collider.shape.0.compute_bounding_sphere(&at));
-        let squared = |v: Vec3| Vec3::new(v.y * v.y + v.z * v.z, v.z * v.z + v.x * v.x, v.x * v.x + v.y * v.y);
-        let in_box = squared(aabb.mins.abs().max(aabb.maxs.abs()));
-        let to_sphere = squared(sphere.center).map(f32::sqrt) + sphere.radius;
-        in_box.min(to_sphere * to_sphere)
-    };
-    colliders.iter().map(of_one).fold(Vec3::ZERO, Vec3::max)
 }
 
 /// The tensor with some moments along the axes of a frame.

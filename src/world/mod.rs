@@ -2,6 +2,7 @@
 
 mod body;
 mod joint;
+mod lever;
 mod limits;
 mod mass;
 mod shape;
@@ -122,7 +123,7 @@ impl World {
 
     /// Raises the moments of inertia that no sweep can work with: [`MassProperties::MOST_LEVERAGE`].
     pub(crate) fn raise_inertias(&mut self) {
-        self.bodies.iter_mut().for_each(Body::raise_inertia);
+        self.bodies.iter_mut().for_each(lever::raise_inertia);
     }
 
     /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
