@@ -115,7 +115,7 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need }
+            Interface { a, b, need: slot.need, is_joint: false }
         })
     }
 
