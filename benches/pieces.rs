@@ -54,7 +54,7 @@ fn stages(c: &mut Criterion) {
     let mut problem = StepProblem::default();
     let mut contacts = ContactRows::default();
     let effort = Effort::default();
-    begin(&world, &[], &config, &mut problem);
+    begin(&world, &[], &config, &effort, &mut problem);
     contacts.follow(&world, &mut detector);
     contacts.color(&world, config.max_colors);
     group.bench_function("rows, written again", |b| {

@@ -151,6 +151,19 @@ fn several_efforts_have_the_bits_of_the_reference_on_all_lanes_and_threads() {
     }
 }
 
+/// Boxes that fall on each other become heaps of their own, which meet: the bits are those of the reference all the while.
+#[test]
+fn a_heap_has_the_bits_of_the_reference() {
+    let scene = find("pile", &["n=60"]);
+    let lanes = || Box::new(Cpu::new()) as Box<dyn Backend>;
+    let mut open = |i: usize| Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { lanes() });
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 120, || ()).expect("both run");
+    assert!(found.first.is_none(), "{:?}", found.first);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 120);
+    assert!(simulation.problem().masses.iter().any(|mass| mass.heap > 0.0), "no heap");
+}
+
 /// A system of joints takes the substeps of the island of its bodies, and each chain stays together with its own.
 #[test]
 fn joints_that_are_solved_at_once_belong_to_the_block_of_their_bodies() {
@@ -333,4 +346,19 @@ fn the_impulse_of_a_joint_follows_the_class() {
     let (next, _) = simulation.next_problem(DT).expect("a step");
     assert_eq!(next.blocks[0].substeps, 8);
     assert_eq!(Vec3::from_array(next.joint_impulses[0].linear), before * (substeps / 8) as f32);
+}
+
+/// Boxes on several others have no preload: with it 150 boxes creep at 0.06 mm/s.
+#[test]
+fn a_heap_comes_to_rest() {
+    let scene = find("pile", &["n=150"]);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 450);
+    let heap = simulation.problem().masses.iter().filter(|mass| mass.heap > 0.0).count();
+    assert!(heap >= 100, "{heap} bodies of a heap");
+    // The preload is gone but for what decays.
+    let preloads = simulation.manifolds().map(|m| m.preload.abs()).fold(0.0, f32::max);
+    assert!(preloads < 1e-4, "{preloads} m");
+    let (speed, overlap) = (rms_speed(&simulation.world), simulation.penetration().mean);
+    assert!(speed < 1e-5 && overlap < 0.3e-3, "{speed} m/s, {overlap} m");
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params};
 use crate::config::{SolverConfig, Stabilization};
+use crate::effort::Effort;
 use crate::math::Lane;
 use crate::world::{Body, BodyKind, World};
 
@@ -14,8 +15,8 @@ const LEAST_BODIES: usize = 256;
 
 /// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
 /// bodies that nothing moves.
-pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
-    write_bodies(world, asleep, config, problem);
+pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, effort: &Effort, problem: &mut StepProblem) {
+    write_bodies(world, asleep, config, effort, problem);
     problem.params = Params {
         restitution_threshold: config.restitution_threshold,
         body_count: problem.bodies.len() as u32,
@@ -28,7 +29,7 @@ pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mu
     problem.momentum = MomentumRow::default();
 }
 
-fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
+fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &Effort, problem: &mut StepProblem) {
     let rests = |i: usize| asleep.get(i) == Some(&true);
     let state = |(i, b): (usize, &Body)| {
         let moves = b.kind != BodyKind::Fixed && !rests(i);
@@ -40,11 +41,13 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
         if b.kind != BodyKind::Dynamic || rests(i) {
             return MassRow::default();
         }
+        let heap = if effort.is_in_heap(i) { 1.0 } else { 0.0 };
         let i = b.mass.world_inverse_inertia(b.rotation);
         MassRow {
             inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
             inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
             inv_mass: 1.0 / b.mass.mass,
+            heap,
             acceleration: (world.gravity + b.force / b.mass.mass).to_array(),
             ..MassRow::default()
         }

@@ -61,10 +61,19 @@ impl Preload {
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The
     /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
     /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
-    pub(crate) fn yielding(&self, share: f32, both_movable: bool, pressed: f32) -> f32 {
-        let compliance = if both_movable { self.movable_compliance } else { self.fixed_compliance };
+    pub(crate) fn yielding(&self, share: f32, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
+        let compliance = self.compliance(both_movable, in_heap);
         // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
         pressed * (compliance * share)
+    }
+
+    /// Overlap at rest per impulse of a substep, times the effective mass (s).
+    pub(super) fn compliance(&self, both_movable: bool, in_heap: bool) -> f32 {
+        match (in_heap, both_movable) {
+            (true, _) => 0.5 * self.movable_compliance,
+            (false, true) => self.movable_compliance,
+            (false, false) => self.fixed_compliance,
+        }
     }
 }
 
@@ -73,9 +82,12 @@ impl Preload {
 ///
 /// That much its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they
 /// are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
-pub(super) fn preloaded(by: &Preload, before: f32, sag: f32) -> f32 {
+///
+/// In a heap it vanishes: it lifts bodies that friction holds, and heaps that were lifted creep.
+pub(super) fn preloaded(by: &Preload, in_heap: bool, before: f32, sag: f32) -> f32 {
+    let wanted = if in_heap { 0.0 } else { sag };
     // Where the load ends, the preload ends too.
-    smaller(before + by.share * (sag - before), LARGEST_PRELOAD * sag)
+    smaller(before + by.share * (wanted - before), LARGEST_PRELOAD * sag)
 }
 
 #[cfg(test)]
@@ -86,7 +98,7 @@ mod tests {
 
     /// The overlap of springs side by side.
     fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
-        BY.yielding(share, both_movable, pressed) / mass
+        BY.yielding(share, both_movable, false, pressed) / mass
     }
 
     fn near(x: f32, y: f32) {
@@ -96,10 +108,21 @@ mod tests {
     /// An impulse of 8 N s on 2 kg sags by 8 / 2 times the compliance.
     #[test]
     fn a_preload_takes_its_share_of_what_is_missing_to_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 0.0, sag(1.0, true, 8.0, 2.0)), 1.0);
-        near(preloaded(&BY, 1.0, sag(1.0, true, 8.0, 2.0)), 1.5);
-        near(preloaded(&BY, 0.0, sag(1.0, false, 8.0, 2.0)), 0.5);
-        near(preloaded(&BY, 3.0, sag(1.0, true, 8.0, 2.0)), 2.5);
+        near(preloaded(&BY, false, 0.0, sag(1.0, true, 8.0, 2.0)), 1.0);
+        near(preloaded(&BY, false, 1.0, sag(1.0, true, 8.0, 2.0)), 1.5);
+        near(preloaded(&BY, false, 0.0, sag(1.0, false, 8.0, 2.0)), 0.5);
+        near(preloaded(&BY, false, 3.0, sag(1.0, true, 8.0, 2.0)), 2.5);
+    }
+
+    /// A heap has springs twice as stiff as those between bodies that can move, and its preload goes.
+    #[test]
+    fn a_contact_of_a_heap_loses_its_preload() {
+        for both_movable in [true, false] {
+            assert_eq!(2.0 * BY.yielding(1.0, both_movable, true, 8.0), BY.yielding(1.0, true, false, 8.0));
+        }
+        near(preloaded(&BY, true, 1.0, 4.0), 0.5);
+        near(preloaded(&BY, true, -1.0, 4.0), -0.5);
+        near(preloaded(&BY, true, 0.0, 4.0), 0.0);
     }
 
     #[test]
@@ -109,8 +132,8 @@ mod tests {
 
     #[test]
     fn a_preload_is_at_most_twice_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, 100.0, sag(1.0, true, 8.0, 2.0)), 4.0);
-        near(preloaded(&BY, 100.0, sag(1.0, false, 8.0, 2.0)), 2.0);
-        near(preloaded(&BY, 100.0, sag(1.0, true, 0.0, 2.0)), 0.0);
+        near(preloaded(&BY, false, 100.0, sag(1.0, true, 8.0, 2.0)), 4.0);
+        near(preloaded(&BY, false, 100.0, sag(1.0, false, 8.0, 2.0)), 2.0);
+        near(preloaded(&BY, false, 100.0, sag(1.0, true, 0.0, 2.0)), 0.0);
     }
 }

@@ -30,11 +30,16 @@ impl StepScale {
 pub(super) fn change_share(contact: &mut ContactRow, share: f32, points: &[PointRow], impulses: &mut [ImpulseRow]) {
     let ratio = ratio(share, contact.substep_share);
     contact.substep_share = share;
+    change_compliance(contact, ratio * ratio, points);
+    impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
+}
+
+/// Brings a contact to springs that the same force compresses `factor` times as much.
+pub(super) fn change_compliance(contact: &mut ContactRow, factor: f32, points: &[PointRow]) {
     let points = &points[..contact.point_count as usize];
     let separation = points.iter().map(|point| point.separation).sum::<f32>() / points.len() as f32;
     let compression = (contact.preload - separation).max(0.0);
-    contact.preload += (ratio * ratio - 1.0) * compression;
-    impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
+    contact.preload += (factor - 1.0) * compression;
 }
 
 fn scale_impulse(impulse: &mut ImpulseRow, factor: f32) {

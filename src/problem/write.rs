@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::carry::{Carry, preloaded};
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
-use super::rescale::change_share;
+use super::rescale::{change_compliance, change_share};
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
@@ -98,8 +98,17 @@ impl Writer<'_> {
         }
         if slot.takes_part {
             let share = self.share(contact);
+            let is_new = contact.substep_share == 0.0;
             if share != contact.substep_share {
                 change_share(contact, share, points, impulses);
+            }
+            let [body_a, body_b] = [contact.body_a, contact.body_b].map(|body| body as usize);
+            let [was, is] = [Effort::was_in_heap, Effort::is_in_heap]
+                .map(|in_heap| in_heap(self.effort, body_a) || in_heap(self.effort, body_b));
+            if was != is && !is_new {
+                let both = self.masses[body_a].inv_mass > 0.0 && self.masses[body_b].inv_mass > 0.0;
+                let [was, is] = [was, is].map(|in_heap| self.carry.preload.compliance(both, in_heap));
+                change_compliance(contact, is * reciprocal(was), points);
             }
         }
         // Where the rows are on a device, the kernel begin_contacts does this.
@@ -214,8 +223,9 @@ impl Writer<'_> {
             pressed += impulse.normal;
             mass += point.normal_mass;
         }
-        let yielding = self.carry.preload.yielding(row.substep_share, a > 0.0 && b > 0.0, pressed);
-        (preloaded(&self.carry.preload, row.preload, yielding * reciprocal(mass)), yielding * (a + b))
+        let in_heap = [row.body_a, row.body_b].into_iter().any(|body| self.masses[body as usize].heap > 0.0);
+        let yielding = self.carry.preload.yielding(row.substep_share, a > 0.0 && b > 0.0, in_heap, pressed);
+        (preloaded(&self.carry.preload, in_heap, row.preload, yielding * reciprocal(mass)), yielding * (a + b))
     }
 
     /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction

@@ -190,7 +190,7 @@ impl Stages {
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
         timed(&mut stats.times.prepare, || {
-            problem::begin(world, sleep.asleep(), config, problem);
+            problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
             contacts.write(world, detector, config, effort, dt, problem);
             rest::begin(world, config, dt / config.substeps as f32, contacts, problem);

@@ -65,7 +65,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
     layouts! {
         Body = BodyRow { v w dp dq }
         Free = FreeRow { v w }
-        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz acceleration }
+        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz heap acceleration }
         Inertia = InertiaRow { principal body inv_principal frame }
         Contact = ContactRow {
             normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
