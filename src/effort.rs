@@ -386,7 +386,7 @@ mod tests {
     fn many_contacts_a_body_make_a_heap() {
         let island = |contacts: u32, is_heap: bool| Island { contacts, bodies: 100, is_heap, ..Island::NONE };
         assert!(!island(225, false).becomes_heap() && island(226, false).becomes_heap());
-        assert!(island(211, true).becomes_heap() && !island(210, true).becomes_heap());
+        assert!(island(211, true).becomes_heap() && !island(209, true).becomes_heap());
         assert!(!Island { has_joints: true, ..island(400, true) }.becomes_heap());
         let squares = 9.0 * 400.0;
         assert_eq!(Island { need: 60.0, squares, ..island(400, true) }.counted_need(), 3.0);
