@@ -14,7 +14,7 @@ pub enum Preset {
     /// 8 substeps.
     #[default]
     Balanced,
-    /// 32 substeps: heavy on light.
+    /// 32 substeps.
     Accurate,
     /// 128 substeps: to hold the others against.
     Reference,
@@ -30,7 +30,7 @@ pub struct Promise {
     pub tower: u32,
     /// Density of the top cube of a tower of ten, relative to the others, which stands for 10 s.
     pub heavy_top: f32,
-    /// Deepest overlap at any time of 10 s of a tower of 20 (m).
+    /// Deepest overlap at any time of 10 s of a tower of five whose cubes begin to fall at 1 mm/s, so that no load is there before (m).
     pub deepest: f64,
     /// The same at the end of them (m).
     pub at_rest: f64,
@@ -52,10 +52,10 @@ impl Preset {
     pub fn promise(self) -> Promise {
         let promise = |tower, heavy_top, deepest, at_rest| Promise { tower, heavy_top, deepest, at_rest };
         match self {
-            Self::Fast => promise(50, 20.0, 10e-3, 0.1e-3),
-            Self::Balanced => promise(80, 100.0, 2.5e-3, 0.02e-3),
-            Self::Accurate => promise(160, 1000.0, 0.16e-3, 2e-6),
-            Self::Reference => promise(400, 5000.0, 0.011e-3, 1e-6),
+            Self::Fast => promise(400, 1e6, 1.8e-3, 0.02e-3),
+            Self::Balanced => promise(400, 1e6, 0.5e-3, 5e-6),
+            Self::Accurate => promise(400, 1e6, 0.04e-3, 1e-6),
+            Self::Reference => promise(400, 1e6, 0.003e-3, 0.1e-6),
         }
     }
 }

@@ -176,7 +176,8 @@ impl<S: System> Solved for S {
 
 #[test]
 fn a_slightly_unsymmetric_w_is_solved() {
-    let mut local = without_bodies(&steps()[0]);
+    // The wall. Signs that differ by entry leave most piles without a solution to 1e-8.
+    let mut local = without_bodies(&steps()[1]);
     let mut sign = 1.0;
     for (i, row) in (0..).zip(&mut local.rows) {
         for (_, w) in row.iter_mut().filter(|(j, _)| *j != i) {
@@ -187,7 +188,7 @@ fn a_slightly_unsymmetric_w_is_solved() {
     let outcome = newton(&mut Blocks::new(&local), TOLERANCE, 20_000);
     let e_vel = Residuals::of_blocks(&local, &outcome.impulses).e_vel;
     assert!(e_vel <= 1.01 * TOLERANCE, "{e_vel:e}: {:?} {:?}", outcome.ended, outcome.newton);
-    let symmetric = without_bodies(&steps()[0]);
+    let symmetric = without_bodies(&steps()[1]);
     assert!(Residuals::of_blocks(&symmetric, &outcome.impulses).e_vel > TOLERANCE, "it is another problem");
 }
 

@@ -26,21 +26,22 @@ const LEAST_RISE: f64 = 0.01;
 const ROUNDS: usize = 16;
 
 /// Gives the contacts of new bodies, and those that bear them, the impulses and preloads that they rest with. The rows are written. `substep` is
-/// the length of a substep of class 0 (s).
+/// the length of a substep of class 0 (s). Returns the new bodies that lie on others and begin without impulses.
 pub(crate) fn begin(
     world: &World,
     config: &SolverConfig,
     substep: f32,
     contacts: &ContactRows,
     problem: &mut StepProblem,
-) {
+) -> Vec<u32> {
     if !config.warm_start || world.gravity == Vec3::ZERO || !contacts.new_bodies().contains(&true) {
-        return;
+        return Vec::new();
     }
     let mut structure = Structure::new(world, config, substep, contacts, problem);
     if !structure.bearings.is_empty() && (0..ROUNDS).any(|_| structure.hand_down(contacts.new_bodies(), problem)) {
         structure.write(config, substep, contacts, problem);
     }
+    structure.restless(contacts.new_bodies(), problem)
 }
 
 /// A contact through which one body bears another.
@@ -59,13 +60,15 @@ struct Structure {
     bearings: Vec<Bearing>,
     /// Where the bearings of each upper body begin.
     bearings_of: Vec<u32>,
-    /// The points of the bearings, and where those of each begin.
-    points: Vec<Point>,
+    /// Where the points of each bearing begin.
     points_of: Vec<u32>,
     /// Forces on the upper bodies along the axes of the points (N).
     forces: Vec<[f64; 3]>,
     /// Bodies that begin without impulses.
     falls: Vec<bool>,
+    /// How deep a body sags by its own weight in class 0 (m): so far apart may surfaces be that bear.
+    sag: f64,
+    has_friction: bool,
 }
 
 impl Structure {
@@ -75,7 +78,6 @@ impl Structure {
         // Bodies that are slower are held by something: gravity makes them faster in a substep.
         let slow = gravity.length() * f64::from(substep);
         let omega = TAU * f64::from(config.contact_frequency) / f64::from(substep);
-        // How deep a body sags by its own weight: so far apart may surfaces be that bear.
         let sag = gravity.length() / (omega * omega);
         let mut bearings: Vec<Bearing> =
             contacts.coloring.order.iter().filter_map(|&row| bearing(row, gravity, slow, problem)).collect();
@@ -83,33 +85,19 @@ impl Structure {
         let mut bearings_of = vec![0; bodies + 1];
         bearings.iter().for_each(|bearing| bearings_of[bearing.upper as usize + 1] += 1);
         (0..bodies).for_each(|i| bearings_of[i + 1] += bearings_of[i]);
-        let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);
-        let (mut points, mut points_of) = (Vec::new(), vec![0]);
-        for (i, bearing) in bearings.iter().enumerate() {
-            let contact = &problem.contacts[bearing.row as usize];
-            let first_of_body = points_of[bearings_of[bearing.upper as usize] as usize];
-            let (reach, is_new) =
-                (sag * f64::from(contact.substep_share).powi(2), contacts.new_bodies()[bearing.upper as usize]);
-            let (tangent_1, tangent_2) = contact.tangents();
-            let axes = [contact.normal.into(), tangent_1, tangent_2].map(|axis| axis.as_dvec3() * bearing.sign);
-            let (rows, impulses) = (points_of_row(contact, &problem.points), points_of_row(contact, &problem.impulses));
-            points.extend(rows.iter().zip(impulses).map(|(row, impulse)| Point {
-                arm: arms(row, bearing).0,
-                axes,
-                mass: row.normal_mass.into(),
-                friction: if has_friction { contact.friction.into() } else { 0.0 },
-                manifold: points_of[i] - first_of_body,
-                bears: if is_new { f64::from(row.separation.abs()) <= reach } else { impulse.normal > 0.0 },
-            }));
-            points_of.push(points.len() as u32);
-        }
+        let mut points_of = vec![0];
+        points_of.extend(bearings.iter().scan(0, |end, bearing| {
+            *end += problem.contacts[bearing.row as usize].point_count;
+            Some(*end)
+        }));
         let mut falls = vec![false; bodies];
         for joint in &world.joints {
             falls[joint.body_a] = true;
             joint.body_b.iter().for_each(|&body| falls[body] = true);
         }
-        let forces = vec![[0.0; 3]; points.len()];
-        Self { bearings, bearings_of, points, points_of, forces, falls }
+        let forces = vec![[0.0; 3]; points_of[bearings.len()] as usize];
+        let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);
+        Self { bearings, bearings_of, points_of, forces, falls, sag, has_friction }
     }
 
     fn bearings_of(&self, upper: u32) -> Range<usize> {
@@ -118,6 +106,27 @@ impl Structure {
 
     fn points_of(&self, bearings: Range<usize>) -> Range<usize> {
         self.points_of[bearings.start] as usize..self.points_of[bearings.end] as usize
+    }
+
+    /// The points of the bearings of one upper body.
+    fn write_points(&self, bearings: Range<usize>, is_new: bool, problem: &StepProblem, points: &mut Vec<Point>) {
+        points.clear();
+        for bearing in &self.bearings[bearings] {
+            let contact = &problem.contacts[bearing.row as usize];
+            let reach = self.sag * f64::from(contact.substep_share).powi(2);
+            let (tangent_1, tangent_2) = contact.tangents();
+            let axes = [contact.normal.into(), tangent_1, tangent_2].map(|axis| axis.as_dvec3() * bearing.sign);
+            let (rows, impulses) = (points_of_row(contact, &problem.points), points_of_row(contact, &problem.impulses));
+            let manifold = points.len() as u32;
+            points.extend(rows.iter().zip(impulses).map(|(row, impulse)| Point {
+                arm: arms(row, bearing).0,
+                axes,
+                mass: row.normal_mass.into(),
+                friction: if self.has_friction { contact.friction.into() } else { 0.0 },
+                manifold,
+                bears: if is_new { f64::from(row.separation.abs()) <= reach } else { impulse.normal > 0.0 },
+            }));
+        }
     }
 
     /// Hands the weights of new bodies down. False if something rests on a body that falls, so that it falls too: its load is then to be left
@@ -133,25 +142,29 @@ impl Structure {
         let mut ready: Vec<u32> =
             (0..above.len() as u32).filter(|&body| is_movable(body) && above[body as usize] == 0).collect();
         let mut is_done = vec![false; above.len()];
-        let mut balance = Balance::default();
+        let (mut balance, mut own_points) = (Balance::default(), Vec::new());
         self.forces.fill([0.0; 3]);
         while let Some(upper) = ready.pop() {
             let body = upper as usize;
             let own = self.bearings_of(upper);
-            let points = self.points_of(own.clone());
+            self.write_points(own.clone(), is_new[body], problem, &mut own_points);
             is_done[body] = true;
             if !self.falls[body] && loads[body] != Wrench::default() {
-                match balance.of(&loads[body], &self.points[points.clone()]) {
-                    Some(forces) => self.forces[points].copy_from_slice(forces),
+                match balance.of(&loads[body], &own_points) {
+                    Some(forces) => {
+                        let points = self.points_of(own.clone());
+                        self.forces[points].copy_from_slice(forces);
+                    }
                     None => self.falls[body] = true,
                 }
             }
+            let mut points = own_points.iter();
             for i in own {
                 let bearing = self.bearings[i];
                 let lower = bearing.lower as usize;
                 let rows = points_of_row(&problem.contacts[bearing.row as usize], &problem.points);
-                for (k, row) in self.points_of(i..i + 1).zip(rows) {
-                    loads[lower].add(-self.points[k].force(&self.forces[k]), arms(row, &bearing).1);
+                for ((force, point), row) in self.forces[self.points_of(i..i + 1)].iter().zip(&mut points).zip(rows) {
+                    loads[lower].add(-point.force(force), arms(row, &bearing).1);
                 }
                 above[lower] -= 1;
                 if above[lower] == 0 && is_movable(bearing.lower) {
@@ -184,6 +197,13 @@ impl Structure {
                 return any;
             }
         }
+    }
+
+    /// The new bodies that begin without impulses on others that can move.
+    fn restless(&self, is_new: &[bool], problem: &StepProblem) -> Vec<u32> {
+        let lies = |bearing: &&Bearing| problem.masses[bearing.lower as usize].inv_mass > 0.0;
+        let begins_without = |body: &u32| is_new[*body as usize] && self.falls[*body as usize];
+        self.bearings.iter().filter(lies).map(|bearing| bearing.upper).filter(begins_without).collect()
     }
 
     /// Adds the impulses of a substep and the preloads to the rows.

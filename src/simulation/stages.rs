@@ -193,7 +193,7 @@ impl Stages {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
             contacts.write(world, detector, config, effort, dt, problem);
-            rest::begin(world, config, dt / config.substeps as f32, contacts, problem);
+            effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));

@@ -23,7 +23,7 @@ impl Named for Preset {
     const WORDS: &'static [(&'static str, &'static str)] = &[
         ("fast", "4 substeps: for games and previews"),
         ("balanced", "8 substeps"),
-        ("accurate", "32 substeps: heavy on light"),
+        ("accurate", "32 substeps"),
         ("reference", "128 substeps: for comparison with the others"),
     ];
 }
