@@ -34,7 +34,7 @@ pub struct Effort {
     classes: Vec<u8>,
     /// Steps in which the next lower class would have kept its promise, body by body.
     calm_for: Vec<u8>,
-    /// Bodies that began on others without the impulses that they rest with, and whose islands did not come to rest since.
+    /// Bodies that began on others, unbalanced by any forces, and whose islands did not come to rest since.
     restless: Vec<u32>,
     /// The need that gives them [`RESTLESS_SUBSTEPS`].
     restless_need: f32,
@@ -124,7 +124,7 @@ const HEAP_BEGINS: f32 = 2.25;
 const HEAP_LEAVES: f32 = 2.1;
 /// Islands are looked for heaps in every so many steps.
 const HEAPS_EVERY: u32 = 8;
-/// Fewest substeps of an island that began without the impulses that it rests with, until it rests or falls. Of arches of 13 to 41 wedges,
+/// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
 /// 0.12 of the radius thick, 4 of 15 stand with 8, 9 with 16 and 10 with 32.
 const RESTLESS_SUBSTEPS: f32 = 32.0;
 /// What is as fast as after a fall of so long does not come to rest where it began (s).
@@ -211,7 +211,7 @@ impl Effort {
         changed
     }
 
-    /// Notes bodies that begin on others without the impulses that they rest with.
+    /// Notes bodies that begin on others, unbalanced by any forces.
     pub fn note_restless(&mut self, bodies: Vec<u32>) {
         self.restless.extend(bodies);
     }

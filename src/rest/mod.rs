@@ -26,7 +26,7 @@ const LEAST_RISE: f64 = 0.01;
 const ROUNDS: usize = 16;
 
 /// Gives the contacts of new bodies, and those that bear them, the impulses and preloads that they rest with. The rows are written. `substep` is
-/// the length of a substep of class 0 (s). Returns the new bodies that lie on others and begin without impulses.
+/// the length of a substep of class 0 (s). Returns the bodies that lie on others which can move, and that no forces balance.
 pub(crate) fn begin(
     world: &World,
     config: &SolverConfig,
@@ -41,7 +41,7 @@ pub(crate) fn begin(
     if !structure.bearings.is_empty() && (0..ROUNDS).any(|_| structure.hand_down(contacts.new_bodies(), problem)) {
         structure.write(config, substep, contacts, problem);
     }
-    structure.restless(contacts.new_bodies(), problem)
+    structure.unbalanced
 }
 
 /// A contact through which one body bears another.
@@ -66,6 +66,8 @@ struct Structure {
     forces: Vec<[f64; 3]>,
     /// Bodies that begin without impulses.
     falls: Vec<bool>,
+    /// Those of them that no forces balance, though they lie on bodies that can move.
+    unbalanced: Vec<u32>,
     /// How deep a body sags by its own weight in class 0 (m): so far apart may surfaces be that bear.
     sag: f64,
     has_friction: bool,
@@ -97,7 +99,7 @@ impl Structure {
         }
         let forces = vec![[0.0; 3]; points_of[bearings.len()] as usize];
         let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);
-        Self { bearings, bearings_of, points_of, forces, falls, sag, has_friction }
+        Self { bearings, bearings_of, points_of, forces, falls, unbalanced: Vec::new(), sag, has_friction }
     }
 
     fn bearings_of(&self, upper: u32) -> Range<usize> {
@@ -155,7 +157,12 @@ impl Structure {
                         let points = self.points_of(own.clone());
                         self.forces[points].copy_from_slice(forces);
                     }
-                    None => self.falls[body] = true,
+                    None => {
+                        self.falls[body] = true;
+                        if self.bearings[own.clone()].iter().any(|bearing| is_movable(bearing.lower)) {
+                            self.unbalanced.push(upper);
+                        }
+                    }
                 }
             }
             let mut points = own_points.iter();
@@ -197,13 +204,6 @@ impl Structure {
                 return any;
             }
         }
-    }
-
-    /// The new bodies that begin without impulses on others that can move.
-    fn restless(&self, is_new: &[bool], problem: &StepProblem) -> Vec<u32> {
-        let lies = |bearing: &&Bearing| problem.masses[bearing.lower as usize].inv_mass > 0.0;
-        let begins_without = |body: &u32| is_new[*body as usize] && self.falls[*body as usize];
-        self.bearings.iter().filter(lies).map(|bearing| bearing.upper).filter(begins_without).collect()
     }
 
     /// Adds the impulses of a substep and the preloads to the rows.
