@@ -154,7 +154,7 @@ impl Default for SolverConfig {
             friction: Friction::Disc,
             friction_at: FrictionAt::Points,
             friction_sweeps: FrictionSweeps::Relax,
-            max_joint_gap_share: 1e-3,
+            max_joint_gap_share: 2.5e-3,
             joint_solver: JointSolver::Auto,
             joint_frequency: 0.25,
             joint_damping: 2.0,

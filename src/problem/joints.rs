@@ -41,9 +41,9 @@ pub struct JointRows {
 /// substeps are cheaper there.
 const MOST_TERMS_A_JOINT: usize = 24;
 
-/// The load on the joint of a pendulum that was let go level, at its lowest point, over its weight. Joints that bear many times the mass of
-/// their bodies are left to sweeps with this load in view.
-const SWING: f32 = 3.0;
+/// The gap of a net that swings over its gap at rest, as substeps for it are chosen. A net of 16 x 16 balls under 300 times opens 6 times as
+/// far as at rest with 8 substeps, and 20 times with 128.
+const SWING: f32 = 8.0;
 
 /// The system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;
