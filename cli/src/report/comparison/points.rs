@@ -123,7 +123,7 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
     if extent != Extent::Quick {
         // The same substeps for all islands, whatever they bear.
         for rule in ["", " preload_rate=0 contact_frequency=0.25"] {
-            points.extend([2, 4, 8, 16, 32].map(|n| ("cpu", format!("substeps={n} max_substeps={n}{rule}"))));
+            points.extend([1, 2, 4, 8, 16, 32].map(|n| ("cpu", format!("substeps={n} max_substeps={n}{rule}"))));
         }
         // A looser promise, and a tighter one.
         points.extend([0.1, 0.001].map(|share| ("cpu", format!("max_penetration_share={share}"))));
