@@ -8,11 +8,14 @@
 //! A class rises as soon as a load lasts, and falls only after a second in which half of the lower class's promise was kept: a load that is as
 //! large as before never changes a class. The power of two makes the change exact: impulses and preloads scale without rounding.
 
+mod island;
+
 use crate::config::{Method, SolverConfig, Stabilization};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
 use crate::stats::EFFORT_CLASSES;
 use crate::world::{BodyKind, World};
+use island::{HIGHEST, Island};
 
 /// A constraint, for the effort that its island takes.
 #[derive(Clone, Copy, Debug)]
@@ -64,64 +67,6 @@ pub struct Effort {
 /// What bodies of one block have in common: their class, and whether they are of heaps.
 type Kind = (u8, bool);
 
-/// What decides the class of an island.
-#[derive(Clone, Copy, Debug)]
-struct Island {
-    /// The largest need of its contacts.
-    need: f32,
-    /// The largest need of its joints, and of restless bodies: no other contact takes load from them.
-    whole_need: f32,
-    /// The sum of the squares of the needs of its contacts.
-    squares: f32,
-    contacts: u32,
-    bodies: u32,
-    has_joints: bool,
-    /// Whether any of its bodies was part of a heap.
-    is_heap: bool,
-    /// The speed of its fastest body (m/s).
-    fastest: f32,
-    /// The highest class of its bodies, and the fewest steps for which any was calm.
-    class: u8,
-    calm_for: u8,
-}
-
-impl Island {
-    const NONE: Self = Self {
-        need: 0.0,
-        whole_need: 0.0,
-        squares: 0.0,
-        contacts: 0,
-        bodies: 0,
-        has_joints: false,
-        is_heap: false,
-        fastest: 0.0,
-        class: 0,
-        calm_for: u8::MAX,
-    };
-
-    /// The need that counts. A column hands its load on through one contact a body and sways where that contact is soft; with several
-    /// contacts a body, the load of a contact has other ways. A heap stands with any springs, and its root mean square counts.
-    fn counted_need(&self) -> f32 {
-        let contacts = self.contacts.max(1) as f32;
-        let of_contacts = if self.is_heap {
-            (self.squares / contacts).sqrt()
-        } else {
-            self.need * (self.bodies as f32 / contacts).min(1.0)
-        };
-        of_contacts.max(self.whole_need)
-    }
-
-    /// Whether it is a heap now. Islands with joints are none.
-    fn becomes_heap(&self) -> bool {
-        let least = if self.is_heap { HEAP_LEAVES } else { HEAP_BEGINS };
-        !self.has_joints && self.contacts as f32 > least * self.bodies as f32
-    }
-}
-
-/// Contacts a body from which on an island is a heap, and below which it is none again. Pyramids, walls and towers of planks have 1 to 2.0
-/// contacts a body, piles of equal boxes 3.3, piles of mixed boxes 2.5.
-const HEAP_BEGINS: f32 = 2.25;
-const HEAP_LEAVES: f32 = 2.1;
 /// Islands are looked for heaps in every so many steps.
 const HEAPS_EVERY: u32 = 8;
 /// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
@@ -129,26 +74,9 @@ const HEAPS_EVERY: u32 = 8;
 const RESTLESS_SUBSTEPS: f32 = 32.0;
 /// What is as fast as after a fall of so long does not come to rest where it began (s).
 const FALL: f32 = 0.1;
-/// Steps after which an island goes down one class.
-const CALM_STEPS: u8 = 60;
-/// The share of the promise that the lower class has to keep.
-const CALM_SHARE: f32 = 0.5;
-/// The highest class of all.
-const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
-
 /// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
     now.min(4.0 * before + 0.25)
-}
-
-/// The lowest class that keeps the promise.
-fn class_for(need: f32) -> u8 {
-    (0..HIGHEST).find(|&class| need <= sag_factor(class)).unwrap_or(HIGHEST)
-}
-
-/// How much deeper a contact would sag in class 0 than in this class.
-fn sag_factor(class: u8) -> f32 {
-    (1_u32 << (2 * class)) as f32
 }
 
 impl Effort {
@@ -289,7 +217,7 @@ impl Effort {
         let mut kinds = [[0; 2]; EFFORT_CLASSES];
         for body in (0..bodies).filter(|&body| is_awake(body)) {
             let island = self.of_root[self.islands.root(body as u32) as usize];
-            let (class, calm) = self.next(&island);
+            let (class, calm) = island.next(self.highest);
             changed |= class != self.classes[body];
             (self.classes[body], self.calm_for[body]) = (class, calm);
             self.heaps[body] = island.is_heap;
@@ -303,19 +231,6 @@ impl Effort {
         self.used.extend(all.filter(|&(class, is_heap)| kinds[usize::from(class)][usize::from(is_heap)] > 0));
         self.any_above = self.classes.iter().any(|&class| class > 0);
         changed | self.heaps_change
-    }
-
-    /// The next class of an island, and for how long it has been calm.
-    fn next(&self, island: &Island) -> (u8, u8) {
-        let (need, class) = (island.counted_need(), island.class.min(self.highest));
-        let wanted = class_for(need);
-        if wanted >= class {
-            return (wanted.min(self.highest), 0);
-        }
-        if need > CALM_SHARE * sag_factor(class - 1) {
-            return (class, 0);
-        }
-        if island.calm_for + 1 < CALM_STEPS { (class, island.calm_for + 1) } else { (class - 1, 0) }
     }
 
     /// Bodies that are awake and can be pushed, class by class, where so many sleep.
@@ -378,13 +293,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_class_is_the_lowest_that_keeps_the_promise() {
-        for (need, class) in [(0.0, 0), (1.0, 0), (1.01, 1), (4.0, 1), (4.1, 2), (16.0, 2), (1e30, HIGHEST)] {
-            assert_eq!(class_for(need), class, "{need}");
-        }
-    }
-
-    #[test]
     fn a_hit_of_one_step_never_counts_and_a_load_does_soon() {
         assert!(lasting(1e9, 0.0) < 1.0);
         let mut need = 0.0;
@@ -394,41 +302,5 @@ mod tests {
         });
         assert_eq!(steps, Some(7));
         assert_eq!(lasting(0.0, 1000.0), 0.0);
-    }
-
-    fn island(need: f32, class: u8, calm_for: u8) -> Island {
-        Island { need, contacts: 2, bodies: 2, class, calm_for, ..Island::NONE }
-    }
-
-    #[test]
-    fn a_class_rises_at_once_and_falls_after_a_second_of_calm() {
-        let effort = Effort { highest: 3, ..Effort::default() };
-        assert_eq!(effort.next(&island(20.0, 0, 0)), (3, 0));
-        assert_eq!(effort.next(&island(1e9, 0, 0)), (3, 0), "no higher than the settings allow");
-        assert_eq!(effort.next(&island(40.0, 5, 0)).0, 3, "as high as the settings allow now");
-        assert_eq!(effort.next(&island(0.0, 5, 0)), (3, 1), "and no lower at once");
-        assert_eq!(effort.next(&island(2.1, 2, 30)), (2, 0), "class 1 would be near its limit");
-        assert_eq!(effort.next(&island(1.9, 2, 30)), (2, 31));
-        assert_eq!(effort.next(&island(1.9, 2, CALM_STEPS - 1)), (1, 0));
-        assert_eq!(effort.next(&island(0.0, 0, 9)), (0, 0));
-    }
-
-    /// Contacts that come and go change nothing, and joints hold what is no heap.
-    #[test]
-    fn many_contacts_a_body_make_a_heap() {
-        let island = |contacts: u32, is_heap: bool| Island { contacts, bodies: 100, is_heap, ..Island::NONE };
-        assert!(!island(225, false).becomes_heap() && island(226, false).becomes_heap());
-        assert!(island(211, true).becomes_heap() && !island(209, true).becomes_heap());
-        assert!(!Island { has_joints: true, ..island(400, true) }.becomes_heap());
-        let squares = 9.0 * 400.0;
-        assert_eq!(Island { need: 60.0, squares, ..island(400, true) }.counted_need(), 3.0);
-    }
-
-    #[test]
-    fn a_heap_needs_less_than_a_column() {
-        assert_eq!(island(8.0, 0, 0).counted_need(), 8.0);
-        assert_eq!(Island { contacts: 8, ..island(8.0, 0, 0) }.counted_need(), 2.0);
-        assert_eq!(Island { contacts: 1, ..island(8.0, 0, 0) }.counted_need(), 8.0);
-        assert_eq!(Island { whole_need: 3.0, contacts: 8, ..island(8.0, 0, 0) }.counted_need(), 3.0);
     }
 }
