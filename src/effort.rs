@@ -74,6 +74,7 @@ const HEAPS_EVERY: u32 = 8;
 const RESTLESS_SUBSTEPS: f32 = 32.0;
 /// What is as fast as after a fall of so long does not come to rest where it began (s).
 const FALL: f32 = 0.1;
+
 /// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
     now.min(4.0 * before + 0.25)

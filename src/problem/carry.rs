@@ -6,6 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::softness::HEAP_STIFFNESS;
 use crate::math::smaller;
 
 /// The changes since the last step, for a backend that has the rows of that step.
@@ -70,7 +71,7 @@ impl Preload {
     /// Overlap at rest per impulse of a substep, times the effective mass (s).
     pub(super) fn compliance(&self, both_movable: bool, in_heap: bool) -> f32 {
         match (in_heap, both_movable) {
-            (true, _) => 0.5 * self.movable_compliance,
+            (true, _) => self.movable_compliance / HEAP_STIFFNESS,
             (false, true) => self.movable_compliance,
             (false, false) => self.fixed_compliance,
         }

@@ -15,6 +15,9 @@ pub use entry::{Entry, MOST_BODIES, Parameter};
 use crate::error::{Result, ensure};
 
 const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of the slope [degrees]");
+const BOXES: Parameter = Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes");
+const JITTER: Parameter =
+    Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]");
 const CUBES: Parameter = Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes");
 const MU: Parameter = Parameter::real("mu", 0.5, (0.0, 10.0), "friction of all bodies");
 const LIFTED: Parameter = Parameter::real("angle", 90.0, (0.0, 180.0), "start, lifted from where it hangs [degrees]");
@@ -35,8 +38,8 @@ pub static CATALOGUE: &[Entry] = &[
         name: "pile",
         summary: "n boxes in a jittered grid fall into a container: none leaves, all come to rest, overlap stays small",
         parameters: &[
-            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
-            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
+            BOXES,
+            JITTER,
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the random shifts and turns"),
             Parameter::real("ratio", 1.0, (1e-6, 1e6), "density of every other box relative to the others"),
         ],
@@ -47,8 +50,8 @@ pub static CATALOGUE: &[Entry] = &[
         name: "pile-mixed",
         summary: "a pile of boxes of random sizes and densities, 200 to 5000 kg/m³: none leaves, all come to rest",
         parameters: &[
-            Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes"),
-            Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]"),
+            BOXES,
+            JITTER,
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the sizes, densities, shifts and turns"),
         ],
         bodies: |v| v[0],

@@ -5,7 +5,8 @@ use crate::settings;
 use drystone::backend::gpu::adapters;
 use drystone::{Result, Scene, SolverConfig};
 
-const FULL: [&str; 12] = [
+/// The scenes of a full and of a brief report that have at most 1,000 bodies.
+const SMALL: [&str; 10] = [
     "tower:n=20",
     "tower:n=10,top_ratio=1000",
     "tower:n=20,top_ratio=1000",
@@ -16,24 +17,13 @@ const FULL: [&str; 12] = [
     "pile:n=512,ratio=100",
     "pile:n=1000",
     "pile-mixed",
-    "pyramid:base=100",
-    "pile:n=5000",
 ];
 
-/// The scenes of [`FULL`] with at most 1,000 bodies.
-const BRIEF: [&str; 11] = [
-    "tower:n=20",
-    "tower:n=10,top_ratio=1000",
-    "tower:n=20,top_ratio=1000",
-    "tower:n=30,top_ratio=100",
-    "mass-ratio",
-    "chain",
-    "wall",
-    "pile:n=512,ratio=100",
-    "pile:n=1000",
-    "pile-mixed",
-    "pyramid:base=40",
-];
+/// The further scenes of a full report.
+const FULL: [&str; 2] = ["pyramid:base=100", "pile:n=5000"];
+
+/// The further scene of a brief report.
+const BRIEF: [&str; 1] = ["pyramid:base=40"];
 
 const QUICK: [&str; 5] = ["tower:n=20", "tower:n=10,top_ratio=1000", "mass-ratio", "chain", "wall:rows=10,columns=10"];
 
@@ -45,9 +35,9 @@ const LARGE_STEPS: u32 = 300;
 
 pub fn scenes(extent: Extent) -> Result<Vec<Scene>> {
     let names = match extent {
-        Extent::Quick => QUICK.as_slice(),
-        Extent::Brief => &BRIEF,
-        Extent::Full => &FULL,
+        Extent::Quick => QUICK.to_vec(),
+        Extent::Brief => [&SMALL[..], &BRIEF].concat(),
+        Extent::Full => [&SMALL[..], &FULL].concat(),
     };
     let named = |name: &&str| {
         let scene = scene(name)?;
