@@ -11,16 +11,16 @@ use crate::plan::Kernel;
 use crate::problem::{ContactRow, JointRow, StepProblem};
 
 /// A kind of constraint: contacts or joints.
-pub(super) trait Constraint: Sized + Sync {
+pub(super) trait Constraint: bytemuck::Pod + Sync {
     /// Whether each impulse has a row of `points`.
     const HAS_POINTS: bool;
+    /// Which numbers of its row stand in lanes, in the order of the kernels' struct; those of a joint end before the padding.
+    const HEADER: [usize; 11];
     fn colors(problem: &StepProblem) -> Range<u32>;
     fn rows(problem: &StepProblem) -> &[Self];
     fn impulses(problem: &StepProblem) -> &[[f32; 4]];
     fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
     fn bodies(&self) -> [u32; 2];
-    /// Numbers of the constraint itself, in the order of the kernels' struct.
-    fn header(&self) -> [f32; 11];
     /// Contact points, 1 to 4; 1 of a joint.
     fn points(&self) -> u32;
     /// Its first row of impulses and points; `row` is its own row.
@@ -29,6 +29,8 @@ pub(super) trait Constraint: Sized + Sync {
 
 impl Constraint for ContactRow {
     const HAS_POINTS: bool = true;
+    /// Normal, tangent, friction, restitution, radii, preload.
+    const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 3, 7, 12, 13, 14];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.contact_colors()
     }
@@ -44,11 +46,6 @@ impl Constraint for ContactRow {
     fn bodies(&self) -> [u32; 2] {
         [self.body_a, self.body_b]
     }
-    #[inline(always)]
-    fn header(&self) -> [f32; 11] {
-        let ([nx, ny, nz], [tx, ty, tz]) = (self.normal, self.tangent);
-        [nx, ny, nz, tx, ty, tz, self.friction, self.restitution, self.radius_a, self.radius_b, self.preload]
-    }
     fn points(&self) -> u32 {
         self.point_count
     }
@@ -59,6 +56,8 @@ impl Constraint for ContactRow {
 
 impl Constraint for JointRow {
     const HAS_POINTS: bool = false;
+    /// Arms and gap.
+    const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 11];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.joint_colors()
     }
@@ -73,10 +72,6 @@ impl Constraint for JointRow {
     }
     fn bodies(&self) -> [u32; 2] {
         [self.body_a, self.body_b]
-    }
-    fn header(&self) -> [f32; 11] {
-        let ([ax, ay, az], [bx, by, bz], [gx, gy, gz]) = (self.r_a, self.r_b, self.gap);
-        [ax, ay, az, bx, by, bz, gx, gy, gz, 0.0, 0.0]
     }
     fn points(&self) -> u32 {
         1

@@ -5,12 +5,12 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::bodies::place;
 use super::constraint::Constraint;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::shared::Shared;
-use super::simd::{Lanes, Portable, WIDTH, Wide};
+use super::simd::{InstructionSet, Lanes, Portable, WIDTH, Wide};
 use super::threads::Threads;
+use super::transfer::{BodyPlace, Load, Store};
 use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
 use crate::math::{Lane, Vec3, vec3};
@@ -22,7 +22,7 @@ pub(super) struct LaneGroup {
     pub a: BodyLanes,
     pub b: BodyLanes,
     /// Rows of the problem, one a lane; `NO_ROW` for a lane without a constraint.
-    rows: [u32; WIDTH],
+    pub rows: [u32; WIDTH],
     pub header: [Wide; 11],
     /// The first of its impulses, and of its points.
     first: u32,
@@ -40,7 +40,7 @@ pub(super) struct ImpulsePlace {
 }
 
 /// The row of a lane without a constraint.
-const NO_ROW: u32 = u32::MAX;
+pub(super) const NO_ROW: u32 = u32::MAX;
 
 /// Sixteen bodies.
 #[derive(Clone, Copy, Default)]
@@ -49,14 +49,6 @@ pub(super) struct BodyLanes {
     pub places: [u32; WIDTH],
     /// Which of them can move, a bit a lane.
     pub movable: u16,
-}
-
-impl BodyLanes {
-    /// Puts a body of a problem into a lane; the body after the last is the placeholder.
-    fn set(&mut self, lane: usize, body: usize, problem: &StepProblem, slots: &[u32]) {
-        self.places[lane] = place(slots[body] as usize);
-        self.movable |= u16::from(problem.masses.get(body).is_some_and(|m| m.inv_mass > 0.0)) << lane;
-    }
 }
 
 /// The contacts, or the joints, of a problem, part by part and color by color.
@@ -81,43 +73,36 @@ impl<C: Constraint> LaneLayout<C> {
         &mut self,
         problem: &StepProblem,
         partition: &Partition,
+        places: &[BodyPlace],
         impulses: &mut Vec<[Wide; 4]>,
-        threads: &Threads,
+        (instructions, threads): (InstructionSet, &Threads),
     ) {
         self.make_groups(problem, partition, threads);
         let count = self.groups.last().map_or(0, |group| group.impulses().end);
         self.points.resize(if C::HAS_POINTS { count } else { 0 }, [Wide::default(); 12]);
         impulses.resize(count, [Wide::default(); 4]);
-        let (points, impulses) = (Shared::new(&mut self.points), Shared::new(impulses));
-        let (len, groups) = (self.groups.len(), Shared::new(&mut self.groups));
-        threads.spread(0..len, &|range| {
-            // SAFETY: tasks have different groups: `Threads::spread` cuts their range.
-            for group in unsafe { groups.slice(range) } {
-                let own = group.impulses();
-                let own_points = if C::HAS_POINTS { own.clone() } else { 0..0 };
-                // SAFETY: `make_groups` gives each group impulses and points of its own.
-                let (points, impulses) = unsafe { (points.slice(own_points), impulses.slice(own)) };
-                group.fill::<C>(problem, &partition.slots, points, impulses);
-            }
-        });
+        let len = self.groups.len();
+        let work = Load::<C> {
+            problem,
+            places,
+            groups: Shared::new(&mut self.groups),
+            points: Shared::new(&mut self.points),
+            impulses: Shared::new(impulses),
+            constraint: PhantomData,
+        };
+        threads.spread(0..len, &|range| instructions.run(&work, range));
     }
 
     /// Gives the impulses back.
-    pub fn store(&self, problem: &mut StepProblem, impulses: &[[Wide; 4]], threads: &Threads) {
-        let (rows, to_problem) = C::impulses_mut(problem);
-        let to_problem = Shared::new(to_problem);
-        threads.spread(0..self.groups.len(), &|range| {
-            for group in &self.groups[range] {
-                for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                    let first = rows[row as usize].first(row) as usize;
-                    for (k, wide) in impulses[group.impulses()].iter().enumerate() {
-                        // SAFETY: `make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
-                        // constraints have different impulses.
-                        unsafe { to_problem.write(first + k, wide.map(|number| number.0[lane])) };
-                    }
-                }
-            }
-        });
+    pub fn store(
+        &self,
+        problem: &mut StepProblem,
+        impulses: &[[Wide; 4]],
+        (instructions, threads): (InstructionSet, &Threads),
+    ) {
+        let (rows, to) = C::impulses_mut(problem);
+        let work = Store { rows, groups: &self.groups, impulses, to: Shared::new(to) };
+        threads.spread(0..self.groups.len(), &|range| instructions.run(&work, range));
     }
 
     /// Extrapolates all impulses.
@@ -245,33 +230,10 @@ impl LaneGroup {
         self.first as usize..(self.first + self.count) as usize
     }
 
-    /// Lanes without a constraint hold one of the placeholder with itself.
-    fn fill<C: Constraint>(
-        &mut self,
-        problem: &StepProblem,
-        slots: &[u32],
-        points: &mut [[Wide; 12]],
-        impulses: &mut [[Wide; 4]],
-    ) {
-        let placeholder = problem.bodies.len() as u32;
-        (self.a, self.b) = (BodyLanes::default(), BodyLanes::default());
-        let (all_points, all_impulses): (&[[f32; 12]], _) =
-            (bytemuck::cast_slice(&problem.points), C::impulses(problem));
-        for (lane, row) in self.rows.into_iter().enumerate() {
-            let ([a, b], header, first) = match C::rows(problem).get(row as usize) {
-                Some(constraint) => (constraint.bodies(), constraint.header(), constraint.first(row) as usize),
-                None => ([placeholder; 2], [0.0; 11], NO_ROW as usize),
-            };
-            self.a.set(lane, a as usize, problem, slots);
-            self.b.set(lane, b as usize, problem, slots);
-            set_lane(&mut self.header, lane, &header);
-            for (k, point) in points.iter_mut().enumerate() {
-                set_lane(point, lane, all_points.get(first + k).unwrap_or(&[0.0; 12]));
-            }
-            for (k, impulse) in impulses.iter_mut().enumerate() {
-                set_lane(impulse, lane, all_impulses.get(first + k).unwrap_or(&[0.0; 4]));
-            }
-        }
+    /// Whether every lane has a constraint; lanes are filled from the first.
+    #[inline(always)]
+    pub fn is_full(&self) -> bool {
+        self.rows[WIDTH - 1] != NO_ROW
     }
 }
 
@@ -279,12 +241,4 @@ impl LaneGroup {
 fn components(impulse: &[Wide; 4]) -> Vec3<Portable> {
     let [x, y, z, _] = impulse.each_ref().map(Portable::load);
     vec3(x, y, z)
-}
-
-/// Writes one lane of some rows.
-#[inline(always)]
-fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
-    for (row, value) in rows.iter_mut().zip(values) {
-        row.0[lane] = *value;
-    }
 }

@@ -18,6 +18,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 mod threads;
+mod transfer;
 
 pub use reference::Reference;
 
@@ -32,7 +33,7 @@ use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
-use bodies::{State, extrapolate_velocities, load_bodies, store_bodies};
+use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
 use joint_systems::{SharedFactors, SystemLayout};
 use lane_layout::LaneLayout;
 use partition::Partition;
@@ -40,6 +41,7 @@ use shared::Shared;
 use shared_step::{SharedStep, Spread};
 use simd::{InstructionSet, Row8, WIDTH, Wide};
 use threads::Threads;
+use transfer::BodyPlace;
 
 /// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
 /// a step took 0.87 and 0.60 of the time on one thread if divided, 1.1 and 0.75 on two; of 64 worlds 1.05 and 0.9.
@@ -52,6 +54,7 @@ pub struct Cpu {
     /// Problems with fewer bodies and constraints are one part; [`UNDIVIDED`] if not given.
     undivided: Option<usize>,
     partition: Partition,
+    places: Vec<BodyPlace>,
     bodies: Vec<State>,
     free: Vec<Row8>,
     accelerations: Vec<Row8>,
@@ -104,8 +107,14 @@ impl Cpu {
         self.inertias
             .extend(problem.inertias.iter().map(|row| (slots[row.body as usize] as usize, Inertia::load(row))));
         self.inertias.sort_unstable_by_key(|inertia| inertia.0);
-        self.contacts.load(problem, &self.partition, &mut self.contact_impulses, threads);
-        self.joints.load(problem, &self.partition, &mut self.joint_impulses, threads);
+        self.places.clear();
+        self.places.extend(slots.iter().enumerate().map(|(body, &slot)| {
+            let is_movable = problem.masses.get(body).is_some_and(|mass| mass.inv_mass > 0.0);
+            BodyPlace { place: place(slot as usize), is_movable }
+        }));
+        let on = (self.instructions, threads);
+        self.contacts.load(problem, &self.partition, &self.places, &mut self.contact_impulses, on);
+        self.joints.load(problem, &self.partition, &self.places, &mut self.joint_impulses, on);
         self.systems.load(problem, &self.partition, &self.joints);
         self.turning.clear();
         self.turning.extend(problem.turning.iter().map(|row| {
@@ -125,8 +134,9 @@ impl Cpu {
     fn store(&self, problem: &mut StepProblem, threads: &Threads) {
         let (rows, slots) = (Shared::new(&mut problem.bodies), &self.partition.slots);
         in_groups(slots.len() - 1, threads, &|range| store_bodies(&self.bodies, slots, range, &rows));
-        self.contacts.store(problem, &self.contact_impulses, threads);
-        self.joints.store(problem, &self.joint_impulses, threads);
+        let on = (self.instructions, threads);
+        self.contacts.store(problem, &self.contact_impulses, on);
+        self.joints.store(problem, &self.joint_impulses, on);
         problem.convergence = self.convergence;
         problem.momentum = self.momentum.store();
     }

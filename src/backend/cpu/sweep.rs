@@ -41,7 +41,7 @@ impl<C: Constraint> Sweep<'_, C> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
         let states = self.bodies.as_ptr();
-        // SAFETY: `BodyLanes::set` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
+        // SAFETY: `Load::take_bodies` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
         // holds that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
         if self.kernel.is_from_start() {

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Lanes, Row8, WIDTH, Wide, lane, lanes, row_at};
+use super::{Lanes, Row8, WIDTH, Wide, lane};
 use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 
 /// One register.
@@ -12,7 +12,7 @@ use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 pub struct Avx512(__m512);
 
 // SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has been
-// detected; loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
+// detected; aligned loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
 
 lane! {
     Avx512, __mmask16, |a, b, m|
@@ -48,11 +48,9 @@ impl Lanes for Avx512 {
         to
     }
     #[inline(always)]
-    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
-        // SAFETY: the caller promises that a row is at each of the places.
-        let r: [*const Row8; WIDTH] = lanes!(lane => unsafe { row_at(rows, places[lane]) });
+    unsafe fn columns(r: &[*const f32; WIDTH]) -> [Self; 8] {
         // Quarters of a register never meet before the last line, so the rows that are four apart share one.
-        // SAFETY: as above.
+        // SAFETY: the caller's promise.
         let (first, second) = unsafe {
             (
                 [both(r[0], r[4]), both(r[1], r[5]), both(r[2], r[6]), both(r[3], r[7])],
@@ -98,13 +96,13 @@ impl Lanes for Avx512 {
 /// Two rows in one register.
 ///
 /// # Safety
-/// A row is at both addresses, and no thread writes it meanwhile.
+/// Eight numbers are at both addresses, and no thread writes them meanwhile.
 #[inline(always)]
-unsafe fn both(low: *const Row8, high: *const Row8) -> __m512 {
-    // SAFETY: the caller's promise; rows are aligned to 32 bytes.
+unsafe fn both(low: *const f32, high: *const f32) -> __m512 {
+    // SAFETY: the caller's promise.
     unsafe {
-        let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_load_ps(low.cast())));
-        _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_load_ps(high.cast()))))
+        let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_loadu_ps(low)));
+        _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_loadu_ps(high))))
     }
 }
 

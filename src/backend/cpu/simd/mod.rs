@@ -1,7 +1,7 @@
 //! Sixteen numbers side by side, for every instruction set there is.
 //!
 //! Sixteen fill one register of the widest instruction set, and two or four of the others. The dearest thing in a sweep is to bring
-//! bodies from where they stand in memory to the lanes and back ([`Lanes::gathered`], [`Lanes::scattered`]): with lanes of eight it
+//! bodies from where they stand in memory to the lanes and back ([`Lanes::columns`], [`Lanes::scattered`]): with lanes of eight it
 //! took 41 % of all instructions.
 
 #![allow(unsafe_code)]
@@ -43,7 +43,16 @@ pub trait Lanes: Lane {
     ///
     /// # Safety
     /// A row is at each of the places, and no thread writes it meanwhile.
-    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8];
+    #[inline(always)]
+    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
+        // SAFETY: the caller's promise.
+        unsafe { Self::columns(&lanes!(lane => row_at(rows, places[lane]).cast())) }
+    }
+    /// From sixteen rows of eight numbers, number by number.
+    ///
+    /// # Safety
+    /// Eight numbers are at each of the addresses, and no thread writes them meanwhile.
+    unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8];
     /// To sixteen rows.
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH];
 }

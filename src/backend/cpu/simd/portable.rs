@@ -1,6 +1,6 @@
 //! Sixteen numbers in plain Rust: right on every target.
 
-use super::{Lanes, Row8, WIDTH, Wide, lane, lanes, row_at};
+use super::{Lanes, Row8, WIDTH, Wide, lane, lanes};
 use crate::math::{INVERSE_SQRT_GUESS, Lane};
 
 /// Sixteen numbers; the compiler chooses the registers.
@@ -35,10 +35,10 @@ impl Lanes for Portable {
         self.0
     }
     #[inline(always)]
-    unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
-        // SAFETY: the caller's promise.
-        let rows: [Row8; WIDTH] = lanes!(lane => unsafe { *row_at(rows, places[lane]) });
-        std::array::from_fn(|column| Self(Wide(std::array::from_fn(|row| rows[row].0[column]))))
+    unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8] {
+        // SAFETY: the caller's promise; an array of numbers is aligned as one number.
+        let rows: [[f32; 8]; WIDTH] = lanes!(lane => unsafe { *rows[lane].cast() });
+        std::array::from_fn(|column| Self(Wide(std::array::from_fn(|row| rows[row][column]))))
     }
     #[inline(always)]
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH] {

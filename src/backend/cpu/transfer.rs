@@ -1,0 +1,198 @@
+//! Rows of a problem into lanes, and impulses back: sixteen rows at a time, number by number.
+
+#![allow(unsafe_code)]
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use super::constraint::Constraint;
+use super::lane_layout::{LaneGroup, NO_ROW};
+use super::shared::Shared;
+use super::simd::{Lanes, Row8, WIDTH, Wide, Work, lanes};
+use crate::problem::StepProblem;
+
+/// Where a body's state is, and whether the body can move.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BodyPlace {
+    pub place: u32,
+    pub is_movable: bool,
+}
+
+/// Takes over the rows of groups.
+pub(super) struct Load<'a, C> {
+    pub problem: &'a StepProblem,
+    /// Body by body; last that of the placeholder.
+    pub places: &'a [BodyPlace],
+    pub groups: Shared<'a, LaneGroup>,
+    pub points: Shared<'a, [Wide; 12]>,
+    pub impulses: Shared<'a, [Wide; 4]>,
+    pub constraint: PhantomData<C>,
+}
+
+/// Gives the impulses of groups back.
+pub(super) struct Store<'a, C> {
+    pub rows: &'a [C],
+    pub groups: &'a [LaneGroup],
+    pub impulses: &'a [[Wide; 4]],
+    pub to: Shared<'a, [f32; 4]>,
+}
+
+impl<C: Constraint> Work for Load<'_, C> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, range: Range<usize>) {
+        // SAFETY: tasks have different groups: `Threads::spread` cuts their range.
+        for group in unsafe { self.groups.slice(range) } {
+            let own = group.impulses();
+            let own_points = if C::HAS_POINTS { own.clone() } else { 0..0 };
+            // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
+            let (points, impulses) = unsafe { (self.points.slice(own_points), self.impulses.slice(own)) };
+            self.take_bodies(group);
+            if group.is_full() {
+                self.take_full::<L>(group, points, impulses);
+            } else {
+                self.take_some(group, points, impulses);
+            }
+        }
+    }
+}
+
+impl<C: Constraint> Load<'_, C> {
+    fn take_bodies(&self, group: &mut LaneGroup) {
+        let placeholder = self.places.len() as u32 - 1;
+        let bodies_of = |row: u32| C::rows(self.problem).get(row as usize).map_or([placeholder; 2], C::bodies);
+        let bodies = group.rows.map(bodies_of);
+        for (lanes, side) in [&mut group.a, &mut group.b].into_iter().zip(0..) {
+            let places = bodies.map(|bodies| self.places[bodies[side] as usize]);
+            lanes.places = places.map(|body| body.place);
+            lanes.movable = places.iter().rev().fold(0, |bits, body| bits << 1 | u16::from(body.is_movable));
+        }
+    }
+
+    /// A row in each lane.
+    #[inline(always)]
+    fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
+        let rows = C::rows(self.problem);
+        let own: [&C; WIDTH] = lanes!(lane => &rows[group.rows[lane] as usize]);
+        let numbers: [&[f32]; WIDTH] = lanes!(lane => bytemuck::cast_slice(std::slice::from_ref(own[lane])));
+        let (low, high) = (first_eight::<L>(&numbers), last_eight::<L>(&numbers));
+        for (wide, at) in group.header.iter_mut().zip(C::HEADER) {
+            *wide = if at < 8 { low[at] } else { high[at + 8 - numbers[0].len()] };
+        }
+        let firsts: [usize; WIDTH] = lanes!(lane => own[lane].first(group.rows[lane]) as usize);
+        for (k, point) in points.iter_mut().enumerate() {
+            let all: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
+            let rows: [&[f32]; WIDTH] = lanes!(lane => &all[firsts[lane] + k][..]);
+            point[..8].copy_from_slice(&first_eight::<L>(&rows));
+            point[4..].copy_from_slice(&last_eight::<L>(&rows));
+        }
+        let all = C::impulses(self.problem);
+        if let [only] = impulses {
+            for (lane, &first) in firsts.iter().enumerate() {
+                set_lane(only, lane, &all[first]);
+            }
+            return;
+        }
+        let last = impulses.len() - 2;
+        for k in (0..=last + 1).step_by(2).map(|k| k.min(last)) {
+            let pairs: [&[f32]; WIDTH] = lanes!(lane => all[firsts[lane] + k..firsts[lane] + k + 2].as_flattened());
+            let both = first_eight::<L>(&pairs);
+            impulses[k].copy_from_slice(&both[..4]);
+            impulses[k + 1].copy_from_slice(&both[4..]);
+        }
+    }
+
+    /// Lanes without a row hold zeros.
+    fn take_some(&self, group: &mut LaneGroup, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
+        let all_points: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
+        let all_impulses = C::impulses(self.problem);
+        for (lane, row) in group.rows.into_iter().enumerate() {
+            let (header, first) = match C::rows(self.problem).get(row as usize) {
+                Some(constraint) => {
+                    let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(constraint));
+                    (C::HEADER.map(|at| numbers[at]), constraint.first(row) as usize)
+                }
+                None => ([0.0; 11], NO_ROW as usize),
+            };
+            set_lane(&mut group.header, lane, &header);
+            for (k, point) in points.iter_mut().enumerate() {
+                set_lane(point, lane, all_points.get(first + k).unwrap_or(&[0.0; 12]));
+            }
+            for (k, impulse) in impulses.iter_mut().enumerate() {
+                set_lane(impulse, lane, all_impulses.get(first + k).unwrap_or(&[0.0; 4]));
+            }
+        }
+    }
+}
+
+impl<C: Constraint> Work for Store<'_, C> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, range: Range<usize>) {
+        for group in &self.groups[range] {
+            let impulses = &self.impulses[group.impulses()];
+            let first = |row: u32| self.rows[row as usize].first(row) as usize;
+            if !group.is_full() || impulses.len() == 1 {
+                for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                    for (k, wide) in impulses.iter().enumerate() {
+                        // SAFETY: `LaneLayout::make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
+                        // constraints have different impulses.
+                        unsafe { self.to.write(first(row) + k, wide.map(|number| number.0[lane])) };
+                    }
+                }
+                continue;
+            }
+            let firsts: [usize; WIDTH] = lanes!(lane => first(group.rows[lane]));
+            let last = impulses.len() - 2;
+            for k in (0..=last + 1).step_by(2).map(|k| k.min(last)) {
+                let [[a, b, c, d], [e, f, g, h]] = [&impulses[k], &impulses[k + 1]];
+                let pairs = L::scattered([
+                    L::load(a),
+                    L::load(b),
+                    L::load(c),
+                    L::load(d),
+                    L::load(e),
+                    L::load(f),
+                    L::load(g),
+                    L::load(h),
+                ]);
+                for (Row8(pair), first) in pairs.iter().zip(firsts) {
+                    let (one, two) = pair.as_chunks().0.split_at(1);
+                    // SAFETY: as above.
+                    unsafe {
+                        self.to.write(first + k, one[0]);
+                        self.to.write(first + k + 1, two[0]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The first eight numbers of sixteen rows, number by number.
+#[inline(always)]
+fn first_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
+    let addresses = lanes!(lane => rows[lane][..8].as_ptr());
+    // SAFETY: eight numbers are there, and borrowed.
+    stored(unsafe { L::columns(&addresses) })
+}
+
+/// The last eight.
+#[inline(always)]
+fn last_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
+    let addresses = lanes!(lane => rows[lane][rows[lane].len() - 8..].as_ptr());
+    // SAFETY: as above.
+    stored(unsafe { L::columns(&addresses) })
+}
+
+/// Without a closure, which would be compiled for the plain instruction set.
+#[inline(always)]
+fn stored<L: Lanes>([a, b, c, d, e, f, g, h]: [L; 8]) -> [Wide; 8] {
+    [a.store(), b.store(), c.store(), d.store(), e.store(), f.store(), g.store(), h.store()]
+}
+
+/// Writes one lane of some rows.
+#[inline(always)]
+fn set_lane<const N: usize>(rows: &mut [Wide; N], lane: usize, values: &[f32; N]) {
+    for (row, value) in rows.iter_mut().zip(values) {
+        row.0[lane] = *value;
+    }
+}
