@@ -8,7 +8,7 @@ use crate::kernels::joint_system::{apply_joint_change, measure_joint};
 use crate::kernels::{Contact, Impulse, Joint, Pair, Point, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
-use crate::problem::{ContactRow, JointRow, StepProblem};
+use crate::problem::{Block, ContactRow, JointRow, StepProblem};
 
 /// A kind of constraint: contacts or joints.
 pub(super) trait Constraint: bytemuck::Pod + Sync {
@@ -17,6 +17,7 @@ pub(super) trait Constraint: bytemuck::Pod + Sync {
     /// Which numbers of its row stand in lanes, in the order of the kernels' struct; those of a joint end before the padding.
     const HEADER: [usize; 11];
     fn colors(problem: &StepProblem) -> Range<u32>;
+    fn own_colors(block: &Block) -> Range<u32>;
     fn rows(problem: &StepProblem) -> &[Self];
     fn impulses(problem: &StepProblem) -> &[[f32; 4]];
     fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
@@ -33,6 +34,9 @@ impl Constraint for ContactRow {
     const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 3, 7, 12, 13, 14];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.contact_colors()
+    }
+    fn own_colors(block: &Block) -> Range<u32> {
+        block.contacts[0]..block.contacts[1]
     }
     fn rows(problem: &StepProblem) -> &[Self] {
         &problem.contacts
@@ -60,6 +64,9 @@ impl Constraint for JointRow {
     const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 11];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.joint_colors()
+    }
+    fn own_colors(block: &Block) -> Range<u32> {
+        block.joints[0]..block.joints[1]
     }
     fn rows(problem: &StepProblem) -> &[Self] {
         &problem.joints

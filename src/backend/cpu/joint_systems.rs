@@ -32,7 +32,7 @@ impl SystemLayout {
             let JointRow { body_a, body_b, .. } = problem.joints[problem.systems.nodes[first].joint as usize];
             partition.of(body_a, body_b)
         };
-        self.rows.update(problem, problem.system_colors(), partition.count, part_of);
+        self.rows.update(problem, partition, |block| block.systems..block.systems + 1, part_of);
         if problem.has_systems() {
             joints.impulse_places(problem.joints.len(), &mut self.impulses);
         }

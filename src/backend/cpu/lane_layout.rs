@@ -150,7 +150,7 @@ impl<C: Constraint> LaneLayout<C> {
     fn make_groups(&mut self, problem: &StepProblem, partition: &Partition, threads: &Threads) {
         let (all, colors) = (C::rows(problem), C::colors(problem));
         self.ranges.reset(colors.clone());
-        self.rows.update(problem, colors, partition.count, |row| {
+        self.rows.update(problem, partition, C::own_colors, |row| {
             let [a, b] = all[row as usize].bodies();
             partition.of(a, b)
         });

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::simd::WIDTH;
 use crate::graph::Islands;
-use crate::problem::{BodyRow, MassRow, StepProblem};
+use crate::problem::{Block, BodyRow, MassRow, StepProblem};
 
 /// Bodies and constraints that a part holds: about a megabyte.
 const PART: u32 = 4096;
@@ -47,22 +47,29 @@ impl Partition {
             self.find_islands(problem);
             (0..problem.blocks.len()).for_each(|block| self.pack_islands(problem, block));
         }
-        let (first, blocks) = (self.blocks.len() as u32, problem.blocks.len() as u32);
-        // Where one part is for all threads, bodies that no pass changes are in it.
-        let resting = if blocks > 1 { first + blocks } else { first };
-        self.count = resting as usize + 1;
+        let first = self.blocks.len() as u32;
+        // Constraints of divided problems find their part by their bodies. Bodies that no pass changes are then in a part of their own, the
+        // last, unless one part is for all threads.
+        let resting = first + problem.blocks.len() as u32;
+        let rest_apart = first > 0 && problem.blocks.len() > 1;
+        self.count = if rest_apart { resting as usize + 1 } else { resting.max(1) as usize };
         for (own, block) in (first..).zip(&problem.blocks) {
             for &body in problem.rows_of(&block.colors()[2]) {
                 let part = &mut self.of_body[body as usize];
                 if *part == u32::MAX {
-                    *part = if blocks == 1 || moves(problem, body) { own } else { resting };
+                    *part = if rest_apart && !moves(problem, body) { resting } else { own };
                 }
             }
         }
         self.give_slots();
     }
 
-    /// The part of a constraint of two bodies.
+    /// Whether all parts are for all threads, a block each.
+    pub fn is_undivided(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// The part of a constraint of two bodies, in a divided problem.
     pub fn of(&self, a: u32, b: u32) -> u32 {
         // A body that cannot be pushed and has no part with what touches it is in the last part.
         self.of_body[a as usize].min(self.of_body[b as usize])
@@ -136,6 +143,12 @@ impl Partition {
     }
 }
 
+/// The colors of a kind of all blocks.
+fn own_colors(problem: &StepProblem, own: impl Fn(&Block) -> Range<u32>) -> Range<u32> {
+    let ends = problem.blocks.first().zip(problem.blocks.last());
+    ends.map_or(0..0, |(first, last)| own(first).start..own(last).end)
+}
+
 fn ends_of_constraints(problem: &StepProblem) -> impl Iterator<Item = [u32; 2]> + Clone {
     let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
     let joints = problem.rows_of(&problem.joint_colors()).iter().map(|&row| &problem.joints[row as usize]);
@@ -194,16 +207,27 @@ pub(super) struct PartitionedRows {
 }
 
 impl PartitionedRows {
-    /// Sorts the rows of some colors by part; `part_of` gives the part of a row.
-    pub fn update(&mut self, problem: &StepProblem, colors: Range<u32>, parts: usize, part_of: impl Fn(u32) -> u32) {
+    /// Sorts the rows of some colors by part. `own` gives the colors of a block, `part_of` the part of a row of a divided problem.
+    pub fn update(
+        &mut self,
+        problem: &StepProblem,
+        partition: &Partition,
+        own: impl Fn(&Block) -> Range<u32>,
+        part_of: impl Fn(u32) -> u32,
+    ) {
+        let colors = own_colors(problem, &own);
+        let parts = partition.count;
         self.ranges.reset(colors.clone());
         let all = problem.rows_of(&colors);
         let starts = &mut self.ranges.starts;
-        if parts == 1 {
+        if partition.is_undivided() {
             self.rows.clear();
             self.rows.extend_from_slice(all);
-            let first = problem.colors.get(colors.start as usize).copied().unwrap_or(0);
-            starts.extend(colors.map(|color| problem.colors[color as usize] - first));
+            let start = |color: u32| problem.colors[color as usize];
+            for block in &problem.blocks {
+                let own = own(block);
+                starts.extend(colors.clone().map(|color| start(color.clamp(own.start, own.end)) - start(colors.start)));
+            }
             starts.push(all.len() as u32);
             return;
         }
