@@ -17,7 +17,7 @@ fn restitute_contact(rules: Rules, i: u32) {
         impulse.normal = sum;
         impulse.peak = larger(impulse.peak, sum);
         impulses[k] = impulse;
-        apply_impulse(&pair, point.r_a, point.r_b, contact.normal * change);
+        apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * change);
     }
     store_pair(contact.body_a, contact.body_b, &pair);
 }

@@ -28,6 +28,6 @@ fn solve_joint(rules: Rules, i: u32) {
     note_correction(rules.measured, change.x, reciprocal(x.x));
     note_correction(rules.measured, change.y, reciprocal(y.y));
     note_correction(rules.measured, change.z, reciprocal(z.z));
-    apply_impulse(&pair, anchors.r_a, anchors.r_b, change);
+    apply_impulse(false, &pair, anchors.r_a, anchors.r_b, change);
     store_pair(joint.body_a, joint.body_b, &pair);
 }

@@ -14,15 +14,15 @@ fn warm_start_contact(rules: Rules, i: u32) {
         if rules.friction != FRICTION_NONE && !rules.at_patch {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
-        apply_impulse(&pair, points[k].r_a, points[k].r_b, p);
+        apply_impulse(rules.isotropic, &pair, points[k].r_a, points[k].r_b, p);
     }
     if rules.friction != FRICTION_NONE && rules.at_patch {
         let impulse = impulses[end];
         let twist = contact.normal * impulse.normal;
-        pair.a.w -= inv_inertia_times(pair.mass_a, twist);
-        pair.b.w += inv_inertia_times(pair.mass_b, twist);
+        pair.a.w -= spin_of(rules.isotropic, pair.mass_a, twist);
+        pair.b.w += spin_of(rules.isotropic, pair.mass_b, twist);
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        apply_impulse(&pair, points[end].r_a, points[end].r_b, p);
+        apply_impulse(rules.isotropic, &pair, points[end].r_a, points[end].r_b, p);
     }
     store_pair(contact.body_a, contact.body_b, &pair);
 }

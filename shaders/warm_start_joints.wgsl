@@ -7,6 +7,6 @@ fn warm_start_joint(i: u32) {
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
     let anchors = current_anchors(&pair, joint);
-    apply_impulse(&pair, anchors.r_a, anchors.r_b, joint_impulses[i].linear);
+    apply_impulse(false, &pair, anchors.r_a, anchors.r_b, joint_impulses[i].linear);
     store_pair(joint.body_a, joint.body_b, &pair);
 }

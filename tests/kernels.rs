@@ -46,6 +46,7 @@ const MEASURED: Rules = Rules {
     passes: 1,
     measured: true,
     from_start: false,
+    isotropic: false,
 };
 
 const SEEDS: std::ops::Range<u64> = 0..2;

@@ -1,6 +1,7 @@
 //! Plans: what a scene lacks is absent from its plan, and saves what it would have moved.
 
-use drystone::{Body, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
+use drystone::stages::plan::Kernel;
+use drystone::{Backend, Body, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
 use glam::Vec3;
 
 /// The plan of a world's next step and the bytes that its kernels move, and the simulation for what else is of interest.
@@ -48,12 +49,12 @@ fn the_plan_of_a_tower_reads_as_the_step_is_told() {
     let (plan, ..) = planned(scene.world, SolverConfig::default().without_sleep());
     // Three colors between boxes: two would do for a chain, if its contacts did not choose in an order without a pattern. One for
     // the floor. All are small, so that one workgroup sweeps them.
-    let first = "integrate_velocities\nwarm_start(disc friction) over colors 0..4\n";
+    let first = "integrate_velocities\nwarm_start(disc friction, isotropic) over colors 0..4\n";
     let later = "integrate_velocities(warm start)\n";
     let sweeps = "\
-solve_contacts(biased) over colors 0..4
+solve_contacts(biased, isotropic) over colors 0..4
 integrate_positions
-solve_contacts(disc friction) over colors 0..4
+solve_contacts(disc friction, isotropic) over colors 0..4
 ";
     assert_eq!(plan.to_string(), [first, sweeps, &[later, sweeps].concat().repeat(7)].concat());
 }
@@ -70,8 +71,8 @@ fn settings_are_in_the_plan() {
     let (plan, ..) = planned(scene.world, config);
     let expected = "\
 integrate_velocities
-warm_start(disc friction) over colors 0, 1, 2, 3
-solve_contacts(biased, disc friction) over colors 0, 1, 2, 3, 0, 1, 2, 3
+warm_start(disc friction, isotropic) over colors 0, 1, 2, 3
+solve_contacts(biased, disc friction, isotropic) over colors 0, 1, 2, 3, 0, 1, 2, 3
 integrate_positions
 ";
     assert_eq!(plan.to_string(), expected);
@@ -274,4 +275,31 @@ fn bytes_moved_are_those_of_the_rows_that_a_pass_names() {
         let (_, bytes) = passes.find(|(p, _)| p.kernel.to_string() == name).unwrap_or_else(|| panic!("{name}: {plan}"));
         assert_eq!(bytes, expected, "{name}");
     }
+}
+
+/// One number stands for the inverse inertia of a cube, and nine for that of a brick.
+#[test]
+fn bodies_with_equal_moments_of_inertia_need_no_tensor_and_move_the_same() {
+    assert!(says(&plan_of(&cube(), 0.5, 0.0).0, "isotropic"));
+    assert!(!says(&plan_of(&brick(), 0.5, 0.0).0, "isotropic"));
+    let scene = Scene::find("pile", &["n=60".into()]).expect("the scene");
+    let backend = Box::new(Reference::<f32>::new());
+    let mut simulation =
+        Simulation::new(scene.world, SolverConfig::default().without_sleep(), backend).expect("good settings");
+    for _ in 0..80 {
+        simulation.step(1.0 / 60.0).expect("a step");
+    }
+    let (mut problem, mut plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
+    let mut with_tensors = problem.clone();
+    Reference::<f32>::new().run(&mut problem, &plan.passes).expect("a step");
+    let before = plan.passes.clone();
+    for pass in &mut plan.passes {
+        if let Kernel::SolveContacts(rules) | Kernel::WarmStart(rules) = &mut pass.kernel {
+            rules.isotropic = false;
+        }
+    }
+    assert_ne!(before, plan.passes);
+    Reference::<f32>::new().run(&mut with_tensors, &plan.passes).expect("a step");
+    assert!(problem.impulses.iter().filter(|impulse| impulse.normal > 0.0).count() > 100);
+    assert_eq!(problem, with_tensors);
 }

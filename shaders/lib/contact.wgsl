@@ -48,5 +48,5 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     (*impulse).normal = sum;
     (*impulse).peak = larger((*impulse).peak, sum);
     note_correction(rules.measured, change, point.normal_mass);
-    apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
+    apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
 }

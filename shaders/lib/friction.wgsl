@@ -39,7 +39,7 @@ fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, poi
     (*impulse).tangent_2 = sum.y;
     note_correction(rules.measured, change_1, point.tangent_mass);
     note_correction(rules.measured, change_2, point.tangent_mass);
-    apply_impulse(pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
+    apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
 // Spin about the normal, limited by the normal impulses times their distance from the middle.
@@ -51,6 +51,6 @@ fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_
     let sum = clamp_abs((*impulse).normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - (*impulse).normal);
     (*impulse).normal = sum;
-    (*pair).a.w -= inv_inertia_times((*pair).mass_a, change);
-    (*pair).b.w += inv_inertia_times((*pair).mass_b, change);
+    (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, change);
+    (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, change);
 }

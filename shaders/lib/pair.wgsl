@@ -12,12 +12,18 @@ fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
     );
 }
 
+// How an impulse turns a body: its inverse inertia times the moment u.
+fn spin_of(isotropic: bool, m: Mass, u: vec3f) -> vec3f {
+    if isotropic { return u * m.inv_inertia_x.x; }
+    return inv_inertia_times(m, u);
+}
+
 // Applies the impulse p to b at r_b, and -p to a at r_a.
-fn apply_impulse(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f, p: vec3f) {
+fn apply_impulse(isotropic: bool, pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f, p: vec3f) {
     (*pair).a.v -= p * (*pair).mass_a.inv_mass;
-    (*pair).a.w -= inv_inertia_times((*pair).mass_a, cross3(r_a, p));
+    (*pair).a.w -= spin_of(isotropic, (*pair).mass_a, cross3(r_a, p));
     (*pair).b.v += p * (*pair).mass_b.inv_mass;
-    (*pair).b.w += inv_inertia_times((*pair).mass_b, cross3(r_b, p));
+    (*pair).b.w += spin_of(isotropic, (*pair).mass_b, cross3(r_b, p));
 }
 
 // Velocity of b at r_b relative to a at r_a.

@@ -14,6 +14,8 @@ struct Rules {
     measured: bool,
     // Velocities of bodies are changes since the step began.
     from_start: bool,
+    // Every body that can move has the same moment of inertia about all axes.
+    isotropic: bool,
 }
 
 const FRICTION_NONE: u32 = 0u;

@@ -6,7 +6,7 @@
 
 use super::Rules;
 use super::friction::{solve_friction, solve_twist};
-use super::pair::{apply_impulse, note_correction, relative_velocity};
+use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
 use crate::math::{Lane, NormalMovement, cross3, dot3, larger, smaller};
@@ -83,7 +83,7 @@ fn solve_normal<L: Lane>(
     impulse.normal = sum;
     impulse.peak = larger(impulse.peak, sum);
     note_correction(rules, params, pair, change, point.normal_mass);
-    apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
+    apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
 /// Forgets the impulse of one point. Kernel `clear_impulses`.
@@ -108,15 +108,15 @@ pub fn warm_start<L: Lane>(
         if rules.friction != FrictionRule::None && !rules.patch {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
-        apply_impulse(pair, point.r_a, point.r_b, p);
+        apply_impulse(rules, pair, point.r_a, point.r_b, p);
     }
     if rules.friction != FrictionRule::None && rules.patch {
         let impulse = &impulses[points.len()];
         let twist = contact.normal * impulse.normal;
-        pair.a.w -= pair.mass_a.inv_inertia.times(twist);
-        pair.b.w += pair.mass_b.inv_inertia.times(twist);
+        pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, twist);
+        pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, twist);
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        apply_impulse(pair, patch[0].r_a, patch[0].r_b, p);
+        apply_impulse(rules, pair, patch[0].r_a, patch[0].r_b, p);
     }
 }
 
@@ -193,6 +193,6 @@ pub fn restitute_contact<L: Lane>(
         let change = sum - impulse.normal;
         impulse.normal = sum;
         impulse.peak = larger(impulse.peak, sum);
-        apply_impulse(pair, point.r_a, point.r_b, contact.normal * change);
+        apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
     }
 }

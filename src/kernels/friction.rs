@@ -1,7 +1,7 @@
 //! Friction at one point or over one manifold. Doubles of `shaders/lib/friction.wgsl`.
 
 use super::Rules;
-use super::pair::{apply_impulse, note_correction, relative_velocity};
+use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, StepParams};
 use crate::config::FrictionRule;
 use crate::math::{Lane, cross3, dot3, larger, smaller};
@@ -62,7 +62,7 @@ pub fn solve_friction<L: Lane>(
     impulse.tangent_2 = sum[1];
     note_correction(rules, params, pair, change_1, point.tangent_mass);
     note_correction(rules, params, pair, change_2, point.tangent_mass);
-    apply_impulse(pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
+    apply_impulse(rules, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
 /// Spin about the normal, limited by the normal impulses times their distance from the middle.
@@ -85,6 +85,6 @@ pub fn solve_twist<L: Lane>(
     let sum = clamp_abs(impulse.normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - impulse.normal);
     impulse.normal = sum;
-    pair.a.w -= pair.mass_a.inv_inertia.times(change);
-    pair.b.w += pair.mass_b.inv_inertia.times(change);
+    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, change);
+    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, change);
 }

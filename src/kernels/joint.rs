@@ -66,7 +66,7 @@ const STIFFENING: f64 = 1.907_348_632_812_5e-6;
 #[inline(always)]
 pub fn warm_start_joint<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, impulse: Vec3<L>) {
     let [r_a, r_b] = current_anchors(pair, joint);
-    apply_impulse(pair, r_a, r_b, impulse);
+    apply_impulse(Rules::default(), pair, r_a, r_b, impulse);
 }
 
 /// Sweeps one joint. Kernel `solve_joints`.
@@ -101,5 +101,5 @@ pub fn solve_joint<L: Lane>(
         note_correction(rules, params, pair, change.y, reciprocal(y.y));
         note_correction(rules, params, pair, change.z, reciprocal(z.z));
     }
-    apply_impulse(pair, anchors[0], anchors[1], change);
+    apply_impulse(Rules::default(), pair, anchors[0], anchors[1], change);
 }

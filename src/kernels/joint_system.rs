@@ -353,5 +353,5 @@ pub trait JointChanges<S> {
 #[inline(always)]
 pub fn apply_joint_change<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, change: Vec3<L>) {
     let [r_a, r_b] = current_anchors(pair, joint);
-    apply_impulse(pair, r_a, r_b, change);
+    apply_impulse(Rules::default(), pair, r_a, r_b, change);
 }

@@ -47,6 +47,8 @@ pub struct Rules {
     pub measured: bool,
     /// Whether velocities of bodies are changes since the step began.
     pub from_start: bool,
+    /// Whether every body that can move has the same moment of inertia about all axes.
+    pub isotropic: bool,
 }
 
 impl Default for Rules {
@@ -63,6 +65,7 @@ impl Default for Rules {
             passes: 1,
             measured: false,
             from_start: false,
+            isotropic: false,
         }
     }
 }
@@ -70,7 +73,7 @@ impl Default for Rules {
 impl Rules {
     /// The rules of a warm start: where friction acts, and nothing else.
     pub fn of_warm_start(self) -> Self {
-        Self { friction: self.friction, patch: self.patch, ..Self::default() }
+        Self { friction: self.friction, patch: self.patch, isotropic: self.isotropic, ..Self::default() }
     }
 
     /// The rules of joints.

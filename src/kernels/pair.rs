@@ -1,16 +1,22 @@
 //! Two bodies while one thread works on them. Doubles of `shaders/lib/pair.wgsl`.
 
 use super::Rules;
-use super::rows::{Pair, StepParams};
+use super::rows::{Pair, StepParams, Sym3};
 use crate::math::{Lane, Vec3, cross3, larger, turned};
+
+/// How an impulse turns a body: its inverse inertia times the moment u.
+#[inline(always)]
+pub fn spin_of<L: Lane>(rules: Rules, inv_inertia: Sym3<L>, u: Vec3<L>) -> Vec3<L> {
+    if rules.isotropic { u * inv_inertia.x.x } else { inv_inertia.times(u) }
+}
 
 /// Applies the impulse p to b at r_b, and -p to a at r_a.
 #[inline(always)]
-pub fn apply_impulse<L: Lane>(pair: &mut Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>, p: Vec3<L>) {
+pub fn apply_impulse<L: Lane>(rules: Rules, pair: &mut Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>, p: Vec3<L>) {
     pair.a.v -= p * pair.mass_a.inv_mass;
-    pair.a.w -= pair.mass_a.inv_inertia.times(cross3(r_a, p));
+    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, cross3(r_a, p));
     pair.b.v += p * pair.mass_b.inv_mass;
-    pair.b.w += pair.mass_b.inv_inertia.times(cross3(r_b, p));
+    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, cross3(r_b, p));
 }
 
 /// Velocity of b at r_b relative to a at r_a.

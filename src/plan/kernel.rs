@@ -185,6 +185,7 @@ impl fmt::Display for Kernel {
                 (r.passes > 1, "repeated"),
                 (r.measured, "measured"),
                 (r.from_start, "from start"),
+                (r.isotropic, "isotropic"),
             ];
             let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
             write!(f, "({})", on.join(", "))?;

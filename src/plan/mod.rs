@@ -93,6 +93,7 @@ impl StepPlan {
             measured: config.tolerance > 0.0,
             biased: false,
             from_start: false,
+            isotropic: false,
         };
         let bounces = problem.has_restitution();
         let mut plan = Self::default();
@@ -100,13 +101,13 @@ impl StepPlan {
             let own = &problem.blocks[block as usize];
             let [contacts, _, bodies, ..] = own.colors();
             let from_start = own.substep.length < LONGEST_FROM_START && !problem.rows_of(&bodies).is_empty();
-            let rules = Rules { from_start, ..rules };
+            let rules = Rules { from_start, isotropic: problem.is_isotropic(problem.rows_of(&bodies)), ..rules };
             if from_start {
                 plan.over_colors(Kernel::BeginChanges, block, std::slice::from_ref(&bodies));
             }
             plan.substeps(config, problem, block, rules);
             if bounces {
-                let rules = Rules { patch: rules.patch, from_start, ..Rules::default() };
+                let rules = Rules { patch: rules.patch, from_start, isotropic: rules.isotropic, ..Rules::default() };
                 let contacts = color_groups(&problem.colors, contacts, config.fuse_colors_below);
                 plan.over_colors(Kernel::ApplyRestitution(rules), block, &contacts);
             }

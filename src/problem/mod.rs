@@ -164,6 +164,14 @@ impl StepProblem {
         }
     }
 
+    /// Whether each of some bodies has the same inverse inertia about all axes; it is zero where nothing turns a body.
+    pub fn is_isotropic(&self, bodies: &[u32]) -> bool {
+        bodies.iter().map(|&body| &self.masses[body as usize]).all(|mass| {
+            let ([xx, xy, xz], [yy, yz, zz]) = (mass.inv_inertia_x, mass.inv_inertia_yz);
+            [xy, xz, yz] == [0.0; 3] && [yy, zz] == [xx; 2]
+        })
+    }
+
     /// Whether any contact has friction.
     pub fn has_friction(&self) -> bool {
         self.swept_contacts().any(|c| c.friction > 0.0)

@@ -12,7 +12,7 @@ use drystone::stages::plan::{Kernel, Pass};
 pub fn every_rules() -> Vec<Rules> {
     let mut all = Vec::new();
     for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
-        for bits in 0..256 {
+        for bits in 0..512 {
             let has = |bit: u32| bits >> bit & 1 == 1;
             let rules = Rules {
                 biased: has(0),
@@ -25,9 +25,11 @@ pub fn every_rules() -> Vec<Rules> {
                 driven: has(6),
                 passes: 1 + u8::from(has(6)),
                 from_start: has(7),
+                isotropic: has(8),
             };
             // Velocities since the start of the step meet every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
+            // Equal moments of inertia meet every impulse without the rules above.
             // Without friction it does not matter when it acts. Belts drive points only; with them, and with repeated passes,
             // the rest of the rules is not tried again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
@@ -36,6 +38,7 @@ pub fn every_rules() -> Vec<Rules> {
             if (friction != FrictionRule::None || !rules.friction_first)
                 && (drivable || !rules.driven)
                 && (plain || !rules.from_start)
+                && (plain && !rules.from_start || !rules.isotropic)
             {
                 all.push(rules);
             }
@@ -75,8 +78,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         all.push(Kernel::SolveJointSystems(rules.of_joints()));
         all.push(Kernel::ApplyJointChanges(rules.of_joints()));
         all.push(Kernel::SolveContacts(rules));
-        let Rules { patch, from_start, .. } = rules;
-        all.push(Kernel::ApplyRestitution(Rules { patch, from_start, ..Rules::default() }));
+        let Rules { patch, from_start, isotropic, .. } = rules;
+        all.push(Kernel::ApplyRestitution(Rules { patch, from_start, isotropic, ..Rules::default() }));
     }
     let mut known = HashSet::new();
     all.retain(|kernel| known.insert(*kernel));

@@ -144,8 +144,19 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
 
 /// A constant of the struct `Rules` of `lib/rules.wgsl`.
 fn rules_text(rules: Rules) -> String {
-    let Rules { biased, patch, friction_first, accumulated, round, passes, driven, measured, from_start, friction } =
-        rules;
+    let Rules {
+        biased,
+        patch,
+        friction_first,
+        accumulated,
+        round,
+        passes,
+        driven,
+        measured,
+        from_start,
+        isotropic,
+        friction,
+    } = rules;
     let friction = match friction {
         FrictionRule::None => "NONE",
         FrictionRule::Slip => "SLIP",
@@ -153,7 +164,7 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start}, {isotropic})"
     )
 }
 
