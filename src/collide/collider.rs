@@ -46,9 +46,10 @@ impl ColliderInfo {
     }
 }
 
-/// Pose and velocity of a body, as far as the detection needs it: three rows of eight numbers, so that lanes can gather them.
+/// Pose and velocity of a body, as far as the detection needs it: four rows of eight numbers, so that lanes can gather them. The first two
+/// are what the test of a pair reads, one line of the cache.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct BodyState {
     pub rotation: Quat,
     pub center: Vec3,
@@ -61,7 +62,7 @@ pub(super) struct BodyState {
     /// 0 if it is still, 1 if it moves by itself, 2 if it is awake.
     pub activity: f32,
     pub position: Vec3,
-    pub rest: [f32; 5],
+    pub rest: [f32; 13],
 }
 
 /// The row of a [`BodyState`] that begins with rotation and center.
@@ -73,7 +74,7 @@ pub(super) const POSITION: usize = 2;
 
 /// A cuboid in the form that lanes gather: two rows of eight numbers.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct CuboidPlace {
     /// In the body's frame.
     pub rotation: Quat,
@@ -105,7 +106,7 @@ impl BodyState {
         let (v, w) = (body.linear_velocity, body.angular_velocity);
         let is_near = position.abs().cmple(Vec3::splat(FARTHEST)).all();
         // parry squares lengths, and takes rotations for unit quaternions.
-        let in_range = is_near && (rotation.length_squared() - 1.0).abs() < 0.1 && v.is_finite() && w.is_finite();
+        let in_range = is_near && (rotation.length_squared() - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());
         Self {
             rotation,
             center: body.center_of_mass(),
@@ -115,7 +116,7 @@ impl BodyState {
             in_range: f32::from(in_range),
             activity: [0.0, 1.0, 2.0][activity as usize],
             position,
-            rest: [0.0; 5],
+            rest: [0.0; 13],
         }
     }
 }

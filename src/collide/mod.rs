@@ -17,6 +17,7 @@ mod pair;
 mod pairs;
 mod query;
 mod report;
+mod reuse;
 mod solid;
 mod world_contacts;
 

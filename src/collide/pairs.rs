@@ -12,8 +12,8 @@ use super::pair::{Motion, Pair};
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct Placed {
-    rotation: Quat,
-    center: Vec3,
+    pub rotation: Quat,
+    pub center: Vec3,
     rest: f32,
 }
 

@@ -72,7 +72,7 @@ pub(super) unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
 /// If one of `which` is not in `all`.
 #[inline(always)]
 pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; WIDTH]) -> [L; 8] {
-    const { assert!(align_of::<T>() == align_of::<Row8>()) };
+    const { assert!(align_of::<T>() >= align_of::<Row8>()) };
     assert!(row < size_of::<T>() / size_of::<Row8>());
     let (mut places, mut last) = (*which, 0);
     for place in &mut places {
@@ -82,6 +82,18 @@ pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; 
     assert!((last as usize) < all.len());
     // SAFETY: each `T` consists of whole rows of numbers, has one of this number, and is one of `all`, which nothing writes meanwhile.
     unsafe { L::gathered(all.as_ptr().cast::<Row8>().add(row), &places) }
+}
+
+/// Tells the processor that something will be read soon.
+#[inline(always)]
+pub fn prefetch<T>(soon: &T) {
+    // SAFETY: every x86-64 processor has the instruction, which changes nothing.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(std::ptr::from_ref(soon).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = soon;
 }
 
 /// An array of what an expression is for each lane, without a closure: a closure would be compiled for the plain
