@@ -5,7 +5,8 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use crate::world::Collider;
+use super::report::Activity;
+use crate::world::{Body, BodyKind, Collider};
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -45,22 +46,78 @@ impl ColliderInfo {
     }
 }
 
-/// Pose and velocity of a body, as far as the detection needs it.
-#[derive(Clone, Copy)]
+/// Pose and velocity of a body, as far as the detection needs it: four rows of eight numbers, so that lanes can gather them. The first two
+/// are what the test of a pair reads, one line of the cache.
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
 pub(super) struct BodyState {
-    pub position: Vec3,
     pub rotation: Quat,
     pub center: Vec3,
+    /// 1 for a kinematic body, otherwise 0.
+    pub kinematic: f32,
     pub v: Vec3,
     pub w: Vec3,
-    pub kinematic: bool,
+    /// 1 if contacts can be computed, otherwise 0.
+    pub in_range: f32,
+    /// 0 if it is still, 1 if it moves by itself, 2 if it is awake.
+    pub activity: f32,
+    pub position: Vec3,
+    pub rest: [f32; 13],
+}
+
+/// The row of a [`BodyState`] that begins with rotation and center.
+pub(super) const POSE: usize = 0;
+/// The row with the velocities.
+pub(super) const VELOCITY: usize = 1;
+/// The row that begins with the position.
+pub(super) const POSITION: usize = 2;
+
+/// A cuboid in the form that lanes gather: two rows of eight numbers.
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+pub(super) struct CuboidPlace {
+    /// In the body's frame.
+    pub rotation: Quat,
+    pub position: Vec3,
+    pub rest_of_place: f32,
+    /// Half extents (m).
+    pub half: Vec3,
+    pub rest: [f32; 5],
+}
+
+impl CuboidPlace {
+    pub fn new(half: Vec3, position: Vec3, rotation: Quat) -> Self {
+        Self { rotation, position, half, ..Self::default() }
+    }
+
+    /// The place of a collider; zero if it is no cuboid.
+    pub fn of(c: &ColliderInfo) -> Self {
+        c.cuboid.map(|half| Self::new(half, c.local.translation, c.local.rotation)).unwrap_or_default()
+    }
+
+    pub fn is_cuboid(&self) -> bool {
+        self.half.x > 0.0
+    }
 }
 
 impl BodyState {
-    /// Whether contacts can be computed: parry squares lengths, and takes rotations for unit quaternions.
-    pub fn is_in_range(&self) -> bool {
-        let near = self.position.abs().cmple(Vec3::splat(FARTHEST)).all();
-        near && (self.rotation.length_squared() - 1.0).abs() < 0.1 && self.v.is_finite() && self.w.is_finite()
+    pub fn of(body: &Body, activity: Activity) -> Self {
+        let (position, rotation) = (body.position, body.rotation);
+        let (v, w) = (body.linear_velocity, body.angular_velocity);
+        let is_near = position.abs().cmple(Vec3::splat(FARTHEST)).all();
+        // parry squares lengths, and takes rotations for unit quaternions.
+        let in_range = is_near && (rotation.length_squared() - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());
+        Self {
+            rotation,
+            center: body.center_of_mass(),
+            kinematic: f32::from(body.kind == BodyKind::Kinematic),
+            v,
+            w,
+            in_range: f32::from(in_range),
+            activity: [0.0, 1.0, 2.0][activity as usize],
+            position,
+            rest: [0.0; 13],
+        }
     }
 }
 

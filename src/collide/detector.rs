@@ -7,7 +7,7 @@ use parry3d::math::Pose;
 use rayon::prelude::*;
 
 use super::collider::{BodyState, ColliderInfo, Margins};
-use super::pair::Pair;
+use super::pair::{Motion, Pair};
 use super::report::{Activity, Change, DetectStats};
 use super::world_contacts::{DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
@@ -100,7 +100,7 @@ impl Detector {
     /// The pairs whose boxes overlap, with the manifolds they touch with, world by world. The order is the same for any
     /// thread count, and within a world whatever stands beside it.
     pub fn pairs(&self) -> impl Iterator<Item = &Pair> + Clone {
-        self.worlds.iter().flat_map(|world| &world.pairs)
+        self.worlds.iter().flat_map(|world| world.pairs.iter())
     }
 
     /// Tells what changed since the last call. The listener gives slots to manifolds that have none, and removes manifolds that ended.
@@ -118,19 +118,18 @@ impl Detector {
         &mut self.worlds[world as usize].pairs[pair as usize]
     }
 
+    /// How the bodies of a pair moved since its manifolds were computed.
+    pub fn motion(&self, world: u32, pair: u32) -> &Motion {
+        self.worlds[world as usize].pairs.motion(pair as usize)
+    }
+
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
     /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
     /// the step; without `activity` all take part.
     pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
-        let moving = |b: &Body| BodyState {
-            position: b.position,
-            rotation: b.rotation,
-            center: b.center_of_mass(),
-            v: b.linear_velocity,
-            w: b.angular_velocity,
-            kinematic: b.kind == BodyKind::Kinematic,
-        };
-        world.bodies.par_iter().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
+        let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
+        let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i));
+        world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
         let margins = Margins {
             speculative: config.speculative_margin,
             recycle: config.recycle_distance,

@@ -5,14 +5,19 @@
 //! beside each other has its own tree and pairs, so that the pairs of a world do not depend on the other worlds.
 
 mod collider;
+mod cuboids;
 mod detector;
 #[cfg(test)]
 mod distances;
 mod facet;
+mod lane_pose;
 mod manifold;
+mod narrow;
 mod pair;
+mod pairs;
 mod query;
 mod report;
+mod reuse;
 mod solid;
 mod world_contacts;
 

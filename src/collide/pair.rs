@@ -1,15 +1,16 @@
-//! The contact of one pair of colliders: reused while they hardly moved, else asked of parry.
+//! The contact of one pair of colliders, and how a new one takes the place of the last.
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::query::TrackedContact;
 use parry3d::shape::TypedShape;
 
-use super::collider::{BodyState, ColliderInfo, Margins};
+use super::collider::{BodyState, ColliderInfo};
 use super::facet::composite_contacts;
 use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
-use super::query::{convex_contact, flip};
+use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
+use crate::backend::cpu::simd::Row8;
 use crate::math::{self, NormalMovement};
 use crate::random::mixed;
 
@@ -26,14 +27,6 @@ pub struct Pair {
     pub(super) collider_b: u32,
     /// Half of the smallest side of the thinner one (m).
     pub size: f32,
-    /// Radius around the origin of body b that holds its collider (m).
-    reach_b: f32,
-    /// Distance up to which the last computation predicted (m).
-    predicted: f32,
-    /// Where the bodies were when the manifolds were computed; none if they never were.
-    computed_at: Option<[Placed; 2]>,
-    /// How they moved since.
-    motion: Motion,
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
 }
@@ -48,6 +41,16 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// From two rows: the turn of a and the drift, the turn of b.
+    pub(super) fn of(first: &Row8, second: &Row8) -> Self {
+        let ([x, y, z, w, drift @ .., _], [b_x, b_y, b_z, b_w, ..]) = (first.0, second.0);
+        Self {
+            drift: Vec3::from_array(drift),
+            turn_a: Quat::from_xyzw(x, y, z, w),
+            turn_b: Quat::from_xyzw(b_x, b_y, b_z, b_w),
+        }
+    }
+
     /// The motion along the normal of a contact.
     pub fn along(&self, normal: [f32; 3], radii: [f32; 2]) -> NormalMovement<f32> {
         let quat = |turn: Quat| math::Quat::load(turn.to_array());
@@ -57,49 +60,24 @@ impl Motion {
     }
 }
 
-/// Where a body is: its centre of mass and rotation.
-#[derive(Clone, Copy, Debug)]
-struct Placed {
-    center: Vec3,
-    rotation: Quat,
-}
-
-impl Placed {
-    fn of(body: &BodyState) -> Self {
-        Self { center: body.center, rotation: body.rotation }
-    }
-
-    /// Rotation since `then`, by the shorter way.
-    fn turn_since(&self, then: &Self) -> Quat {
-        let turn = self.rotation * then.rotation.conjugate();
-        if turn.w < 0.0 { -turn } else { turn }
-    }
-}
-
 /// A collider, and where its body is.
-type Side<'a> = (&'a ColliderInfo, &'a BodyState);
+pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);
 
 /// Memory that one thread reuses from pair to pair.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(super) struct PairScratch {
     buffers: ClipBuffers,
     one: ParryManifold,
     many: Vec<ParryManifold>,
+    renewal: Renewal,
+}
+
+/// The same for manifolds that take the place of others.
+#[derive(Default)]
+struct Renewal {
     candidates: Vec<ManifoldPoint>,
     old: Vec<Manifold>,
 }
-
-/// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
-/// computed, so this is how far bodies that turn together may see gravity from the wrong side. At 0.01 rad arches that open a little
-/// are computed anew while they do, and one of 17 stones, 0.12 of its radius thick, falls with 8 substeps.
-const RECYCLE_TURN: f32 = 2.25e-4;
-
-/// The same where one of them is kinematic, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
-/// slipped 1.6 degrees late, and a ball lost a quarter of its way.
-const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
-
-/// Largest turn of a body in a step with which planes are seen as far ahead as the body gets (rad). The rod of 1000 rad/s (H7) turns by 17.
-const MOST_FORESEEN_TURN: f32 = 0.5;
 
 /// How a pair was brought up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,10 +98,6 @@ impl Pair {
             collider_a,
             collider_b,
             size: a.size.min(b.size),
-            reach_b: b.reach,
-            predicted: 0.0,
-            computed_at: None,
-            motion: Motion::default(),
             takes_part: true,
         }
     }
@@ -141,67 +115,28 @@ impl Pair {
         self.manifolds.iter().any(|manifold| !manifold.has_ended())
     }
 
-    /// How the bodies moved since the manifolds were computed.
-    pub fn motion(&self) -> &Motion {
-        &self.motion
+    /// Ends all manifolds. A body that left the range touches nothing, so that the trouble does not spread.
+    pub(super) fn end(&mut self) {
+        self.manifolds.retain(|manifold| manifold.slot != NO_SLOT);
+        self.manifolds.iter_mut().for_each(Manifold::end);
     }
 
-    /// Notes how the bodies moved to the poses `a` and `b`; computes the manifolds anew if that was too far.
-    pub(super) fn update(
-        &mut self,
-        colliders: &[ColliderInfo],
-        a: &BodyState,
-        b: &BodyState,
-        margins: Margins,
-        scratch: &mut Scratch,
-    ) -> Update {
-        // A body that left the range touches nothing, so that the trouble does not spread.
-        if !(a.is_in_range() && b.is_in_range()) {
-            self.manifolds.retain(|manifold| manifold.slot != NO_SLOT);
-            self.manifolds.iter_mut().for_each(Manifold::end);
-            self.computed_at = None;
-            return Update::Reshaped;
+    /// Ends all manifolds of two colliders that do not touch.
+    pub(super) fn part(&mut self) -> Update {
+        if self.manifolds.is_empty() {
+            return Update::Computed;
         }
-        let size = self.size;
-        let approach = (b.v - a.v).length() + self.reach_b * (b.w - a.w).length();
-        let base = margins.speculative * size + margins.fall;
-        // A contact with a plane is true however far away it is seen; with others it would stop what passes by. Arms stay the same within a step.
-        let is_far_seen =
-            colliders[self.collider_a as usize].unbounded && b.w.length() * margins.dt < MOST_FORESEEN_TURN;
-        let farthest = if is_far_seen { f32::MAX } else { 2.0 * size };
-        let prediction = base + (approach * margins.dt).min(farthest);
-
-        if let Some([a_then, b_then]) = &self.computed_at {
-            let (a_now, b_now) = (Placed::of(a), Placed::of(b));
-            let (turn_a, turn_b) = (a_now.turn_since(a_then), b_now.turn_since(b_then));
-            // How far any point of b that can touch moved as seen from a. 2 |vector part| is the angle, if small.
-            let carried = b_then.center - a_then.center;
-            let shift = (b_now.center - a_now.center) - (turn_a * carried);
-            let turn = turn_a.conjugate() * turn_b;
-            let moved = shift.length() + 2.0 * turn.xyz().length() * self.reach_b;
-            let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
-            let most = if a.kinematic || b.kinematic { RECYCLE_TURN_KINEMATIC } else { RECYCLE_TURN };
-            if moved < margins.recycle * size && turned < most && prediction <= self.predicted + 0.5 * base {
-                self.motion = Motion { drift: (b_now.center - a_now.center) - carried, turn_a, turn_b };
-                return Update::Reused;
-            }
-        }
-        self.computed_at = Some([Placed::of(a), Placed::of(b)]);
-        self.motion = Motion::default();
-        self.predicted = prediction;
-        let before = self.manifolds.len();
-        let sides = [(&colliders[self.collider_a as usize], a), (&colliders[self.collider_b as usize], b)];
-        self.compute(sides, ContactQuery { prediction, size }, scratch);
-        let same = |(now, then): (&Manifold, &Manifold)| now.points().len() == then.points().len();
-        let all_same = self.manifolds.len() == before && self.manifolds.iter().zip(&scratch.old).all(same);
-        if all_same { Update::Computed } else { Update::Reshaped }
+        self.end();
+        Update::Reshaped
     }
 
-    fn compute(&mut self, sides: [Side; 2], search: ContactQuery, scratch: &mut Scratch) {
+    /// Asks parry for the manifolds.
+    pub(super) fn compute(&mut self, sides: [Side; 2], prediction: f32, scratch: &mut PairScratch) -> Update {
         let [(ca, _), (cb, _)] = sides;
-        let [pose_a, pose_b] = sides.map(|(c, body)| Pose::from_parts(body.position, body.rotation) * c.local);
+        let search = ContactQuery { prediction, size: self.size };
+        let [pose_a, pose_b] = sides.map(pose);
         let pos12 = pose_a.inv_mul(&pose_b);
-        let Scratch { buffers, one, many, candidates, old } = scratch;
+        let PairScratch { buffers, one, many, renewal } = scratch;
         many.clear();
         let found: &[ParryManifold] = if ca.is_composite() {
             composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, buffers, many);
@@ -214,14 +149,40 @@ impl Pair {
             convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers, one);
             std::slice::from_ref(one)
         };
+        self.renew(found, sides, prediction, renewal)
+    }
 
+    /// Takes over the manifold that `write` writes.
+    pub(super) fn take_over(
+        &mut self,
+        sides: [Side; 2],
+        prediction: f32,
+        write: &dyn Fn(&mut ParryManifold),
+        PairScratch { one, renewal, .. }: &mut PairScratch,
+    ) -> Update {
+        empty(one);
+        write(one);
+        self.renew(std::slice::from_ref(one), sides, prediction, renewal)
+    }
+
+    /// Puts the manifolds `found` in the place of those that are.
+    fn renew(
+        &mut self,
+        found: &[ParryManifold],
+        sides: [Side; 2],
+        prediction: f32,
+        Renewal { candidates, old }: &mut Renewal,
+    ) -> Update {
+        let [(ca, _), (cb, _)] = sides;
+        let [pose_a, pose_b] = sides.map(pose);
+        let before = self.manifolds.len();
         old.clear();
         old.append(&mut self.manifolds);
         // Most pairs have one manifold; by itself a vector would begin with room for four, a kilobyte too much.
         self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
-            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, sides, search.prediction)));
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, sides, prediction)));
             if candidates.is_empty() {
                 continue;
             }
@@ -232,7 +193,7 @@ impl Pair {
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
             manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
             if let Some(o) = old.iter_mut().find(|o| o.subshapes == manifold.subshapes && !o.has_ended()) {
-                manifold.succeed(o, 0.1 * search.size);
+                manifold.succeed(o, 0.1 * self.size);
                 o.slot = NO_SLOT;
             }
             self.manifolds.push(manifold);
@@ -243,7 +204,15 @@ impl Pair {
             o.end();
             o
         }));
+        let same = |(now, then): (&Manifold, &Manifold)| now.points().len() == then.points().len();
+        let all_same = self.manifolds.len() == before && self.manifolds.iter().zip(&*old).all(same);
+        if all_same { Update::Computed } else { Update::Reshaped }
     }
+}
+
+/// Where a collider is.
+fn pose((c, body): Side) -> Pose {
+    Pose::from_parts(body.position, body.rotation) * c.local
 }
 
 /// A point of parry's as one of ours; none if it is not finite or too far away.
@@ -253,6 +222,9 @@ fn candidate(
     [(ca, a), (cb, b)]: [Side; 2],
     prediction: f32,
 ) -> Option<ManifoldPoint> {
+    if p.dist > prediction {
+        return None;
+    }
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
     let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
@@ -260,7 +232,7 @@ fn candidate(
     let on_a = a.rotation * anchor_a - (a.center - a.position);
     let on_b = b.rotation * anchor_b - (b.center - b.position);
     let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a);
-    let usable = p.dist <= prediction && p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
+    let usable = p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
     usable.then(|| ManifoldPoint {
         anchor_a,
         anchor_b,
@@ -274,6 +246,9 @@ fn candidate(
 
 /// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) (m).
 fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
+    if c.cuboid.is_some() {
+        return 0.0;
+    }
     match c.shape.as_typed_shape() {
         TypedShape::Ball(ball) => ball.radius,
         TypedShape::Capsule(capsule) => capsule.radius,

@@ -38,7 +38,7 @@ pub(super) fn convex_contact(
 
 /// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
 /// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
-fn empty(manifold: &mut ParryManifold) {
+pub(super) fn empty(manifold: &mut ParryManifold) {
     let mut points = std::mem::take(&mut manifold.points);
     points.clear();
     *manifold = ParryManifold { points, ..ParryManifold::new() };

@@ -8,9 +8,10 @@ use parry3d::math::Pose;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
-use super::collider::{BodyState, ColliderInfo, FARTHEST, Margins};
+use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
 use super::manifold::NO_SLOT;
-use super::pair::{Pair, Scratch, Update};
+use super::narrow::{Narrow, Scratch, Updated};
+use super::pairs::Pairs;
 use super::report::{Activity, Change, DetectStats};
 use crate::world::BodyKind;
 
@@ -28,6 +29,8 @@ pub(super) struct DetectionInput<'a> {
 #[derive(Clone, Default)]
 pub(super) struct WorldContacts {
     colliders: Vec<ColliderInfo>,
+    /// The same, of those that are cuboids.
+    cuboids: Vec<CuboidPlace>,
     unbounded: Vec<u32>,
     tree: Bvh,
     workspace: BvhWorkspace,
@@ -38,7 +41,7 @@ pub(super) struct WorldContacts {
     /// Colliders whose fattened boxes are new.
     moved: Vec<u32>,
     /// The pairs whose boxes overlap.
-    pub pairs: Vec<Pair>,
+    pub pairs: Pairs,
     slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
     found: Vec<(u32, u32)>,
     /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`WorldContacts::take_changes`] last told of them.
@@ -61,7 +64,8 @@ const FAT: f32 = 0.1;
 impl WorldContacts {
     pub fn new(colliders: Vec<ColliderInfo>) -> Self {
         let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
-        Self { colliders, unbounded, ..Self::default() }
+        let cuboids = colliders.iter().map(CuboidPlace::of).collect();
+        Self { colliders, cuboids, unbounded, ..Self::default() }
     }
 
     /// The colliders, in the order of the bodies.
@@ -225,36 +229,22 @@ impl WorldContacts {
                 let (first, second) = (i.min(j), i.max(j));
                 let swap = self.colliders[second as usize].reach > self.colliders[first as usize].reach;
                 let (a, b) = if swap { (second, first) } else { (first, second) };
-                self.pairs.push(Pair::new(a, b, &self.colliders));
+                self.pairs.push(a, b, &self.colliders);
             }
         }
     }
 
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
-        let (colliders, moving, margins) = (&self.colliders, input.moving, input.margins);
-        let update = |scratch: &mut Scratch, (i, pair): (usize, &mut Pair)| {
-            let (a, b) = (&moving[pair.body_a as usize], &moving[pair.body_b as usize]);
-            let of = |body: u32| input.activity.get(body as usize).copied().unwrap_or(Activity::Awake);
-            let both = [of(pair.body_a), of(pair.body_b)];
-            let mut update = Update::Reused;
-            if both != [Activity::Still; 2] {
-                update = pair.update(colliders, a, b, margins, scratch);
-            }
-            let computed = update != Update::Reused;
-            let takes_part = both.contains(&Activity::Awake);
-            let changes = pair.takes_part != takes_part;
-            pair.takes_part = takes_part;
-            let changed = PairChange { pair: i as u32, computed };
-            let reshaped = update == Update::Reshaped || changes && pair.is_touching();
-            (computed || changes).then_some((changed, reshaped))
-        };
-        let pairs = self.pairs.par_iter_mut().enumerate().with_min_len(64);
-        let updates: Vec<_> = pairs.map_init(Scratch::default, update).flatten_iter().collect();
+        let narrow =
+            Narrow { colliders: &self.colliders, cuboids: &self.cuboids, moving: input.moving, margins: input.margins };
+        let chunks = self.pairs.par_chunks_mut();
+        let updates = chunks.map_init(Scratch::default, |scratch, chunk| narrow.update(chunk, scratch));
+        let updates: Vec<Updated> = updates.flatten_iter().collect();
         let mut stats = DetectStats { pairs: self.pairs.len(), ..DetectStats::default() };
-        for (changed, reshaped) in updates {
-            stats.computed += usize::from(changed.computed);
+        for Updated { pair, computed, reshaped } in updates {
+            stats.computed += usize::from(computed);
             stats.reshaped |= reshaped;
-            self.changed.push(changed);
+            self.changed.push(PairChange { pair, computed });
         }
         stats
     }

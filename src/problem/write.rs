@@ -68,7 +68,7 @@ impl Writer<'_> {
                 // Far away in memory: these reads come first, so that none waits for another.
                 let mut motions = [Motion::default(); SLOTS_A_TASK];
                 for (motion, slot) in motions.iter_mut().zip(slots).filter(|(_, slot)| slot.takes_part) {
-                    *motion = *self.detector.pair(slot.world, slot.pair).motion();
+                    *motion = *self.detector.motion(slot.world, slot.pair);
                 }
                 let points = points.chunks_mut(stride).zip(impulses.chunks_mut(stride));
                 let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS).zip(sags));

@@ -100,6 +100,29 @@ impl Lanes for Avx2 {
         }
         rows
     }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(both!(_mm256_sqrt_ps; self.0))
+    }
+    #[inline(always)]
+    fn divided_by(self, divisor: Self) -> Self {
+        Self(both!(_mm256_div_ps; self.0, divisor.0))
+    }
+    #[inline(always)]
+    fn with_sign(self, sign: Self) -> Self {
+        let bit = [unsafe { _mm256_set1_ps(-0.0) }; 2];
+        let (magnitude, sign) = (both!(_mm256_andnot_ps; bit, self.0), both!(_mm256_and_ps; bit, sign.0));
+        Self(both!(_mm256_or_ps; magnitude, sign))
+    }
+    #[inline(always)]
+    fn floats_below(self, steps: i32) -> Self {
+        Self([floats_below(self.0[0], steps), floats_below(self.0[1], steps)])
+    }
+}
+
+#[inline(always)]
+fn floats_below(x: __m256, steps: i32) -> __m256 {
+    unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(x), _mm256_set1_epi32(steps))) }
 }
 
 /// Rows become columns.

@@ -91,6 +91,27 @@ impl Lanes for Avx512 {
         }
         rows
     }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
+    fn divided_by(self, divisor: Self) -> Self {
+        Self(unsafe { _mm512_div_ps(self.0, divisor.0) })
+    }
+    #[inline(always)]
+    fn with_sign(self, sign: Self) -> Self {
+        unsafe {
+            let (magnitude, sign) = (_mm512_castps_si512(self.0), _mm512_castps_si512(sign.0));
+            // Of the bits of the first number those that the mask does not have, of the second those that it has.
+            let both = _mm512_ternarylogic_epi32::<0xd8>(magnitude, sign, _mm512_set1_epi32(i32::MIN));
+            Self(_mm512_castsi512_ps(both))
+        }
+    }
+    #[inline(always)]
+    fn floats_below(self, steps: i32) -> Self {
+        unsafe { Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_castps_si512(self.0), _mm512_set1_epi32(steps)))) }
+    }
 }
 
 /// Two rows in one register.

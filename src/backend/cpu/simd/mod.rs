@@ -55,6 +55,14 @@ pub trait Lanes: Lane {
     unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8];
     /// To sixteen rows.
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH];
+    /// The square root, rounded as IEEE 754 asks. No kernel may use it.
+    fn sqrt(self) -> Self;
+    /// The quotient, rounded as IEEE 754 asks. No kernel may use it.
+    fn divided_by(self, divisor: Self) -> Self;
+    /// The magnitude of `self` with the sign bit of `sign`.
+    fn with_sign(self, sign: Self) -> Self;
+    /// The number whose bits are fewer by `steps`: for positive normal numbers the one that lies so many floats below.
+    fn floats_below(self, steps: i32) -> Self;
 }
 
 /// The row at a place.
@@ -65,6 +73,36 @@ pub trait Lanes: Lane {
 pub(super) unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
     // SAFETY: the caller's promise. Indices of the processor count in eights.
     unsafe { rows.cast::<u64>().add(place as usize).cast() }
+}
+
+/// The row number `row` of each of sixteen of `all`, number by number.
+///
+/// # Panics
+/// If one of `which` is not in `all`.
+#[inline(always)]
+pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; WIDTH]) -> [L; 8] {
+    const { assert!(align_of::<T>() >= align_of::<Row8>()) };
+    assert!(row < size_of::<T>() / size_of::<Row8>());
+    let (mut places, mut last) = (*which, 0);
+    for place in &mut places {
+        last = last.max(*place);
+        *place *= (size_of::<T>() / 8) as u32;
+    }
+    assert!((last as usize) < all.len());
+    // SAFETY: each `T` consists of whole rows of numbers, has one of this number, and is one of `all`, which nothing writes meanwhile.
+    unsafe { L::gathered(all.as_ptr().cast::<Row8>().add(row), &places) }
+}
+
+/// Tells the processor that something will be read soon.
+#[inline(always)]
+pub fn prefetch<T>(soon: &T) {
+    // SAFETY: every x86-64 processor has the instruction, which changes nothing.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(std::ptr::from_ref(soon).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = soon;
 }
 
 /// An array of what an expression is for each lane, without a closure: a closure would be compiled for the plain

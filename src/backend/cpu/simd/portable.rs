@@ -44,4 +44,20 @@ impl Lanes for Portable {
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH] {
         std::array::from_fn(|row| Row8(std::array::from_fn(|column| columns[column].0.0[row])))
     }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(Wide(lanes!(i => self.0.0[i].sqrt())))
+    }
+    #[inline(always)]
+    fn divided_by(self, divisor: Self) -> Self {
+        Self(Wide(lanes!(i => self.0.0[i] / divisor.0.0[i])))
+    }
+    #[inline(always)]
+    fn with_sign(self, sign: Self) -> Self {
+        Self(Wide(lanes!(i => self.0.0[i].copysign(sign.0.0[i]))))
+    }
+    #[inline(always)]
+    fn floats_below(self, steps: i32) -> Self {
+        Self(Wide(lanes!(i => f32::from_bits(self.0.0[i].to_bits().wrapping_sub(steps as u32)))))
+    }
 }

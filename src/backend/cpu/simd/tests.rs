@@ -62,8 +62,10 @@ impl Work for Sixteen {
         let numbers = done(L::load(&self.a), L::load(&self.b));
         // SAFETY: the places are those of rows.
         let columns = unsafe { L::gathered(self.rows.as_ptr(), &self.places) };
+        let (a, b) = (L::load(&self.a), L::load(&self.b));
+        let exact = [a.sqrt(), a.divided_by(b), a.with_sign(b), a.floats_below(4)];
         let mut results = self.results.lock().expect("one thread");
-        for number in numbers.into_iter().chain(columns) {
+        for number in numbers.into_iter().chain(exact).chain(columns) {
             results.0.push(number.store());
         }
         results.1.extend(L::scattered(columns));
@@ -91,7 +93,9 @@ fn every_set_compares_and_chooses_as_a_number_does() {
             let results = work.results.into_inner().expect("one thread").0;
             for lane in 0..WIDTH {
                 let (x, y) = (NUMBERS[lane], b[lane]);
-                for (k, expected) in done(x, y).into_iter().enumerate() {
+                let below = f32::from_bits(x.to_bits().wrapping_sub(4));
+                let exact = [x.sqrt(), x / y, x.copysign(y), below];
+                for (k, expected) in done(x, y).into_iter().chain(exact).enumerate() {
                     let found = results[k].0[lane];
                     assert!(same(found, expected), "{}: {x:e} and {y:e}, {k}: {found:e}, not {expected:e}", set.name());
                 }
@@ -108,7 +112,7 @@ fn every_set_brings_rows_to_lanes_and_back() {
         let (columns, back) = work.results.into_inner().expect("one thread");
         for (lane, (place, back)) in work.places.iter().zip(&back).enumerate() {
             let row = work.rows[*place as usize / 4];
-            let found: Vec<f32> = columns[11..].iter().map(|column| column.0[lane]).collect();
+            let found: Vec<f32> = columns[15..].iter().map(|column| column.0[lane]).collect();
             assert_eq!((&found[..], *back), (&row.0[..], row), "{}, lane {lane}", set.name());
         }
     }

@@ -1,0 +1,147 @@
+//! Contacts of cuboids against parry's, bit by bit.
+
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::query::TrackedContact;
+use parry3d::query::details::contact_manifold_cuboid_cuboid;
+use parry3d::shape::Cuboid;
+
+use super::*;
+use crate::random::mixed;
+
+struct Random(u64);
+
+impl Random {
+    /// From -1 to 1.
+    fn next(&mut self) -> f32 {
+        self.0 += 1;
+        (mixed(self.0) >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+
+    fn rotation(&mut self) -> Quat {
+        Quat::from_xyzw(self.next(), self.next(), self.next(), self.next()).normalize()
+    }
+
+    /// One of a few angles, and a tiny one.
+    fn nearly_right(&mut self) -> Quat {
+        let quarter = |x: f32| (3.0 * x) as i32 as f32 * std::f32::consts::FRAC_PI_2;
+        let right = Vec3::new(self.next(), self.next(), self.next()).to_array().map(quarter);
+        let tiny = self.vector() * 10.0_f32.powf(-4.5 + 3.5 * self.next()) * if self.next() > -0.8 { 1.0 } else { 0.0 };
+        let turned = Quat::from_euler(glam::EulerRot::XYZ, right[0], right[1], right[2]);
+        (Quat::from_scaled_axis(tiny) * turned).normalize()
+    }
+
+    fn body(&mut self, position: Vec3, rotation: Quat) -> BodyState {
+        BodyState { position, rotation, ..BodyState::default() }
+    }
+}
+
+/// Two cuboids about as far apart as they touch. Some have the same size, or sizes and distances that are round numbers, so that directions
+/// are as good as others and corners lie on sides.
+fn two(random: &mut Random, nearly_parallel: bool) -> ([BodyState; 2], [CuboidPlace; 2]) {
+    let size = |random: &mut Random| {
+        let any = Vec3::splat(1.05) + random.vector();
+        if random.next() > 0.0 { any } else { (any * 4.0).ceil() * 0.25 }
+    };
+    let half = if random.next() > 0.0 { [size(random); 2] } else { [size(random), size(random)] };
+    let base = if random.next() > 0.5 { Quat::IDENTITY } else { random.rotation() };
+    let (rotation, mut between) = if nearly_parallel {
+        let axis = Vec3::AXES[(3.0 * (0.5 + 0.499 * random.next())) as usize];
+        let across = random.vector() * (half[0] + half[1]) * (Vec3::ONE - axis);
+        let gap = 0.02 * random.next() * if random.next() > -0.5 { 1.0 } else { 0.0 };
+        let signed = axis * random.next().signum();
+        (random.nearly_right(), across + signed * ((half[0] + half[1]).dot(axis) + gap))
+    } else {
+        (random.rotation(), random.vector() * (half[0].length() + half[1].length()))
+    };
+    if random.next() > 0.7 {
+        between = (between * 8.0).round() * 0.125;
+    }
+    let at = 5.0 * random.vector();
+    let bodies = [random.body(at, base), random.body(at + base * between, (base * rotation).normalize())];
+    let local =
+        if random.next() > 0.8 { (0.1 * random.vector(), random.rotation()) } else { (Vec3::ZERO, Quat::IDENTITY) };
+    let places = [CuboidPlace::new(half[0], local.0, local.1), CuboidPlace::new(half[1], Vec3::ZERO, Quat::IDENTITY)];
+    (bodies, places)
+}
+
+/// Compares `count` pairs with parry, bit by bit; returns how many touch.
+fn compare(set: InstructionSet, count: u32, nearly_parallel: bool) -> usize {
+    let mut random = Random(if nearly_parallel { 1 << 40 } else { 1 << 41 });
+    let (mut scratch, mut touching, mut points) = (CuboidScratch::default(), 0, 0);
+    for batch in 0..count.div_ceil(1000) {
+        let (mut bodies, mut cuboids, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
+        for number in 0..1000 {
+            let (two, places) = two(&mut random, nearly_parallel);
+            bodies.extend(two);
+            cuboids.extend(places);
+            let ids = [2 * number, 2 * number + 1];
+            let prediction = 0.05 * (1.0 + random.next());
+            pairs.push(CuboidPair { bodies: ids, cuboids: ids, prediction, number });
+        }
+        let mut found: Vec<Option<ParryManifold>> = vec![None; 1000];
+        cuboid_contacts(set, &bodies, &cuboids, &pairs, &mut scratch, |number, write| {
+            let mut one = ParryManifold::new();
+            write(&mut one);
+            found[number as usize] = Some(one);
+        });
+        for pair in &pairs {
+            let [a, b] = pair.bodies.map(|i| i as usize);
+            let pose = |i: usize| {
+                let body = Pose::from_parts(bodies[i].position, bodies[i].rotation);
+                body * Pose::from_parts(cuboids[i].position, cuboids[i].rotation)
+            };
+            let pos12 = pose(a).inv_mul(&pose(b));
+            let [box_a, box_b] = [a, b].map(|i| Cuboid::new(cuboids[i].half));
+            let mut expected = ParryManifold::new();
+            contact_manifold_cuboid_cuboid(&pos12, &box_a, &box_b, pair.prediction, &mut expected);
+            let none = ParryManifold::new();
+            let found = found[pair.number as usize].as_ref().unwrap_or(&none);
+            let bits = |m: &ParryManifold| -> Vec<u32> {
+                let vector = |v: Vec3| v.to_array().map(f32::to_bits);
+                let point = |p: &TrackedContact<()>| {
+                    let [a, b] = [vector(p.local_p1), vector(p.local_p2)];
+                    [&a[..], &b, &[p.dist.to_bits(), p.fid1.0, p.fid2.0]].concat()
+                };
+                let normals = [vector(m.local_n1), vector(m.local_n2)].concat();
+                if m.points.is_empty() {
+                    Vec::new()
+                } else {
+                    [normals, m.points.iter().flat_map(point).collect()].concat()
+                }
+            };
+            let what = format!("batch {batch}, pair {}: {pos12:?} {box_a:?} {box_b:?}", pair.number);
+            assert_eq!(bits(found), bits(&expected), "{what}\n{:?}\n{:?}", found.points, expected.points);
+            touching += usize::from(!found.points.is_empty());
+            points += found.points.len();
+        }
+    }
+    println!("{touching} of {count} touch, {points} points");
+    touching
+}
+
+#[test]
+fn cuboids_touch_as_parry_says_bit_by_bit() {
+    for set in InstructionSet::each() {
+        assert!(compare(set, 50_000, false) > 5_000);
+    }
+}
+
+#[test]
+fn nearly_parallel_cuboids_touch_as_parry_says_bit_by_bit() {
+    for set in InstructionSet::each() {
+        assert!(compare(set, 50_000, true) > 20_000);
+    }
+}
+
+/// A million pairs of either kind: `cargo test --release --lib collide::cuboids -- --ignored`.
+#[test]
+#[ignore = "half a minute"]
+fn a_million_cuboids_touch_as_parry_says_bit_by_bit() {
+    assert!(compare(InstructionSet::default(), 1_000_000, false) > 100_000);
+    assert!(compare(InstructionSet::default(), 1_000_000, true) > 400_000);
+}

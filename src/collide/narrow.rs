@@ -1,0 +1,121 @@
+//! The contacts of pairs, brought to where the bodies are: reused while the bodies hardly moved, else computed. Sixteen pairs at a time are
+//! tested, and those of cuboids are computed as many at a time; each pair is updated by itself, so that it does not matter with which others.
+
+use std::sync::Mutex;
+
+use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
+use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::pair::{Motion, Pair, PairScratch, Side, Update};
+use super::pairs::{NEVER, PairChunk, Placed};
+use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
+use crate::backend::cpu::simd::{InstructionSet, WIDTH, Wide};
+
+/// What an update reads.
+pub(super) struct Narrow<'a> {
+    pub colliders: &'a [ColliderInfo],
+    pub cuboids: &'a [CuboidPlace],
+    pub moving: &'a [BodyState],
+    pub margins: Margins,
+}
+
+/// A pair that is not as it was.
+pub(super) struct Updated {
+    /// Its place.
+    pub pair: u32,
+    pub computed: bool,
+    /// Whether what touches, or with how many points, is other than before.
+    pub reshaped: bool,
+}
+
+/// Memory that one thread reuses from chunk to chunk.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pair: PairScratch,
+    tests: Vec<Tested>,
+    events: Vec<Event>,
+    cuboid_pairs: Vec<CuboidPair>,
+    cuboids: CuboidScratch,
+}
+
+/// A pair that the test found not to stay as it is.
+struct Event {
+    place: u32,
+    changes: bool,
+    /// None until it is computed.
+    update: Option<Update>,
+}
+
+impl Narrow<'_> {
+    /// Updates some pairs; returns those that are not as they were, in their order.
+    pub fn update(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
+        let PairChunk { first, pairs, tracks, motions } = chunk;
+        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids } = scratch;
+        let set = InstructionSet::default();
+        tests.clear();
+        let results = Mutex::new((&mut *tests, &mut *motions));
+        let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results };
+        set.run(&test, 0..tracks.len().div_ceil(WIDTH));
+        events.clear();
+        cuboid_pairs.clear();
+        for (group, tested) in tests.iter().enumerate() {
+            if tested.verdict == Wide([REUSED; WIDTH]) && tested.changes == Wide::default() {
+                continue;
+            }
+            for lane in 0..WIDTH.min(tracks.len() - group * WIDTH) {
+                let (verdict, changes) = (tested.verdict.0[lane], tested.changes.0[lane] != 0.0);
+                if verdict == REUSED && !changes {
+                    continue;
+                }
+                let place = group * WIDTH + lane;
+                let (pair, track) = (&mut pairs[place], &mut tracks[place]);
+                let mut update = Some(Update::Reused);
+                if verdict == LOST {
+                    pair.end();
+                    track.predicted = NEVER;
+                    update = Some(Update::Reshaped);
+                } else if verdict == MOVED {
+                    let bodies = track.bodies.map(|body| &self.moving[body as usize]);
+                    let prediction = tested.prediction.0[lane];
+                    track.then = bodies.map(Placed::of);
+                    track.predicted = prediction;
+                    motions[place] = Motion::default();
+                    let places = [pair.collider_a, pair.collider_b];
+                    if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
+                        let number = events.len() as u32;
+                        cuboid_pairs.push(CuboidPair { bodies: track.bodies, cuboids: places, prediction, number });
+                        update = None;
+                    } else {
+                        update = Some(pair.compute(self.sides(pair), prediction, pair_scratch));
+                        track.has_manifolds = f32::from(!pair.manifolds.is_empty());
+                    }
+                }
+                events.push(Event { place: place as u32, changes, update });
+            }
+        }
+        cuboid_contacts(set, self.moving, self.cuboids, cuboid_pairs, cuboids, |number, write| {
+            let event = &mut events[number as usize];
+            let pair = &mut pairs[event.place as usize];
+            let prediction = tracks[event.place as usize].predicted;
+            event.update = Some(pair.take_over(self.sides(pair), prediction, write, pair_scratch));
+        });
+        let finish = |event: &Event| {
+            let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
+            let update = event.update.unwrap_or_else(|| pair.part());
+            track.has_manifolds = f32::from(!pair.manifolds.is_empty());
+            if event.changes {
+                pair.takes_part = !pair.takes_part;
+                track.takes_part = f32::from(pair.takes_part);
+            }
+            let computed = update != Update::Reused;
+            let reshaped = update == Update::Reshaped || event.changes && pair.is_touching();
+            Updated { pair: first + event.place, computed, reshaped }
+        };
+        events.iter().map(finish).collect()
+    }
+
+    /// The colliders of a pair, and their bodies.
+    fn sides(&self, pair: &Pair) -> [Side<'_>; 2] {
+        let side = |c: u32, body: u32| (&self.colliders[c as usize], &self.moving[body as usize]);
+        [side(pair.collider_a, pair.body_a), side(pair.collider_b, pair.body_b)]
+    }
+}

@@ -1,0 +1,130 @@
+//! The pairs of one world, and apart from them what the test whether they are reused reads: a third of the bytes, and no manifold.
+
+use std::ops::{Deref, DerefMut};
+
+use glam::{Quat, Vec3};
+use rayon::prelude::*;
+
+use super::collider::{BodyState, ColliderInfo};
+use super::pair::{Motion, Pair};
+
+/// Where a body is: its rotation and center of mass.
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct Placed {
+    pub rotation: Quat,
+    pub center: Vec3,
+    rest: f32,
+}
+
+impl Placed {
+    pub fn of(body: &BodyState) -> Self {
+        Self { rotation: body.rotation, center: body.center, rest: 0.0 }
+    }
+}
+
+/// What the test reads of a pair: three rows of eight numbers, so that lanes can gather them.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(32))]
+pub(super) struct Track {
+    /// Half of the smallest side of the thinner collider (m).
+    pub size: f32,
+    /// Radius around the origin of body b that holds its collider (m).
+    pub reach_b: f32,
+    /// Distance up to which the last computation predicted (m); that of a pair that was never computed is below all others.
+    pub predicted: f32,
+    /// 1 if collider a is unbounded, otherwise 0.
+    pub unbounded: f32,
+    /// 1 if the pair has manifolds, otherwise 0.
+    pub has_manifolds: f32,
+    /// 1 if it takes part in the step, otherwise 0.
+    pub takes_part: f32,
+    pub bodies: [u32; 2],
+    /// Where the bodies were when the manifolds were computed.
+    pub then: [Placed; 2],
+}
+
+/// The predicted distance of a pair that was never computed.
+pub(super) const NEVER: f32 = f32::NEG_INFINITY;
+
+impl Track {
+    fn of(pair: &Pair, colliders: &[ColliderInfo]) -> Self {
+        let [a, b] = [pair.collider_a, pair.collider_b].map(|c| &colliders[c as usize]);
+        Self {
+            size: pair.size,
+            reach_b: b.reach,
+            predicted: NEVER,
+            unbounded: f32::from(a.unbounded),
+            has_manifolds: 0.0,
+            takes_part: 1.0,
+            bodies: [pair.body_a, pair.body_b],
+            then: [Placed::default(); 2],
+        }
+    }
+}
+
+/// Pairs, in the order in which they were found.
+#[derive(Clone, Default)]
+pub(super) struct Pairs {
+    all: Vec<Pair>,
+    tracks: Vec<Track>,
+    /// How the bodies moved since the manifolds were computed.
+    motions: Vec<Motion>,
+}
+
+/// Some pairs one after another.
+pub(super) struct PairChunk<'a> {
+    /// The place of the first among all.
+    pub first: u32,
+    pub pairs: &'a mut [Pair],
+    pub tracks: &'a mut [Track],
+    pub motions: &'a mut [Motion],
+}
+
+/// Pairs that one task updates: those of them that are computed fill several groups of lanes.
+const PAIRS_A_TASK: usize = 2048;
+
+impl Pairs {
+    /// A new pair of two colliders.
+    pub fn push(&mut self, collider_a: u32, collider_b: u32, colliders: &[ColliderInfo]) {
+        let pair = Pair::new(collider_a, collider_b, colliders);
+        self.tracks.push(Track::of(&pair, colliders));
+        self.motions.push(Motion::default());
+        self.all.push(pair);
+    }
+
+    /// Ends a pair; the last takes its place.
+    pub fn swap_remove(&mut self, place: usize) -> Pair {
+        self.tracks.swap_remove(place);
+        self.motions.swap_remove(place);
+        self.all.swap_remove(place)
+    }
+
+    /// How the bodies of a pair moved since its manifolds were computed. Not kept for pairs without manifolds.
+    pub fn motion(&self, place: usize) -> &Motion {
+        &self.motions[place]
+    }
+
+    /// All, in chunks.
+    pub fn par_chunks_mut(&mut self) -> impl IndexedParallelIterator<Item = PairChunk<'_>> {
+        let tracks = self.tracks.par_chunks_mut(PAIRS_A_TASK).zip(self.motions.par_chunks_mut(PAIRS_A_TASK));
+        let chunks = self.all.par_chunks_mut(PAIRS_A_TASK).zip(tracks).enumerate();
+        chunks.map(|(chunk, (pairs, (tracks, motions)))| {
+            let first = (chunk * PAIRS_A_TASK) as u32;
+            PairChunk { first, pairs, tracks, motions }
+        })
+    }
+}
+
+impl Deref for Pairs {
+    type Target = [Pair];
+    fn deref(&self) -> &[Pair] {
+        &self.all
+    }
+}
+
+impl DerefMut for Pairs {
+    fn deref_mut(&mut self) -> &mut [Pair] {
+        &mut self.all
+    }
+}

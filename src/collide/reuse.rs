@@ -1,0 +1,269 @@
+//! The test whether pairs are reused, sixteen at a time: the bodies hardly moved since their manifolds were computed.
+
+use std::ops::Range;
+use std::sync::Mutex;
+
+use super::collider::{BodyState, Margins, POSE, VELOCITY};
+use super::lane_pose::{Pose, Turn, backwards, choose, length, negative, product};
+use super::pair::Motion;
+use super::pairs::Track;
+use crate::backend::cpu::simd::{Lanes, Row8, WIDTH, Wide, Work, columns, prefetch};
+use crate::math::{Quat, dot3, vec3};
+
+/// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
+/// computed, so this is how far bodies that turn together may see gravity from the wrong side. At 0.01 rad arches that open a little
+/// are computed anew while they do, and one of 17 stones, 0.12 of its radius thick, falls with 8 substeps.
+const RECYCLE_TURN: f32 = 2.25e-4;
+
+/// The same where one of them is kinematic, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
+/// slipped 1.6 degrees late, and a ball lost a quarter of its way.
+const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
+
+/// Largest turn of a body in a step with which planes are seen as far ahead as the body gets (rad). The rod of 1000 rad/s (H7) turns by 17.
+const MOST_FORESEEN_TURN: f32 = 0.5;
+
+/// What the test says of sixteen pairs.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub(super) struct Tested {
+    /// One of the three numbers below.
+    pub verdict: Wide,
+    /// Whether the pair takes part from now on or no longer does.
+    pub changes: Wide,
+    pub prediction: Wide,
+    /// Whether a body of the pair is not still.
+    pub moves: Wide,
+}
+
+/// The manifolds stay as they are.
+pub(super) const REUSED: f32 = 0.0;
+/// They are to be computed.
+pub(super) const MOVED: f32 = 1.0;
+/// A body is where nothing can be computed.
+pub(super) const LOST: f32 = 2.0;
+
+/// Tests which pairs are reused, and notes how the bodies of those moved.
+pub(super) struct ReuseTest<'a> {
+    pub tracks: &'a [Track],
+    pub moving: &'a [BodyState],
+    pub margins: Margins,
+    pub results: Mutex<(&'a mut Vec<Tested>, &'a mut [Motion])>,
+}
+
+impl Work for ReuseTest<'_> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
+        let mut results = self.results.lock().expect("no other thread has it");
+        let (tests, motions) = &mut *results;
+        for group in groups {
+            let (mut which, mut bodies) = ([0; WIDTH], [[0; WIDTH]; 2]);
+            for lane in 0..WIDTH {
+                let place = (group * WIDTH + lane).min(self.tracks.len() - 1);
+                which[lane] = place as u32;
+                bodies[0][lane] = self.tracks[place].bodies[0];
+                bodies[1][lane] = self.tracks[place].bodies[1];
+            }
+            // Bodies are anywhere in memory: those of the next but one group are asked for now.
+            let soon = self.tracks.len().min((group + 2) * WIDTH)..self.tracks.len().min((group + 3) * WIDTH);
+            for track in &self.tracks[soon] {
+                prefetch(&self.moving[track.bodies[0] as usize]);
+                prefetch(&self.moving[track.bodies[1] as usize]);
+            }
+            let (tested, rows) = self.test::<L>(&which, &bodies);
+            tests.push(tested);
+            for (lane, place) in (group * WIDTH..self.tracks.len().min((group + 1) * WIDTH)).enumerate() {
+                if self.tracks[place].has_manifolds != 0.0
+                    && tested.verdict.0[lane] == REUSED
+                    && tested.moves.0[lane] != 0.0
+                {
+                    motions[place] = Motion::of(&rows[0][lane], &rows[1][lane]);
+                }
+            }
+        }
+    }
+}
+
+impl ReuseTest<'_> {
+    /// The verdict on sixteen pairs, and the rows of their motions.
+    #[inline(always)]
+    fn test<L: Lanes>(&self, which: &[u32; WIDTH], bodies: &[[u32; WIDTH]; 2]) -> (Tested, [[Row8; WIDTH]; 2]) {
+        let (zero, one, two) = (L::constant(0.0), L::constant(1.0), L::constant(2.0));
+        let number = L::constant;
+        let track = columns::<L, _>(self.tracks, 0, which);
+        let then_a = Pose::of(columns::<L, _>(self.tracks, 1, which));
+        let then_b = Pose::of(columns::<L, _>(self.tracks, 2, which));
+        let now_a = columns::<L, _>(self.moving, POSE, &bodies[0]);
+        let now_b = columns::<L, _>(self.moving, POSE, &bodies[1]);
+        let v_a = columns::<L, _>(self.moving, VELOCITY, &bodies[0]);
+        let v_b = columns::<L, _>(self.moving, VELOCITY, &bodies[1]);
+        let [size, reach_b, predicted, unbounded, _, takes_part, ..] = track;
+        let kinematic = L::larger(now_a[7], now_b[7]);
+        let (now_a, now_b) = (Pose::of(now_a), Pose::of(now_b));
+        let dt = number(f64::from(self.margins.dt));
+
+        let v = vec3(v_b[0], v_b[1], v_b[2]) - vec3(v_a[0], v_a[1], v_a[2]);
+        let w_b = vec3(v_b[3], v_b[4], v_b[5]);
+        let w = w_b - vec3(v_a[3], v_a[4], v_a[5]);
+        let approach = length(v) + reach_b * length(w);
+        let base = number(f64::from(self.margins.speculative)) * size + number(f64::from(self.margins.fall));
+        // A contact with a plane is true however far away it is seen; with others it would stop what passes by. Arms stay the same within a step.
+        let is_far_seen = L::and(unbounded.gt(zero), number(f64::from(MOST_FORESEEN_TURN)).gt(length(w_b) * dt));
+        let farthest = L::select(two * size, number(f64::from(f32::MAX)), is_far_seen);
+        let prediction = base + L::smaller(approach * dt, farthest);
+
+        let (turn_a, turn_b) =
+            (turn_since(now_a.rotation, then_a.rotation), turn_since(now_b.rotation, then_b.rotation));
+        // How far any point of b that can touch moved as seen from a. 2 |vector part| is the angle, if small.
+        let carried = then_b.at - then_a.at;
+        let apart = now_b.at - now_a.at;
+        let shift = apart - Turn::of(turn_a).of_vector(carried);
+        let turn = product(backwards(turn_a), turn_b);
+        let moved = length(shift) + two * length(turn.axis) * reach_b;
+        let turned = L::larger(dot3(turn_a.axis, turn_a.axis), dot3(turn_b.axis, turn_b.axis));
+        let most = number(f64::from(RECYCLE_TURN));
+        let most = L::select(most, number(f64::from(RECYCLE_TURN_KINEMATIC)), kinematic.gt(zero));
+        let is_still_near = L::and((number(f64::from(self.margins.recycle)) * size).gt(moved), most.gt(turned));
+        let is_new = L::select(zero, one, prediction.gt(predicted + number(0.5) * base));
+        let is_reused = L::and(is_still_near, one.gt(is_new));
+
+        // The more awake of the two bodies.
+        let activity = L::larger(v_a[7], v_b[7]);
+        let in_range = L::smaller(v_a[6], v_b[6]);
+        let verdict = L::select(number(f64::from(MOVED)), number(f64::from(REUSED)), is_reused);
+        let verdict = L::select(number(f64::from(LOST)), verdict, in_range.gt(zero));
+        let moves = L::select(zero, one, activity.gt(zero));
+        let verdict = L::select(number(f64::from(REUSED)), verdict, activity.gt(zero));
+        let is_awake = L::select(zero, one, activity.gt(one));
+        let changes = (is_awake - takes_part) * (is_awake - takes_part);
+        let tested = Tested {
+            verdict: verdict.store(),
+            changes: changes.store(),
+            prediction: prediction.store(),
+            moves: moves.store(),
+        };
+        let drift = apart - carried;
+        let (a, b) = (turn_a.axis, turn_b.axis);
+        let first = L::scattered([a.x, a.y, a.z, turn_a.w, drift.x, drift.y, drift.z, zero]);
+        let second = L::scattered([b.x, b.y, b.z, turn_b.w, zero, zero, zero, zero]);
+        (tested, [first, second])
+    }
+}
+
+/// Rotation from `then` to `now`, by the shorter way.
+#[inline(always)]
+fn turn_since<L: Lanes>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
+    let turn = product(now, backwards(then));
+    let is_long = L::constant(0.0).gt(turn.w);
+    Quat { axis: choose(turn.axis, negative(turn.axis), is_long), w: L::select(turn.w, -turn.w, is_long) }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+    use crate::backend::cpu::simd::InstructionSet;
+    use crate::collide::pairs::{NEVER, Placed};
+    use crate::random::mixed;
+
+    struct Random(u64);
+
+    impl Random {
+        /// From -1 to 1.
+        fn next(&mut self) -> f32 {
+            self.0 += 1;
+            (mixed(self.0) >> 40) as f32 / (1 << 23) as f32 - 1.0
+        }
+
+        fn vector(&mut self) -> Vec3 {
+            Vec3::new(self.next(), self.next(), self.next())
+        }
+
+        fn body(&mut self) -> BodyState {
+            let rotation = Quat::from_xyzw(self.next(), self.next(), self.next(), self.next()).normalize();
+            let at = 3.0 * self.vector();
+            let [v, w] = [self.vector(), self.vector() * 10.0_f32.powf(3.0 * self.next())];
+            let activity = (1.49 * (self.next() + 1.0)) as u32 as f32;
+            let [kinematic, in_range] = [self.next() > 0.8, self.next() > -0.95].map(f32::from);
+            BodyState { rotation, center: at, kinematic, v, w, in_range, activity, position: at, rest: [0.0; 13] }
+        }
+
+        /// A little before a body was where it is.
+        fn before(&mut self, body: &BodyState) -> Placed {
+            let scale = 10.0_f32.powf(-2.5 + self.next());
+            let turn = Quat::from_scaled_axis(self.vector() * scale) * if self.next() > 0.0 { 1.0 } else { -1.0 };
+            let center = body.center + self.vector() * scale;
+            Placed::of(&BodyState { rotation: turn * body.rotation, center, ..*body })
+        }
+    }
+
+    /// The verdict on one pair, its prediction and its motion, with glam.
+    fn of_one(track: &Track, [a, b]: [&BodyState; 2], margins: Margins) -> (f32, f32, [Vec<f32>; 3]) {
+        let size = track.size;
+        let approach = (b.v - a.v).length() + track.reach_b * (b.w - a.w).length();
+        let base = margins.speculative * size + margins.fall;
+        let is_far_seen = track.unbounded != 0.0 && b.w.length() * margins.dt < MOST_FORESEEN_TURN;
+        let farthest = if is_far_seen { f32::MAX } else { 2.0 * size };
+        let prediction = base + (approach * margins.dt).min(farthest);
+        let since = |now: &BodyState, then: &Placed| {
+            let turn = now.rotation * then.rotation.conjugate();
+            if turn.w < 0.0 { -turn } else { turn }
+        };
+        let [then_a, then_b] = &track.then;
+        let (turn_a, turn_b) = (since(a, then_a), since(b, then_b));
+        let carried = then_b.center - then_a.center;
+        let shift = (b.center - a.center) - (turn_a * carried);
+        let turn = turn_a.conjugate() * turn_b;
+        let moved = shift.length() + 2.0 * turn.xyz().length() * track.reach_b;
+        let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
+        let most = if a.kinematic + b.kinematic > 0.0 { RECYCLE_TURN_KINEMATIC } else { RECYCLE_TURN };
+        let is_reused = moved < margins.recycle * size && turned < most && prediction <= track.predicted + 0.5 * base;
+        let verdict = match (a.activity.max(b.activity) > 0.0, a.in_range.min(b.in_range) > 0.0) {
+            (false, _) => REUSED,
+            (true, false) => LOST,
+            _ if is_reused => REUSED,
+            _ => MOVED,
+        };
+        let drift = ((b.center - a.center) - carried).to_array().to_vec();
+        (verdict, prediction, [drift, turn_a.to_array().to_vec(), turn_b.to_array().to_vec()])
+    }
+
+    #[test]
+    fn sixteen_pairs_are_tested_as_one_is() {
+        let mut random = Random(1);
+        let margins = Margins { speculative: 0.02, recycle: 0.02, fall: 0.003, dt: 1.0 / 60.0 };
+        let moving: Vec<BodyState> = (0..300).map(|_| random.body()).collect();
+        let track = |place: u32| {
+            let mut body = |_| (149.5 * (random.next() + 1.0)) as u32;
+            let bodies = [body(0), body(1)];
+            let then = bodies.map(|body| random.before(&moving[body as usize]));
+            let [size, reach_b] = [1.1, 1.5].map(|least| least + random.next());
+            let predicted = if place % 7 == 0 { NEVER } else { 1.0 + random.next() };
+            let [unbounded, takes_part] = [random.next() > 0.5, random.next() > 0.0].map(f32::from);
+            Track { size, reach_b, predicted, unbounded, has_manifolds: 1.0, takes_part, bodies, then }
+        };
+        // The last group is not full.
+        let tracks: Vec<Track> = (0..16 * 500 + 5).map(track).collect();
+        let mut seen = [0; 3];
+        for set in InstructionSet::each() {
+            let (mut tests, mut motions) = (Vec::new(), vec![Motion::default(); tracks.len()]);
+            let results = Mutex::new((&mut tests, &mut motions[..]));
+            set.run(&ReuseTest { tracks: &tracks, moving: &moving, margins, results }, 0..tracks.len().div_ceil(WIDTH));
+            for (place, track) in tracks.iter().enumerate() {
+                let bodies = track.bodies.map(|body| &moving[body as usize]);
+                let (verdict, prediction, [drift, turn_a, turn_b]) = of_one(track, bodies, margins);
+                let (tested, lane) = (&tests[place / WIDTH], place % WIDTH);
+                let what = format!("{}, pair {place}", set.name());
+                assert_eq!(tested.verdict.0[lane], verdict, "{what}");
+                assert_eq!(tested.prediction.0[lane].to_bits(), prediction.to_bits(), "{what}");
+                let is_awake = bodies.iter().any(|body| body.activity == 2.0);
+                assert_eq!(tested.changes.0[lane] != 0.0, is_awake != (track.takes_part != 0.0), "{what}");
+                seen[verdict as usize] += 1;
+                let is_noted = verdict == REUSED && bodies.iter().any(|body| body.activity > 0.0);
+                let row = |x: &[f32]| Row8(std::array::from_fn(|k| x.get(k).copied().unwrap_or_default()));
+                let noted = Motion::of(&row(&[&turn_a[..], &drift].concat()), &row(&turn_b));
+                assert_eq!(motions[place], if is_noted { noted } else { Motion::default() }, "{what}");
+            }
+        }
+        assert!(seen.iter().all(|&count| count > 300), "{seen:?} reused, moved, lost");
+    }
+}
