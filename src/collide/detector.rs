@@ -119,7 +119,7 @@ impl Detector {
     }
 
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
-    /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
+    /// their pairs know where the bodies were. Pairs of bodies that are still keep what they have, and take no part in
     /// the step; without `activity` all take part.
     pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
         let moving = |b: &Body| BodyState {

@@ -10,7 +10,6 @@ use super::facet::composite_contacts;
 use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
-use crate::math::{self, NormalMovement};
 use crate::random::mixed;
 
 /// Two colliders whose boxes overlap.
@@ -32,36 +31,17 @@ pub struct Pair {
     predicted: f32,
     /// Where the bodies were when the manifolds were computed; none if they never were.
     computed_at: Option<[Placed; 2]>,
-    /// How they moved since.
-    motion: Motion,
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
 }
 
-/// How two bodies moved relative to each other since their manifolds were computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
-    /// Of the centre of b as seen from the centre of a, world axes (m).
-    drift: Vec3,
-    turn_a: Quat,
-    turn_b: Quat,
-}
-
-impl Motion {
-    /// The motion along the normal of a contact.
-    pub fn along(&self, normal: [f32; 3], radii: [f32; 2]) -> NormalMovement<f32> {
-        let quat = |turn: Quat| math::Quat::load(turn.to_array());
-        let (normal, drift) = (math::Vec3::load(normal), math::Vec3::load(self.drift.to_array()));
-        let movement = NormalMovement::new(normal, drift, quat(self.turn_a), quat(self.turn_b));
-        if radii == [0.0; 2] { movement } else { movement.round(normal, radii[0], radii[1]) }
-    }
-}
-
-/// Where a body is: its centre of mass and rotation.
+/// Where a body is.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
-    center: Vec3,
-    rotation: Quat,
+pub struct Placed {
+    /// Centre of mass (m).
+    pub center: Vec3,
+    /// Rotation.
+    pub rotation: Quat,
 }
 
 impl Placed {
@@ -123,7 +103,6 @@ impl Pair {
             reach_b: b.reach,
             predicted: 0.0,
             computed_at: None,
-            motion: Motion::default(),
             takes_part: true,
         }
     }
@@ -141,12 +120,12 @@ impl Pair {
         self.manifolds.iter().any(|manifold| !manifold.has_ended())
     }
 
-    /// How the bodies moved since the manifolds were computed.
-    pub fn motion(&self) -> &Motion {
-        &self.motion
+    /// Where the bodies were when the manifolds were computed; none if they never were, or a body is out of range.
+    pub fn computed_at(&self) -> Option<&[Placed; 2]> {
+        self.computed_at.as_ref()
     }
 
-    /// Notes how the bodies moved to the poses `a` and `b`; computes the manifolds anew if that was too far.
+    /// Computes the manifolds anew if the bodies moved too far to the poses `a` and `b` since they were computed.
     pub(super) fn update(
         &mut self,
         colliders: &[ColliderInfo],
@@ -182,12 +161,10 @@ impl Pair {
             let turned = turn_a.xyz().length_squared().max(turn_b.xyz().length_squared());
             let most = if a.kinematic || b.kinematic { RECYCLE_TURN_KINEMATIC } else { RECYCLE_TURN };
             if moved < margins.recycle * size && turned < most && prediction <= self.predicted + 0.5 * base {
-                self.motion = Motion { drift: (b_now.center - a_now.center) - carried, turn_a, turn_b };
                 return Update::Reused;
             }
         }
         self.computed_at = Some([Placed::of(a), Placed::of(b)]);
-        self.motion = Motion::default();
         self.predicted = prediction;
         let before = self.manifolds.len();
         let sides = [(&colliders[self.collider_a as usize], a), (&colliders[self.collider_b as usize], b)];

@@ -12,7 +12,7 @@ use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 pub struct Avx2([__m256; 2]);
 
 // SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has been
-// detected; loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes.
+// detected; loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes, and `gathered` asks for no alignment.
 
 /// An intrinsic for both registers.
 macro_rules! both {
@@ -73,7 +73,7 @@ impl Lanes for Avx2 {
     #[inline(always)]
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
         // SAFETY: the caller promises that a row is at each of the places.
-        let r: [__m256; WIDTH] = lanes!(lane => unsafe { _mm256_load_ps(row_at(rows, places[lane]).cast()) });
+        let r: [__m256; WIDTH] = lanes!(lane => unsafe { _mm256_loadu_ps(row_at(rows, places[lane]).cast()) });
         let s = transposed([r[8], r[9], r[10], r[11], r[12], r[13], r[14], r[15]]);
         let r = transposed([r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]]);
         [

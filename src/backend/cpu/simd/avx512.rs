@@ -12,7 +12,7 @@ use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 pub struct Avx512(__m512);
 
 // SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has been
-// detected; loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
+// detected; loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32; `gathered` asks for no alignment.
 
 lane! {
     Avx512, __mmask16, |a, b, m|
@@ -101,10 +101,10 @@ impl Lanes for Avx512 {
 /// A row is at both addresses, and no thread writes it meanwhile.
 #[inline(always)]
 unsafe fn both(low: *const Row8, high: *const Row8) -> __m512 {
-    // SAFETY: the caller's promise; rows are aligned to 32 bytes.
+    // SAFETY: the caller's promise.
     unsafe {
-        let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_load_ps(low.cast())));
-        _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_load_ps(high.cast()))))
+        let low = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_loadu_ps(low.cast())));
+        _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(_mm256_loadu_ps(high.cast()))))
     }
 }
 

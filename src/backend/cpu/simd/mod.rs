@@ -42,7 +42,7 @@ pub trait Lanes: Lane {
     /// From rows of sixteen bodies, number by number. Where each row is, in units of 8 bytes from `rows`, say `places`.
     ///
     /// # Safety
-    /// A row is at each of the places, and no thread writes it meanwhile.
+    /// Eight numbers are at each of the places, aligned or not, and no thread writes them meanwhile.
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8];
     /// To sixteen rows.
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH];

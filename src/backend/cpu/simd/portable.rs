@@ -37,7 +37,7 @@ impl Lanes for Portable {
     #[inline(always)]
     unsafe fn gathered(rows: *const Row8, places: &[u32; WIDTH]) -> [Self; 8] {
         // SAFETY: the caller's promise.
-        let rows: [Row8; WIDTH] = lanes!(lane => unsafe { *row_at(rows, places[lane]) });
+        let rows: [Row8; WIDTH] = lanes!(lane => unsafe { row_at(rows, places[lane]).read_unaligned() });
         std::array::from_fn(|column| Self(Wide(std::array::from_fn(|row| rows[row].0[column]))))
     }
     #[inline(always)]
