@@ -273,6 +273,16 @@ impl Effort {
         self.used.get(block).copied().unwrap_or_default()
     }
 
+    /// The class of each body.
+    pub fn classes(&self) -> &[u8] {
+        &self.classes
+    }
+
+    /// Whether any body became part of a heap in this step, or ceased to be.
+    pub fn heaps_change(&self) -> bool {
+        self.heaps_change
+    }
+
     /// Whether the body is part of a heap.
     pub fn is_in_heap(&self, body: usize) -> bool {
         self.heaps.get(body) == Some(&true)

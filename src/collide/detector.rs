@@ -7,7 +7,8 @@ use parry3d::math::Pose;
 use rayon::prelude::*;
 
 use super::collider::{BodyState, ColliderInfo, Margins};
-use super::pair::{Motion, Pair};
+use super::pair::Pair;
+use super::pairs::Placed;
 use super::report::{Activity, Change, DetectStats};
 use super::world_contacts::{DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
@@ -118,13 +119,13 @@ impl Detector {
         &mut self.worlds[world as usize].pairs[pair as usize]
     }
 
-    /// How the bodies of a pair moved since its manifolds were computed.
-    pub fn motion(&self, world: u32, pair: u32) -> &Motion {
-        self.worlds[world as usize].pairs.motion(pair as usize)
+    /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.
+    pub fn computed_at(&self, world: u32, pair: u32) -> Option<&[Placed; 2]> {
+        self.worlds[world as usize].pairs.computed_at(pair as usize)
     }
 
     /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
-    /// their pairs know how the bodies moved since. Pairs of bodies that are still keep what they have, and take no part in
+    /// their pairs know where the bodies were. Pairs of bodies that are still keep what they have, and take no part in
     /// the step; without `activity` all take part.
     pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);

@@ -23,6 +23,7 @@ mod world_contacts;
 
 pub use detector::Detector;
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
-pub use pair::{Motion, Pair};
+pub use pair::Pair;
+pub use pairs::Placed;
 pub(crate) use report::Change;
 pub use report::{Activity, DetectStats};

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
-use super::pair::{Motion, Pair, PairScratch, Side, Update};
+use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
 use crate::backend::cpu::simd::{InstructionSet, WIDTH, Wide};
@@ -48,12 +48,11 @@ struct Event {
 impl Narrow<'_> {
     /// Updates some pairs; returns those that are not as they were, in their order.
     pub fn update(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
-        let PairChunk { first, pairs, tracks, motions } = chunk;
+        let PairChunk { first, pairs, tracks } = chunk;
         let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids } = scratch;
         let set = InstructionSet::default();
         tests.clear();
-        let results = Mutex::new((&mut *tests, &mut *motions));
-        let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results };
+        let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results: Mutex::new(tests) };
         set.run(&test, 0..tracks.len().div_ceil(WIDTH));
         events.clear();
         cuboid_pairs.clear();
@@ -78,7 +77,6 @@ impl Narrow<'_> {
                     let prediction = tested.prediction.0[lane];
                     track.then = bodies.map(Placed::of);
                     track.predicted = prediction;
-                    motions[place] = Motion::default();
                     let places = [pair.collider_a, pair.collider_b];
                     if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
                         let number = events.len() as u32;
@@ -86,7 +84,6 @@ impl Narrow<'_> {
                         update = None;
                     } else {
                         update = Some(pair.compute(self.sides(pair), prediction, pair_scratch));
-                        track.has_manifolds = f32::from(!pair.manifolds.is_empty());
                     }
                 }
                 events.push(Event { place: place as u32, changes, update });
@@ -101,7 +98,6 @@ impl Narrow<'_> {
         let finish = |event: &Event| {
             let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
             let update = event.update.unwrap_or_else(|| pair.part());
-            track.has_manifolds = f32::from(!pair.manifolds.is_empty());
             if event.changes {
                 pair.takes_part = !pair.takes_part;
                 track.takes_part = f32::from(pair.takes_part);

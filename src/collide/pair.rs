@@ -1,6 +1,6 @@
 //! The contact of one pair of colliders, and how a new one takes the place of the last.
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use parry3d::math::Pose;
 use parry3d::query::TrackedContact;
 use parry3d::shape::TypedShape;
@@ -10,8 +10,6 @@ use super::facet::composite_contacts;
 use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
-use crate::backend::cpu::simd::Row8;
-use crate::math::{self, NormalMovement};
 use crate::random::mixed;
 
 /// Two colliders whose boxes overlap.
@@ -29,35 +27,6 @@ pub struct Pair {
     pub size: f32,
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
-}
-
-/// How two bodies moved relative to each other since their manifolds were computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
-    /// Of the centre of b as seen from the centre of a, world axes (m).
-    drift: Vec3,
-    turn_a: Quat,
-    turn_b: Quat,
-}
-
-impl Motion {
-    /// From two rows: the turn of a and the drift, the turn of b.
-    pub(super) fn of(first: &Row8, second: &Row8) -> Self {
-        let ([x, y, z, w, drift @ .., _], [b_x, b_y, b_z, b_w, ..]) = (first.0, second.0);
-        Self {
-            drift: Vec3::from_array(drift),
-            turn_a: Quat::from_xyzw(x, y, z, w),
-            turn_b: Quat::from_xyzw(b_x, b_y, b_z, b_w),
-        }
-    }
-
-    /// The motion along the normal of a contact.
-    pub fn along(&self, normal: [f32; 3], radii: [f32; 2]) -> NormalMovement<f32> {
-        let quat = |turn: Quat| math::Quat::load(turn.to_array());
-        let (normal, drift) = (math::Vec3::load(normal), math::Vec3::load(self.drift.to_array()));
-        let movement = NormalMovement::new(normal, drift, quat(self.turn_a), quat(self.turn_b));
-        if radii == [0.0; 2] { movement } else { movement.round(normal, radii[0], radii[1]) }
-    }
 }
 
 /// A collider, and where its body is.

@@ -6,19 +6,21 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
 use super::collider::{BodyState, ColliderInfo};
-use super::pair::{Motion, Pair};
+use super::pair::Pair;
 
-/// Where a body is: its rotation and center of mass.
-#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+/// Where a body is.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(super) struct Placed {
+pub struct Placed {
+    /// Rotation.
     pub rotation: Quat,
+    /// Center of mass (m).
     pub center: Vec3,
     rest: f32,
 }
 
 impl Placed {
-    pub fn of(body: &BodyState) -> Self {
+    pub(super) fn of(body: &BodyState) -> Self {
         Self { rotation: body.rotation, center: body.center, rest: 0.0 }
     }
 }
@@ -35,10 +37,9 @@ pub(super) struct Track {
     pub predicted: f32,
     /// 1 if collider a is unbounded, otherwise 0.
     pub unbounded: f32,
-    /// 1 if the pair has manifolds, otherwise 0.
-    pub has_manifolds: f32,
     /// 1 if it takes part in the step, otherwise 0.
     pub takes_part: f32,
+    pub rest: f32,
     pub bodies: [u32; 2],
     /// Where the bodies were when the manifolds were computed.
     pub then: [Placed; 2],
@@ -55,8 +56,8 @@ impl Track {
             reach_b: b.reach,
             predicted: NEVER,
             unbounded: f32::from(a.unbounded),
-            has_manifolds: 0.0,
             takes_part: 1.0,
+            rest: 0.0,
             bodies: [pair.body_a, pair.body_b],
             then: [Placed::default(); 2],
         }
@@ -68,8 +69,6 @@ impl Track {
 pub(super) struct Pairs {
     all: Vec<Pair>,
     tracks: Vec<Track>,
-    /// How the bodies moved since the manifolds were computed.
-    motions: Vec<Motion>,
 }
 
 /// Some pairs one after another.
@@ -78,7 +77,6 @@ pub(super) struct PairChunk<'a> {
     pub first: u32,
     pub pairs: &'a mut [Pair],
     pub tracks: &'a mut [Track],
-    pub motions: &'a mut [Motion],
 }
 
 /// Pairs that one task updates: those of them that are computed fill several groups of lanes.
@@ -89,30 +87,25 @@ impl Pairs {
     pub fn push(&mut self, collider_a: u32, collider_b: u32, colliders: &[ColliderInfo]) {
         let pair = Pair::new(collider_a, collider_b, colliders);
         self.tracks.push(Track::of(&pair, colliders));
-        self.motions.push(Motion::default());
         self.all.push(pair);
     }
 
     /// Ends a pair; the last takes its place.
     pub fn swap_remove(&mut self, place: usize) -> Pair {
         self.tracks.swap_remove(place);
-        self.motions.swap_remove(place);
         self.all.swap_remove(place)
     }
 
-    /// How the bodies of a pair moved since its manifolds were computed. Not kept for pairs without manifolds.
-    pub fn motion(&self, place: usize) -> &Motion {
-        &self.motions[place]
+    /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.
+    pub fn computed_at(&self, place: usize) -> Option<&[Placed; 2]> {
+        let track = &self.tracks[place];
+        (track.predicted != NEVER).then_some(&track.then)
     }
 
     /// All, in chunks.
     pub fn par_chunks_mut(&mut self) -> impl IndexedParallelIterator<Item = PairChunk<'_>> {
-        let tracks = self.tracks.par_chunks_mut(PAIRS_A_TASK).zip(self.motions.par_chunks_mut(PAIRS_A_TASK));
-        let chunks = self.all.par_chunks_mut(PAIRS_A_TASK).zip(tracks).enumerate();
-        chunks.map(|(chunk, (pairs, (tracks, motions)))| {
-            let first = (chunk * PAIRS_A_TASK) as u32;
-            PairChunk { first, pairs, tracks, motions }
-        })
+        let chunks = self.all.par_chunks_mut(PAIRS_A_TASK).zip(self.tracks.par_chunks_mut(PAIRS_A_TASK)).enumerate();
+        chunks.map(|(chunk, (pairs, tracks))| PairChunk { first: (chunk * PAIRS_A_TASK) as u32, pairs, tracks })
     }
 }
 

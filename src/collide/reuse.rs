@@ -5,9 +5,8 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, Margins, POSE, VELOCITY};
 use super::lane_pose::{Pose, Turn, backwards, choose, length, negative, product};
-use super::pair::Motion;
 use super::pairs::Track;
-use crate::backend::cpu::simd::{Lanes, Row8, WIDTH, Wide, Work, columns, prefetch};
+use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns, prefetch};
 use crate::math::{Quat, dot3, vec3};
 
 /// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
@@ -30,8 +29,6 @@ pub(super) struct Tested {
     /// Whether the pair takes part from now on or no longer does.
     pub changes: Wide,
     pub prediction: Wide,
-    /// Whether a body of the pair is not still.
-    pub moves: Wide,
 }
 
 /// The manifolds stay as they are.
@@ -46,14 +43,13 @@ pub(super) struct ReuseTest<'a> {
     pub tracks: &'a [Track],
     pub moving: &'a [BodyState],
     pub margins: Margins,
-    pub results: Mutex<(&'a mut Vec<Tested>, &'a mut [Motion])>,
+    pub results: Mutex<&'a mut Vec<Tested>>,
 }
 
 impl Work for ReuseTest<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         let mut results = self.results.lock().expect("no other thread has it");
-        let (tests, motions) = &mut *results;
         for group in groups {
             let (mut which, mut bodies) = ([0; WIDTH], [[0; WIDTH]; 2]);
             for lane in 0..WIDTH {
@@ -68,24 +64,15 @@ impl Work for ReuseTest<'_> {
                 prefetch(&self.moving[track.bodies[0] as usize]);
                 prefetch(&self.moving[track.bodies[1] as usize]);
             }
-            let (tested, rows) = self.test::<L>(&which, &bodies);
-            tests.push(tested);
-            for (lane, place) in (group * WIDTH..self.tracks.len().min((group + 1) * WIDTH)).enumerate() {
-                if self.tracks[place].has_manifolds != 0.0
-                    && tested.verdict.0[lane] == REUSED
-                    && tested.moves.0[lane] != 0.0
-                {
-                    motions[place] = Motion::of(&rows[0][lane], &rows[1][lane]);
-                }
-            }
+            results.push(self.test::<L>(&which, &bodies));
         }
     }
 }
 
 impl ReuseTest<'_> {
-    /// The verdict on sixteen pairs, and the rows of their motions.
+    /// The verdict on sixteen pairs.
     #[inline(always)]
-    fn test<L: Lanes>(&self, which: &[u32; WIDTH], bodies: &[[u32; WIDTH]; 2]) -> (Tested, [[Row8; WIDTH]; 2]) {
+    fn test<L: Lanes>(&self, which: &[u32; WIDTH], bodies: &[[u32; WIDTH]; 2]) -> Tested {
         let (zero, one, two) = (L::constant(0.0), L::constant(1.0), L::constant(2.0));
         let number = L::constant;
         let track = columns::<L, _>(self.tracks, 0, which);
@@ -95,7 +82,7 @@ impl ReuseTest<'_> {
         let now_b = columns::<L, _>(self.moving, POSE, &bodies[1]);
         let v_a = columns::<L, _>(self.moving, VELOCITY, &bodies[0]);
         let v_b = columns::<L, _>(self.moving, VELOCITY, &bodies[1]);
-        let [size, reach_b, predicted, unbounded, _, takes_part, ..] = track;
+        let [size, reach_b, predicted, unbounded, takes_part, ..] = track;
         let kinematic = L::larger(now_a[7], now_b[7]);
         let (now_a, now_b) = (Pose::of(now_a), Pose::of(now_b));
         let dt = number(f64::from(self.margins.dt));
@@ -130,21 +117,10 @@ impl ReuseTest<'_> {
         let in_range = L::smaller(v_a[6], v_b[6]);
         let verdict = L::select(number(f64::from(MOVED)), number(f64::from(REUSED)), is_reused);
         let verdict = L::select(number(f64::from(LOST)), verdict, in_range.gt(zero));
-        let moves = L::select(zero, one, activity.gt(zero));
         let verdict = L::select(number(f64::from(REUSED)), verdict, activity.gt(zero));
         let is_awake = L::select(zero, one, activity.gt(one));
         let changes = (is_awake - takes_part) * (is_awake - takes_part);
-        let tested = Tested {
-            verdict: verdict.store(),
-            changes: changes.store(),
-            prediction: prediction.store(),
-            moves: moves.store(),
-        };
-        let drift = apart - carried;
-        let (a, b) = (turn_a.axis, turn_b.axis);
-        let first = L::scattered([a.x, a.y, a.z, turn_a.w, drift.x, drift.y, drift.z, zero]);
-        let second = L::scattered([b.x, b.y, b.z, turn_b.w, zero, zero, zero, zero]);
-        (tested, [first, second])
+        Tested { verdict: verdict.store(), changes: changes.store(), prediction: prediction.store() }
     }
 }
 
@@ -196,8 +172,8 @@ mod tests {
         }
     }
 
-    /// The verdict on one pair, its prediction and its motion, with glam.
-    fn of_one(track: &Track, [a, b]: [&BodyState; 2], margins: Margins) -> (f32, f32, [Vec<f32>; 3]) {
+    /// The verdict on one pair and its prediction, with glam.
+    fn of_one(track: &Track, [a, b]: [&BodyState; 2], margins: Margins) -> (f32, f32) {
         let size = track.size;
         let approach = (b.v - a.v).length() + track.reach_b * (b.w - a.w).length();
         let base = margins.speculative * size + margins.fall;
@@ -223,8 +199,7 @@ mod tests {
             _ if is_reused => REUSED,
             _ => MOVED,
         };
-        let drift = ((b.center - a.center) - carried).to_array().to_vec();
-        (verdict, prediction, [drift, turn_a.to_array().to_vec(), turn_b.to_array().to_vec()])
+        (verdict, prediction)
     }
 
     #[test]
@@ -239,18 +214,18 @@ mod tests {
             let [size, reach_b] = [1.1, 1.5].map(|least| least + random.next());
             let predicted = if place % 7 == 0 { NEVER } else { 1.0 + random.next() };
             let [unbounded, takes_part] = [random.next() > 0.5, random.next() > 0.0].map(f32::from);
-            Track { size, reach_b, predicted, unbounded, has_manifolds: 1.0, takes_part, bodies, then }
+            Track { size, reach_b, predicted, unbounded, takes_part, rest: 0.0, bodies, then }
         };
         // The last group is not full.
         let tracks: Vec<Track> = (0..16 * 500 + 5).map(track).collect();
         let mut seen = [0; 3];
         for set in InstructionSet::each() {
-            let (mut tests, mut motions) = (Vec::new(), vec![Motion::default(); tracks.len()]);
-            let results = Mutex::new((&mut tests, &mut motions[..]));
-            set.run(&ReuseTest { tracks: &tracks, moving: &moving, margins, results }, 0..tracks.len().div_ceil(WIDTH));
+            let mut tests = Vec::new();
+            let test = ReuseTest { tracks: &tracks, moving: &moving, margins, results: Mutex::new(&mut tests) };
+            set.run(&test, 0..tracks.len().div_ceil(WIDTH));
             for (place, track) in tracks.iter().enumerate() {
                 let bodies = track.bodies.map(|body| &moving[body as usize]);
-                let (verdict, prediction, [drift, turn_a, turn_b]) = of_one(track, bodies, margins);
+                let (verdict, prediction) = of_one(track, bodies, margins);
                 let (tested, lane) = (&tests[place / WIDTH], place % WIDTH);
                 let what = format!("{}, pair {place}", set.name());
                 assert_eq!(tested.verdict.0[lane], verdict, "{what}");
@@ -258,10 +233,6 @@ mod tests {
                 let is_awake = bodies.iter().any(|body| body.activity == 2.0);
                 assert_eq!(tested.changes.0[lane] != 0.0, is_awake != (track.takes_part != 0.0), "{what}");
                 seen[verdict as usize] += 1;
-                let is_noted = verdict == REUSED && bodies.iter().any(|body| body.activity > 0.0);
-                let row = |x: &[f32]| Row8(std::array::from_fn(|k| x.get(k).copied().unwrap_or_default()));
-                let noted = Motion::of(&row(&[&turn_a[..], &drift].concat()), &row(&turn_b));
-                assert_eq!(motions[place], if is_noted { noted } else { Motion::default() }, "{what}");
             }
         }
         assert!(seen.iter().all(|&count| count > 300), "{seen:?} reused, moved, lost");

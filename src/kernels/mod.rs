@@ -13,6 +13,7 @@ pub mod joint_system;
 mod kernel_rows;
 pub mod momentum;
 pub mod pair;
+pub mod prepare;
 mod rows;
 
 pub use kernel_rows::KernelRows;

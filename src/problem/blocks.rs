@@ -82,9 +82,7 @@ pub fn lay_out(
         colors,
         blocks,
         bodies,
-        masses,
         inertias,
-        points,
         contacts: rows,
         joints: joint_rows,
         systems,
@@ -102,7 +100,7 @@ pub fn lay_out(
         let substep = if is_heap { Substep::of_heap } else { Substep::new };
         Block { substeps, substep: substep(config, dt / substeps as f32), ..Block::default() }
     }));
-    let jamming = contacts.jamming(world, rows, points, masses);
+    let jamming = contacts.jamming();
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });

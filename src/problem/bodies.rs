@@ -11,7 +11,7 @@ use crate::math::Lane;
 use crate::world::{Body, BodyKind, World};
 
 /// Bodies that one task works on at least.
-const LEAST_BODIES: usize = 256;
+pub(super) const LEAST_BODIES: usize = 256;
 
 /// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
 /// bodies that nothing moves.

@@ -7,7 +7,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::softness::HEAP_STIFFNESS;
-use crate::math::smaller;
+use crate::math::{Lane, smaller};
 
 /// The changes since the last step, for a backend that has the rows of that step.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,25 +56,25 @@ pub struct Preload {
 }
 
 /// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
-const LARGEST_PRELOAD: f32 = 2.0;
+const LARGEST_PRELOAD: f64 = 2.0;
 
 impl Preload {
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The
     /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
     /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
-    pub(crate) fn yielding(&self, share: f32, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
-        let compliance = self.compliance(both_movable, in_heap);
+    #[inline(always)]
+    pub(crate) fn yielding<L: Lane>(&self, share: L, both_movable: L::Mask, in_heap: L::Mask, pressed: L) -> L {
+        let compliance: L = self.compliance(both_movable, in_heap);
         // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
         pressed * (compliance * share)
     }
 
     /// Overlap at rest per impulse of a substep, times the effective mass (s).
-    pub(super) fn compliance(&self, both_movable: bool, in_heap: bool) -> f32 {
-        match (in_heap, both_movable) {
-            (true, _) => self.movable_compliance / HEAP_STIFFNESS,
-            (false, true) => self.movable_compliance,
-            (false, false) => self.fixed_compliance,
-        }
+    #[inline(always)]
+    pub(super) fn compliance<L: Lane>(&self, both_movable: L::Mask, in_heap: L::Mask) -> L {
+        let [movable, fixed] = [self.movable_compliance, self.fixed_compliance].map(|c| L::constant(c.into()));
+        let of_heap = L::constant((self.movable_compliance / HEAP_STIFFNESS).into());
+        L::select(L::select(fixed, movable, both_movable), of_heap, in_heap)
     }
 }
 
@@ -85,10 +85,11 @@ impl Preload {
 /// are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
 ///
 /// In a heap it vanishes: it lifts bodies that friction holds, and heaps that were lifted creep.
-pub(super) fn preloaded(by: &Preload, in_heap: bool, before: f32, sag: f32) -> f32 {
-    let wanted = if in_heap { 0.0 } else { sag };
+#[inline(always)]
+pub(super) fn preloaded<L: Lane>(by: &Preload, in_heap: L::Mask, before: L, sag: L) -> L {
+    let wanted = L::select(sag, L::constant(0.0), in_heap);
     // Where the load ends, the preload ends too.
-    smaller(before + by.share * (wanted - before), LARGEST_PRELOAD * sag)
+    smaller(before + L::constant(by.share.into()) * (wanted - before), L::constant(LARGEST_PRELOAD) * sag)
 }
 
 #[cfg(test)]

@@ -1,14 +1,17 @@
 //! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::StepProblem;
+use super::bodies::LEAST_BODIES;
 use super::carry::{Carry, NO_POINT, Preload, Written};
-use super::effective::{EffectiveMass, InverseMass, LEAST_JAMMING};
+use super::effective::LEAST_JAMMING;
 use super::points_a_slot;
-use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow, Substep};
+use super::prepare::{ComputedRow, PoseRow};
+use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slot, Slots, Write};
-use super::write::{Writer, point_before};
+use super::write::{SlotRows, Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
@@ -25,12 +28,39 @@ pub struct ContactRows {
     pub coloring: Coloring,
     /// Whether every manifold has a row for friction of its own.
     patches: bool,
-    /// Separation of each point when its manifold was computed, [`MAX_POINTS`] a slot (m).
-    computed: Vec<f32>,
+    /// What the manifold of each slot was computed from.
+    computed: Vec<ComputedRow>,
+    /// Where bodies are.
+    poses: Vec<PoseRow>,
+    /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
+    jams: Vec<bool>,
+    /// The classes of bodies that the rows were written for.
+    classes: Vec<u8>,
+    /// What all materials have in common; none where one may have changed.
+    materials: Option<Materials>,
     /// The bodies that lie still and touch nothing that they touched before.
     new_bodies: Vec<bool>,
     /// How the rows follow from those of the step before.
     pub carry: Carry,
+}
+
+/// What the materials of a world have in common.
+#[derive(Clone, Copy, Debug)]
+struct Materials {
+    /// Whether any surface bounces.
+    bounce: bool,
+    /// Whether any has more friction than [`LEAST_JAMMING`].
+    may_jam: bool,
+}
+
+impl Materials {
+    fn of(world: &World) -> Self {
+        let any = |has: fn(&Body) -> bool| world.bodies.iter().any(has);
+        Self {
+            bounce: any(|body| body.material.restitution > 0.0),
+            may_jam: any(|body| body.material.friction > LEAST_JAMMING),
+        }
+    }
 }
 
 impl ContactRows {
@@ -42,6 +72,7 @@ impl ContactRows {
     /// Lets the next step write all rows again.
     pub fn write_again(&mut self) {
         self.slots.write_again();
+        self.materials = None;
     }
 
     /// Gives every manifold that takes part a color; one that has a color keeps it.
@@ -71,7 +102,8 @@ impl ContactRows {
             problem.points = moved(&problem.points, &from, stride);
             problem.impulses = moved(&problem.impulses, &from, stride);
             problem.sags = moved(&problem.sags, &from, 1);
-            self.computed = moved(&self.computed, &from, MAX_POINTS);
+            self.computed = moved(&self.computed, &from, 1);
+            self.jams = moved(&self.jams, &from, 1);
         }
     }
 
@@ -124,19 +156,12 @@ impl ContactRows {
         })
     }
 
-    /// The contacts that take part and jam, ascending: those with a point of [`EffectiveMass::jamming`] above 1.
-    pub fn jamming(&self, world: &World, rows: &[ContactRow], points: &[PointRow], masses: &[MassRow]) -> Vec<u32> {
-        if world.bodies.iter().all(|body| body.material.friction <= LEAST_JAMMING) {
+    /// The contacts that take part and jam, ascending.
+    pub fn jamming(&self) -> Vec<u32> {
+        if self.materials.is_none_or(|materials| !materials.may_jam) {
             return Vec::new();
         }
-        let jams = |&row: &u32| {
-            let row = &rows[row as usize];
-            let inverse = [row.body_a, row.body_b].map(|body| InverseMass::of(&masses[body as usize]));
-            let effective = EffectiveMass { inverse: &inverse, row };
-            let own = &points[row.first_point as usize..][..row.point_count as usize];
-            own.iter().any(|p| effective.jamming(p.r_a.into(), p.r_b.into()) > 1.0)
-        };
-        self.slots.taking_part().filter(jams).collect()
+        self.slots.taking_part().filter(|&row| self.jams[row as usize]).collect()
     }
 
     /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
@@ -181,8 +206,8 @@ impl ContactRows {
         self.lay_out(patches, problem);
         problem.params.point_count = problem.points.len() as u32;
         problem.params.patches = patches.into();
-        self.carry.approach =
-            config.friction_rule() == FrictionRule::Slip || world.bodies.iter().any(|b| b.material.restitution > 0.0);
+        let materials = *self.materials.get_or_insert_with(|| Materials::of(world));
+        self.carry.approach = config.friction_rule() == FrictionRule::Slip || materials.bounce;
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
             movable_compliance: substep.movable.compliance(),
@@ -192,10 +217,33 @@ impl ContactRows {
         };
         self.note_written(detector);
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
-        let Self { slots, carry, patches, computed, .. } = self;
-        let (substep, patches) = (substep.length, *patches);
-        let writer = Writer { world, detector, config, effort, substep, bodies, masses, carry, patches };
-        writer.write(&slots.all, contacts, points, impulses, computed, sags);
+        let Self { slots, carry, patches, computed, poses, jams, classes, .. } = self;
+        let pose = |body: &Body| PoseRow {
+            center: body.center_of_mass().to_array(),
+            pad: 0.0,
+            rotation: body.rotation.to_array(),
+        };
+        world.bodies.par_iter().with_min_len(LEAST_BODIES).map(pose).collect_into_vec(poses);
+        let effort_changes = effort.heaps_change() || *classes != effort.classes();
+        if effort_changes {
+            classes.clear();
+            classes.extend_from_slice(effort.classes());
+        }
+        let writer = Writer {
+            world,
+            detector,
+            config,
+            effort,
+            effort_changes,
+            substep: substep.length,
+            bodies,
+            masses,
+            poses,
+            carry,
+            patches: *patches,
+            may_jam: materials.may_jam,
+        };
+        writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
     }
 
@@ -219,7 +267,8 @@ impl ContactRows {
         problem.sags.resize(count, 0.0);
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
-        self.computed.resize(count * MAX_POINTS, 0.0);
+        self.computed.resize(count, ComputedRow::default());
+        self.jams.resize(count, false);
     }
 
     /// Notes which rows are written again, for a device that has the others.

@@ -11,6 +11,7 @@ mod joint_loads;
 mod joint_systems;
 mod joints;
 mod lent_inertia;
+mod prepare;
 mod rescale;
 mod rows;
 mod slots;

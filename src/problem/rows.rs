@@ -7,6 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use crate::collide::MAX_POINTS;
+use crate::kernels::prepare::tangent_of;
+use crate::math;
 
 /// State of one body that a step changes, 64 B.
 #[repr(C)]
@@ -119,7 +121,8 @@ pub struct ContactRow {
 impl ContactRow {
     /// A row of nothing but a normal and the tangents that belong to it.
     pub fn framed(normal: Vec3) -> Self {
-        Self { normal: normal.to_array(), tangent: normal.any_orthonormal_vector().to_array(), ..Self::default() }
+        let tangent = tangent_of(math::Vec3::<f32>::load(normal.to_array()));
+        Self { normal: normal.to_array(), tangent: tangent.store(), ..Self::default() }
     }
 
     /// The two tangents; together with the normal a right-handed frame.

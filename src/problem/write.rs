@@ -7,16 +7,19 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::carry::{Carry, preloaded};
+use super::carry::Carry;
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
+use super::prepare::{ComputedRow, Over, PoseRow, Prepare, What};
 use super::rescale::{change_compliance, change_share};
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
-use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Motion, Pair};
+use crate::backend::cpu::shared::Shared;
+use crate::backend::cpu::simd::{InstructionSet, WIDTH};
+use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
-use crate::math::{self, reciprocal};
+use crate::math::reciprocal;
 use crate::world::World;
 
 /// The sources of the rows of contacts.
@@ -25,104 +28,179 @@ pub(super) struct Writer<'a> {
     pub detector: &'a Detector,
     pub config: &'a SolverConfig,
     pub effort: &'a Effort,
+    /// Whether a class or a heap is not what the rows of the step before were written for.
+    pub effort_changes: bool,
     /// Length of a substep of class 0 (s).
     pub substep: f32,
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
+    pub poses: &'a [PoseRow],
     /// The coefficients of the preloads, and whether a device computes preloads and impulses.
     pub carry: &'a Carry,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
+    /// Whether a surface has so much friction that contacts may jam.
+    pub may_jam: bool,
 }
 
-/// The rows of one slot.
-struct SlotRows<'a> {
-    contact: &'a mut ContactRow,
-    points: &'a mut [PointRow],
-    impulses: &'a mut [ImpulseRow],
-    /// Separation of each point when its manifold was computed (m).
-    computed: &'a mut [f32],
-    sag: &'a mut f32,
+/// The rows of neighboring slots.
+pub(super) struct SlotRows<'a> {
+    pub contacts: &'a mut [ContactRow],
+    pub points: &'a mut [PointRow],
+    pub impulses: &'a mut [ImpulseRow],
+    pub computed: &'a mut [ComputedRow],
+    pub sags: &'a mut [f32],
+    pub jams: &'a mut [bool],
 }
 
 /// Slots that one task writes.
 const SLOTS_A_TASK: usize = 256;
 
-impl Writer<'_> {
-    /// Writes the rows of all slots, on all threads.
-    pub fn write(
-        &self,
-        slots: &[Slot],
-        contacts: &mut [ContactRow],
-        points: &mut [PointRow],
-        impulses: &mut [ImpulseRow],
-        computed: &mut [f32],
-        sags: &mut [f32],
-    ) {
-        let stride = points_a_slot(self.patches);
-        let points = points.par_chunks_mut(SLOTS_A_TASK * stride).zip(impulses.par_chunks_mut(SLOTS_A_TASK * stride));
-        let computed = computed.par_chunks_mut(SLOTS_A_TASK * MAX_POINTS).zip(sags.par_chunks_mut(SLOTS_A_TASK));
-        let rows = contacts.par_chunks_mut(SLOTS_A_TASK).zip(points).zip(computed);
-        slots.par_chunks(SLOTS_A_TASK).zip(rows).enumerate().for_each(
-            |(chunk, (slots, ((contacts, (points, impulses)), (computed, sags))))| {
-                // Far away in memory: these reads come first, so that none waits for another.
-                let mut motions = [Motion::default(); SLOTS_A_TASK];
-                for (motion, slot) in motions.iter_mut().zip(slots).filter(|(_, slot)| slot.takes_part) {
-                    *motion = *self.detector.motion(slot.world, slot.pair);
-                }
-                let points = points.chunks_mut(stride).zip(impulses.chunks_mut(stride));
-                let rows = contacts.iter_mut().zip(points).zip(computed.chunks_mut(MAX_POINTS).zip(sags));
-                for (i, ((slot, motion), ((contact, (points, impulses)), (computed, sag)))) in
-                    slots.iter().zip(&motions).zip(rows).enumerate()
-                {
-                    contact.first_point = ((chunk * SLOTS_A_TASK + i) * stride) as u32;
-                    self.write_slot(slot, motion, SlotRows { contact, points, impulses, computed, sag });
-                }
-            },
-        );
+/// Some of the slots of a task, ascending.
+struct Chosen {
+    slots: [u32; SLOTS_A_TASK],
+    count: usize,
+}
+
+impl Chosen {
+    fn of(slots: &[Slot], is_wanted: impl Fn(&Slot) -> bool) -> Self {
+        let mut chosen = Self { slots: [0; SLOTS_A_TASK], count: 0 };
+        for (i, slot) in (0..).zip(slots) {
+            chosen.slots[chosen.count] = i;
+            chosen.count += usize::from(is_wanted(slot));
+        }
+        chosen
     }
 
-    fn write_slot(&self, slot: &Slot, motion: &Motion, rows: SlotRows) {
-        let SlotRows { contact, points, impulses, computed, sag } = rows;
-        if slot.write != Write::Separations {
-            let pair = self.detector.pair(slot.world, slot.pair);
-            let manifold = &pair.manifolds[slot.manifold as usize];
-            let before = *contact;
-            self.write_header(contact, slot.write, pair, manifold);
-            self.write_points(contact, manifold, motion, points, computed);
-            if !self.carry.on_device {
-                self.bring_impulses(slot.write, &before, contact, manifold, impulses);
-            }
-        } else if slot.takes_part {
-            self.refresh_points(contact, motion, points, computed);
-        }
-        if slot.takes_part {
-            let share = self.share(contact);
+    fn all(&self) -> &[u32] {
+        &self.slots[..self.count]
+    }
+}
+
+impl Writer<'_> {
+    /// Writes the rows of all slots, on all threads.
+    pub fn write(&self, slots: &[Slot], rows: SlotRows) {
+        let stride = points_a_slot(self.patches);
+        let points = rows.points.par_chunks_mut(SLOTS_A_TASK * stride);
+        let points = points.zip(rows.impulses.par_chunks_mut(SLOTS_A_TASK * stride));
+        let slots_rows = rows.computed.par_chunks_mut(SLOTS_A_TASK).zip(rows.sags.par_chunks_mut(SLOTS_A_TASK));
+        let slots_rows = slots_rows.zip(rows.jams.par_chunks_mut(SLOTS_A_TASK));
+        let rows = rows.contacts.par_chunks_mut(SLOTS_A_TASK).zip(points).zip(slots_rows);
+        slots.par_chunks(SLOTS_A_TASK).zip(rows).enumerate().for_each(|(task, (slots, rows))| {
+            let ((contacts, (points, impulses)), ((computed, sags), jams)) = rows;
+            let rows = SlotRows { contacts, points, impulses, computed, sags, jams };
+            self.write_some(task * SLOTS_A_TASK, slots, rows);
+        });
+    }
+
+    /// Writes the rows of the slots from the number `first` on.
+    fn write_some(&self, first: usize, slots: &[Slot], mut rows: SlotRows) {
+        let stride = points_a_slot(self.patches);
+        let written = Chosen::of(slots, |slot| slot.write != Write::Separations);
+        let begun = Chosen::of(slots, |slot| slot.takes_part);
+        let mut follows = self.effort_changes;
+        for &i in written.all() {
+            let (slot, i) = (&slots[i as usize], i as usize);
+            rows.contacts[i].first_point = ((first + i) * stride) as u32;
+            self.write_slot(slot, i, &mut rows);
+            let contact = &rows.contacts[i];
             let is_new = contact.substep_share == 0.0;
-            if share != contact.substep_share {
-                change_share(contact, share, points, impulses);
-            }
-            let [body_a, body_b] = [contact.body_a, contact.body_b].map(|body| body as usize);
-            let [was, is] = [Effort::was_in_heap, Effort::is_in_heap]
-                .map(|in_heap| in_heap(self.effort, body_a) || in_heap(self.effort, body_b));
-            if was != is && !is_new {
-                let both = self.masses[body_a].inv_mass > 0.0 && self.masses[body_b].inv_mass > 0.0;
-                let [was, is] = [was, is].map(|in_heap| self.carry.preload.compliance(both, in_heap));
-                change_compliance(contact, is * reciprocal(was), points);
+            follows |= slot.takes_part && !is_new && self.share(contact) != contact.substep_share;
+        }
+        let has_two_tangents = matches!(self.config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
+        self.prepare(&mut rows, written.all(), What::Masses { tangents: has_two_tangents, jams: self.may_jam });
+        if self.patches {
+            for &i in written.all() {
+                let contact = &rows.contacts[i as usize];
+                let inverse = [contact.body_a, contact.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
+                let own = &mut rows.points[i as usize * stride..][..stride];
+                let (points, patch) = own.split_at_mut(contact.point_count as usize);
+                patch[0] = patch_of(&EffectiveMass { inverse: &inverse, row: contact }, points);
             }
         }
         // Where the rows are on a device, the kernel begin_contacts does this.
-        if slot.takes_part && !self.carry.on_device {
-            let (preload, load) = self.loaded(contact, points, impulses);
-            (contact.preload, *sag) = (preload, load);
-            let warm_start = self.carry.preload.warm_start != 0;
-            let begun =
-                |i: &ImpulseRow| if warm_start { ImpulseRow { peak: 0.0, ..*i } } else { ImpulseRow::default() };
-            impulses.iter_mut().for_each(|i| *i = begun(i));
+        let loads = !self.carry.on_device;
+        if !follows {
+            for &i in written.all().iter().filter(|&&i| slots[i as usize].takes_part) {
+                rows.contacts[i as usize].substep_share = self.share(&rows.contacts[i as usize]);
+            }
+            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads });
+        } else {
+            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads: false });
+            for &i in begun.all() {
+                let own = i as usize * stride..(i as usize + 1) * stride;
+                let (points, impulses) = (&rows.points[own.clone()], &mut rows.impulses[own]);
+                self.follow_effort(&mut rows.contacts[i as usize], points, impulses);
+            }
+            if loads {
+                self.prepare(&mut rows, begun.all(), What::Begin { separations: false, loads });
+            }
+        }
+        if self.carry.approach {
+            for &i in begun.all() {
+                let contact = &rows.contacts[i as usize];
+                let own = &mut rows.points[i as usize * stride..][..contact.point_count as usize];
+                own.iter_mut().for_each(|point| self.approach(contact, point));
+            }
         }
     }
 
-    fn write_header(&self, row: &mut ContactRow, write: Write, pair: &Pair, manifold: &Manifold) {
+    fn prepare(&self, rows: &mut SlotRows, slots: &[u32], what: What) {
+        let rows = Prepare {
+            stride: points_a_slot(self.patches),
+            masses: self.masses,
+            poses: self.poses,
+            preload: &self.carry.preload,
+            contacts: Shared::new(rows.contacts),
+            points: Shared::new(rows.points),
+            impulses: Shared::new(rows.impulses),
+            computed: rows.computed,
+            sags: Shared::new(rows.sags),
+            jams: Shared::new(rows.jams),
+        };
+        let work = Over { rows: &rows, slots, what };
+        InstructionSet::default().run(&work, 0..slots.len().div_ceil(WIDTH));
+    }
+
+    /// Writes all of a slot that does not follow from numbers of other rows.
+    fn write_slot(&self, slot: &Slot, i: usize, rows: &mut SlotRows) {
+        let stride = points_a_slot(self.patches);
+        let contact = &mut rows.contacts[i];
+        let pair = self.detector.pair(slot.world, slot.pair);
+        let manifold = &pair.manifolds[slot.manifold as usize];
+        let before = *contact;
+        self.write_header(contact, slot, pair, manifold);
+        rows.computed[i] = self
+            .detector
+            .computed_at(slot.world, slot.pair)
+            .map_or_else(Default::default, |placed| ComputedRow::of(placed, manifold));
+        for (point, p) in rows.points[i * stride..].iter_mut().zip(manifold.points()) {
+            *point = PointRow { r_a: p.r_a.to_array(), r_b: p.r_b.to_array(), ..PointRow::default() };
+        }
+        if !self.carry.on_device {
+            let impulses = &mut rows.impulses[i * stride..(i + 1) * stride];
+            self.bring_impulses(slot.write, &before, contact, manifold, impulses);
+        }
+    }
+
+    /// Brings a contact to the substeps and springs of its island.
+    fn follow_effort(&self, contact: &mut ContactRow, points: &[PointRow], impulses: &mut [ImpulseRow]) {
+        let share = self.share(contact);
+        let is_new = contact.substep_share == 0.0;
+        if share != contact.substep_share {
+            change_share(contact, share, points, impulses);
+        }
+        let [body_a, body_b] = [contact.body_a, contact.body_b].map(|body| body as usize);
+        let [was, is] = [Effort::was_in_heap, Effort::is_in_heap]
+            .map(|in_heap| in_heap(self.effort, body_a) || in_heap(self.effort, body_b));
+        if was != is && !is_new {
+            let both = self.masses[body_a].inv_mass > 0.0 && self.masses[body_b].inv_mass > 0.0;
+            let [was, is] = [was, is].map(|in_heap| self.carry.preload.compliance::<f32>(both, in_heap));
+            change_compliance(contact, is * reciprocal(was), points);
+        }
+    }
+
+    fn write_header(&self, row: &mut ContactRow, slot: &Slot, pair: &Pair, manifold: &Manifold) {
         let [a, b] = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
         let material = a.material.combine(b.material);
         *row = ContactRow {
@@ -134,45 +212,10 @@ impl Writer<'_> {
             point_count: manifold.points().len() as u32,
             radius_a: manifold.radius_a,
             radius_b: manifold.radius_b,
-            preload: if write == Write::New { 0.0 } else { row.preload },
-            substep_share: if write == Write::New { 0.0 } else { row.substep_share },
+            preload: if slot.write == Write::New { 0.0 } else { row.preload },
+            substep_share: if slot.write == Write::New { 0.0 } else { row.substep_share },
             ..ContactRow::framed(manifold.normal)
         };
-    }
-
-    fn write_points(
-        &self,
-        row: &ContactRow,
-        manifold: &Manifold,
-        motion: &Motion,
-        points: &mut [PointRow],
-        computed: &mut [f32],
-    ) {
-        let inverse = [row.body_a, row.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
-        let effective = EffectiveMass { inverse: &inverse, row };
-        for ((p, point), computed) in manifold.points().iter().zip(&mut *points).zip(&mut *computed) {
-            let tangent_mass = match self.config.friction_rule() {
-                FrictionRule::Box | FrictionRule::Disc => effective.tangent(p.r_a, p.r_b),
-                FrictionRule::None | FrictionRule::Slip => 0.0,
-            };
-            // Normal impulse and friction in turn swing about their solution where friction lifts more than the impulse does. Shorter
-            // steps end that.
-            let jamming = effective.jamming(p.r_a, p.r_b);
-            let normal_step = if jamming > 1.0 { 1.0 / (1.0 + jamming) } else { 1.0 };
-            *computed = p.separation;
-            *point = PointRow {
-                r_a: p.r_a.to_array(),
-                r_b: p.r_b.to_array(),
-                normal_mass: effective.normal(p.r_a, p.r_b) * normal_step,
-                tangent_mass,
-                ..PointRow::default()
-            };
-        }
-        self.refresh_points(row, motion, points, computed);
-        if self.patches {
-            let (points, patch) = points.split_at_mut(manifold.points().len());
-            patch[0] = patch_of(&effective, points);
-        }
     }
 
     /// Brings the impulses of a slot to the points that its manifold has now, and to its tangents. Double of the function of the same
@@ -200,40 +243,15 @@ impl Writer<'_> {
         }
     }
 
-    /// Brings the separations of a manifold to where the bodies are, from those that were computed.
-    fn refresh_points(&self, row: &ContactRow, motion: &Motion, points: &mut [PointRow], computed: &[f32]) {
-        let movement = motion.along(row.normal, [row.radius_a, row.radius_b]);
-        for (point, computed) in points[..row.point_count as usize].iter_mut().zip(computed) {
-            point.separation = computed + movement.between(math::Vec3::load(point.r_a), math::Vec3::load(point.r_b));
-            self.approach(row, point);
-        }
-    }
-
     /// The length of a contact's substeps over that of class 0.
     fn share(&self, row: &ContactRow) -> f32 {
         let is_movable = |body: u32| self.masses[body as usize].inv_mass > 0.0;
         self.effort.share(if is_movable(row.body_a) { row.body_a } else { row.body_b } as usize)
     }
 
-    /// The preload of a contact, and how deep its bodies sag, by the impulses that it bore in the step before.
-    fn loaded(&self, row: &ContactRow, points: &[PointRow], impulses: &[ImpulseRow]) -> (f32, f32) {
-        let [a, b] = [row.body_a, row.body_b].map(|body| self.masses[body as usize].inv_mass);
-        let (mut pressed, mut mass) = (0.0, 0.0);
-        for (point, impulse) in points[..row.point_count as usize].iter().zip(impulses) {
-            pressed += impulse.normal;
-            mass += point.normal_mass;
-        }
-        let in_heap = [row.body_a, row.body_b].into_iter().any(|body| self.masses[body as usize].heap > 0.0);
-        let yielding = self.carry.preload.yielding(row.substep_share, a > 0.0 && b > 0.0, in_heap, pressed);
-        (preloaded(&self.carry.preload, in_heap, row.preload, yielding * reciprocal(mass)), yielding * (a + b))
-    }
-
     /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction
     /// of the slip where friction has one only.
     fn approach(&self, row: &ContactRow, point: &mut PointRow) {
-        if !self.carry.approach {
-            return;
-        }
         let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
         let [a, b] = [row.body_a, row.body_b].map(|i| &self.bodies[i as usize]);
         let masses = [row.body_a, row.body_b].map(|i| &self.masses[i as usize]);

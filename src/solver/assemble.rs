@@ -5,9 +5,9 @@ use glam::{DMat3, DVec3};
 use super::{Order, Sequence};
 use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
 use crate::error::{Result, input};
+use crate::kernels::prepare::tangent_mass;
 use crate::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
-use crate::problem::effective::tangent_mass;
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem, Substep};
 
 /// A contact problem as a step without time.
@@ -107,7 +107,7 @@ fn point(operator: &Operator, index: usize, hand: f64) -> Point<f64> {
         r_b: wide(contact.r_b),
         separation: contact.offset.x,
         normal_mass: 1.0 / w.x_axis.x,
-        tangent_mass: tangent_mass([w.y_axis.y, w.z_axis.z, w.y_axis.z], f64::sqrt),
+        tangent_mass: tangent_mass(w.y_axis.y, w.z_axis.z, w.y_axis.z),
         approach_velocity: 0.0,
         slip_1: contact.offset.y,
         slip_2: contact.offset.z * hand,

@@ -11,7 +11,7 @@ mod joint_systems;
 mod lane_layout;
 mod partition;
 mod reference;
-mod shared;
+pub(crate) mod shared;
 mod shared_step;
 pub(crate) mod simd;
 mod sweep;

@@ -1,0 +1,160 @@
+//! How the rows of a contact follow from its manifold and from the masses and poses of its bodies. The functions of effective masses are the
+//! doubles of `shaders/lib/prepare.wgsl`; separations are computed by the processor alone.
+
+use super::rows::Mass;
+use crate::math::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
+
+/// Friction up to which no solid of even density jams. A point at the lever r from the center of such a solid has m r²/I <= 15, and friction
+/// below 2/√14 jams no point with that (docs/derivation.md, section 6).
+pub const LEAST_JAMMING: f32 = 0.53;
+
+/// One over x, to half an ulp for most x; 0 where x is not positive.
+#[inline(always)]
+pub fn inverse_or_zero<L: Lane>(x: L) -> L {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let is_positive = x.gt(zero);
+    let x = L::select(one, x, is_positive);
+    let y = reciprocal(x);
+    // One step of Newton's method more: powers of two are exact.
+    L::select(zero, y + y * (one - x * y), is_positive)
+}
+
+/// The square root of x; 0 where x is below 1e-30.
+#[inline(always)]
+pub fn square_root<L: Lane>(x: L) -> L {
+    let is_normal = x.gt(L::constant(1e-30));
+    let x = L::select(L::constant(1.0), x, is_normal);
+    L::select(L::constant(0.0), x * x.inverse_sqrt(), is_normal)
+}
+
+/// A unit vector across a unit normal (Duff et al., "Building an orthonormal basis, revisited", 2017).
+#[inline(always)]
+pub fn tangent_of<L: Lane>(n: Vec3<L>) -> Vec3<L> {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let sign = L::select(one, -one, zero.gt(n.z));
+    let a = -(sign * inverse_or_zero(one + sign * n.z));
+    vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y)
+}
+
+/// Share of one body in the entry (d, e) of G M⁻¹ Gᵀ at the arm r.
+#[inline(always)]
+fn entry_of<L: Lane>(mass: &Mass<L>, r: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
+    mass.inv_mass * dot3(d, e) + dot3(cross3(r, d), mass.inv_inertia.times(cross3(r, e)))
+}
+
+/// The entry (d, e) of G M⁻¹ Gᵀ at the arms of a and b.
+#[inline(always)]
+pub fn entry<L: Lane>(a: &Mass<L>, b: &Mass<L>, r_a: Vec3<L>, r_b: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
+    entry_of(a, r_a, d, e) + entry_of(b, r_b, d, e)
+}
+
+/// One over the largest eigenvalue of the tangential block with the entries s_11, s_22 and s_12; 0 for no block.
+#[inline(always)]
+pub fn tangent_mass<L: Lane>(s_11: L, s_22: L, s_12: L) -> L {
+    // Squares of a light body's entries would leave single precision.
+    let scale = (s_11 + s_22).inverse_power();
+    let (s_11, s_22, s_12) = (s_11 * scale, s_22 * scale, s_12 * scale);
+    let apart = s_11 - s_22;
+    let root = square_root(apart * apart + L::constant(4.0) * s_12 * s_12);
+    scale * inverse_or_zero(L::constant(0.5) * (s_11 + s_22 + root))
+}
+
+/// The largest change of the normal velocity by friction, for a normal impulse of 1, over that by the impulse itself. Where the ratio is above 1,
+/// friction that slides can press the surfaces together faster than the normal impulse parts them (Painlevé). The entries are those of the
+/// normal, and of the normal with each tangent.
+#[inline(always)]
+pub fn jamming<L: Lane>(friction: L, parted: L, pressed_1: L, pressed_2: L) -> L {
+    let scale = parted.inverse_power();
+    let (pressed_1, pressed_2) = (pressed_1 * scale, pressed_2 * scale);
+    let pressed = square_root(pressed_1 * pressed_1 + pressed_2 * pressed_2);
+    let ratio = friction * pressed * inverse_or_zero(parted * scale);
+    L::select(L::constant(0.0), ratio, friction.gt(L::constant(LEAST_JAMMING.into())))
+}
+
+/// The share of a normal step that is taken. Normal impulse and friction in turn swing about their solution where friction lifts more than the
+/// impulse does. Shorter steps end that.
+#[inline(always)]
+pub fn normal_step<L: Lane>(jamming: L) -> L {
+    let one = L::constant(1.0);
+    L::select(one, inverse_or_zero(one + jamming), jamming.gt(one))
+}
+
+/// The normal and the tangents of a manifold, and its friction.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Frame<L> {
+    /// Unit normal from a to b.
+    pub normal: Vec3<L>,
+    /// First unit tangent.
+    pub tangent: Vec3<L>,
+    /// Coulomb coefficient.
+    pub friction: L,
+}
+
+/// The effective masses of a contact point, and how far it jams.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointMasses<L> {
+    /// Along the normal, shortened where the point jams.
+    pub normal: L,
+    /// Of the tangential step.
+    pub tangent: L,
+    /// [`jamming`].
+    pub jamming: L,
+}
+
+/// The effective masses of a point at the arms `r_a` and `r_b`. `tangents`: friction has two directions. `jams`: a surface has friction above
+/// [`LEAST_JAMMING`].
+#[inline(always)]
+pub fn point_masses<L: Lane>(
+    tangents: bool,
+    jams: bool,
+    frame: &Frame<L>,
+    a: &Mass<L>,
+    b: &Mass<L>,
+    r_a: Vec3<L>,
+    r_b: Vec3<L>,
+) -> PointMasses<L> {
+    let (n, t_1) = (frame.normal, frame.tangent);
+    let t_2 = cross3(n, t_1);
+    let parted = entry(a, b, r_a, r_b, n, n);
+    let mut masses = PointMasses { normal: inverse_or_zero(parted), ..PointMasses::default() };
+    if jams {
+        let pressed_1 = entry(a, b, r_a, r_b, n, t_1);
+        masses.jamming = jamming(frame.friction, parted, pressed_1, entry(a, b, r_a, r_b, n, t_2));
+        masses.normal = masses.normal * normal_step(masses.jamming);
+    }
+    if tangents {
+        let (s_11, s_22) = (entry(a, b, r_a, r_b, t_1, t_1), entry(a, b, r_a, r_b, t_2, t_2));
+        masses.tangent = tangent_mass(s_11, s_22, entry(a, b, r_a, r_b, t_1, t_2));
+    }
+    masses
+}
+
+/// Where a body is: its center of mass, and its rotation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pose<L> {
+    /// Center of mass.
+    pub center: Vec3<L>,
+    /// Rotation.
+    pub rotation: Quat<L>,
+}
+
+/// The rotation from `then` to `now`. That of a body that did not turn moves no arm, to the bit.
+#[inline(always)]
+pub fn turn_since<L: Lane>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
+    let axis = (now.axis * then.w - then.axis * now.w) - cross3(now.axis, then.axis);
+    Quat { axis, w: now.w * then.w + dot3(now.axis, then.axis) }
+}
+
+/// How the bodies at the poses `a` and `b` moved along a normal since b was at `apart` from a, and they had the rotations `then`.
+#[inline(always)]
+pub fn movement_since<L: Lane>(
+    normal: Vec3<L>,
+    [radius_a, radius_b]: [L; 2],
+    [a, b]: [Pose<L>; 2],
+    apart: Vec3<L>,
+    then: [Quat<L>; 2],
+) -> NormalMovement<L> {
+    let [turn_a, turn_b] = [turn_since(a.rotation, then[0]), turn_since(b.rotation, then[1])];
+    let movement = NormalMovement::new(normal, (b.center - a.center) - apart, turn_a, turn_b);
+    movement.round(normal, radius_a, radius_b)
+}
