@@ -11,6 +11,7 @@ mod growth;
 mod limits;
 mod machine;
 mod memory;
+mod rates;
 mod worlds;
 
 pub use baseline::{Change, compare_with};
