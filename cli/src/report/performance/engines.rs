@@ -35,10 +35,10 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
     let mut text = String::from("| scene, steps | engine |");
     for threads in &all_threads {
         let plural = if *threads == 1 { "thread" } else { "threads" };
-        let _ = write!(text, " {threads} {plural}: ms in each third | to the best other | worst | first |");
+        let _ = write!(text, " {threads} {plural}: ms in each third | to the best other | worst, first |");
     }
     let _ = write!(text, " mean overlap mm | deepest mm | rms mm/s | in place |\n|---|---|");
-    let _ = writeln!(text, "{}--:|--:|--:|--:|", "--:|--:|--:|--:|".repeat(all_threads.len()));
+    let _ = writeln!(text, "{}--:|--:|--:|--:|", "--:|--:|--:|".repeat(all_threads.len()));
     for scene in distinct(rows.iter().map(|r| &*r.scene)) {
         let of_scene = || rows.iter().filter(|r| r.scene == scene);
         let steps = of_scene().map(|r| r.to).max().unwrap_or(0);
@@ -49,10 +49,11 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
                 let own = thirds(rows, scene, threads, setting);
                 let is_own = own.first().is_some_and(|r| r.engine == OWN);
                 let to_best = cell(own.iter().filter(|_| is_own).filter_map(|r| r.to_best));
-                let worst = own.iter().map(|r| r.ms_worst / r.ms).reduce(f64::max).map_or_else(String::new, number);
-                let first = own.first().map_or_else(String::new, |r| number(r.ms_first / r.ms));
+                let worst = own.iter().map(|r| r.ms_worst / r.ms).reduce(f64::max);
+                let first = own.first().map(|r| r.ms_first / r.ms);
+                let slow = cell(worst.into_iter().chain(first));
                 let ms = cell(own.iter().map(|r| r.ms));
-                let _ = write!(text, " {ms} | {to_best} | {worst} | {first} |");
+                let _ = write!(text, " {ms} | {to_best} | {slow} |");
             }
             // Errors of the first number of threads.
             let own = thirds(rows, scene, all_threads[0], setting);

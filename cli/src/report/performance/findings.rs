@@ -39,8 +39,11 @@ fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
 fn beside(rows: &[WindowRow]) -> String {
     let own = || rows.iter().filter(|r| r.engine == OWN);
     let times = distinct(own().map(|r| r.threads)).into_iter().map(|threads| {
-        let ratios = own().filter(move |r| r.threads == threads).filter_map(|r| r.to_best);
-        format!("{} ({})", range(ratios), on(threads))
+        let ratios = || own().filter(move |r| r.threads == threads).filter_map(|r| Some((r.to_best?, r)));
+        let most = ratios().max_by(|a, b| a.0.total_cmp(&b.0));
+        let of_most =
+            most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
+        format!("{} ({}{of_most})", range(ratios().map(|r| r.0)), on(threads))
     });
     // Of the overlap of the other engine that has least, third by third.
     let to_least = |mine: &WindowRow| {
