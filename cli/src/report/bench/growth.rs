@@ -111,4 +111,14 @@ mod tests {
             assert!((500.0..50_000.0).contains(&bytes), "{bytes}");
         }
     }
+
+    #[test]
+    fn an_island_of_class_two_takes_four_times_the_sweeps() {
+        let config = SolverConfig::default();
+        let mut stats = StepStats::default();
+        assert_eq!(passes(&config, &stats), 17.0);
+        (stats.efforts[0], stats.efforts[2]) = (30, 10);
+        // Thirty boxes take 16 sweeps, ten take 64.
+        assert_eq!(passes(&config, &stats), 1.0 + (30.0 * 16.0 + 10.0 * 64.0) / 40.0);
+    }
 }
