@@ -234,7 +234,8 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
     let falling =
         FallingRow { bodies: 9, threads: 1, from: 1, to: 100, detect: 3.21, ms: 9.0, ..FallingRow::default() };
     write("falling.csv", files::csv(&[falling]).unwrap());
-    let growth = |boxes, ns| GrowthRow {
+    let growth = |boxes: usize, ns| GrowthRow {
+        scene: boxes.to_string(),
         boxes,
         threads: 1,
         ns,
@@ -265,7 +266,7 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
         "takes at most 1.70 (pile:n=9, ",
         "at most 2.90 (pile:n=9, ",
         "detection 3.21",
-        "36.4 ns, 1.82 times the smallest; 3456 bytes a box",
+        "36.4 ns (1.82) with one thread; 3456 bytes a box",
         "63 % of a triad",
         "46 % of a peak",
         "190123",

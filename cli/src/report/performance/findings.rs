@@ -17,7 +17,7 @@ pub(super) fn findings(rows: &Rows) -> String {
         ("Sweeps and the limits of the machine", "limits.csv", limits(&rows.limits)),
         ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
     ]
-    .map(|(title, files, text)| format!("\n## {title}\n\n{text} Rows: {}.\n", links(files)))
+    .map(|(title, files, text)| format!("\n## {title}\n\n{text}\n\nRows: {}.\n", links(files)))
     .concat()
 }
 
@@ -75,81 +75,81 @@ fn stalls(rows: &[WindowRow]) -> String {
     )
 }
 
+/// The thirds of the largest scene on the least number of threads.
 fn stages(rows: &[FallingRow]) -> String {
-    let most = rows.iter().map(|r| r.bodies).max().unwrap_or(0);
-    let of_scene = rows.iter().filter(|r| r.bodies == most);
-    let thirds = of_scene.map(|r| {
-        let [detect, color, prepare, run, store] = [r.detect, r.color, r.prepare, r.run, r.store].map(number);
-        format!(
-            "* {}, steps {} to {}, {}: {} ms; detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} pairs \
-             computed anew",
-            r.scene,
-            r.from,
-            r.to,
-            on(r.threads),
-            number(r.ms),
-            r.computed,
-            r.pairs
-        )
-    });
-    format!("Medians of the largest falling scene:\n\n{}\n\n", thirds.collect::<Vec<_>>().join("\n"))
+    let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
+    let Some(most) = rows.iter().map(key).max() else { return String::new() };
+    let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
+    let mut text = format!("Medians of {}, {}, in ms:\n\n", shown[0].scene, on(shown[0].threads));
+    for r in shown {
+        let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
+        let _ = writeln!(
+            text,
+            "* steps {} to {}: {ms}, of it detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} \
+             pairs computed anew, {} manifolds",
+            r.from, r.to, r.computed, r.pairs, r.manifolds
+        );
+    }
+    text.trim_end().to_owned()
 }
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The least time of the stage `run` for a manifold and a pass over all contacts:\n\n",
+        "A plane pyramid is one island. The least time of the stage `run` for a manifold and a pass over all contacts, relative to the \
+         smallest island in brackets, and bytes of the whole process at its peak:\n\n",
     );
-    for row in rows {
-        let memory = row.bytes_a_box.map_or_else(String::new, |bytes| format!("; {bytes:.0} bytes a box"));
+    for scene in distinct(rows.iter().map(|r| &r.scene)) {
+        let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
+        let times = own.iter().map(|r| format!("{} ns ({}) with {}", number(r.ns), number(r.growth), on(r.threads)));
+        let memory = own[0].bytes_a_box.map_or_else(String::new, |bytes| format!("; {bytes:.0} bytes a box"));
+        let [ms, detect, rows, run] = [own[0].ms, own[0].detect, own[0].prepare, own[0].run].map(number);
         let _ = writeln!(
             text,
-            "* {} boxes, {}: {} ns, {} times the smallest{memory}; a step {} ms, of it detection {}, rows {}, sweeps {}",
-            row.boxes,
-            on(row.threads),
-            number(row.ns),
-            number(row.growth),
-            number(row.ms),
-            number(row.detect),
-            number(row.prepare),
-            number(row.run)
+            "* {} boxes: {}{memory}; a step with {} takes {ms} ms, of it detection {detect}, rows {rows}, sweeps {run}",
+            own[0].boxes,
+            times.collect::<Vec<_>>().join(", "),
+            on(own[0].threads)
         );
     }
-    text + "\nThe bytes are of the whole process at its peak."
+    text.trim_end().to_owned()
 }
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = String::from(
         "A sweep over one point with friction takes 299.5 operations on single numbers, counted by running the kernel over a number type \
-         that counts. Bytes are those that the lanes read and write, each body as often as a contact names it. The triad is a = b + s c over \
-         as many bytes as the lanes hold; the peak is that of multiplications and additions on registers alone:\n\n",
+         that counts. Bytes are those that the lanes read and write, and in brackets those of the kernels over plain rows, each body as often \
+         as a contact names it; bodies that come from a cache take the rate beyond 100 % of the triad. The triad is a = b + s c over as \
+         many bytes as the lanes hold; the peak is that of multiplications and additions on registers alone:\n\n",
     );
-    for row in rows {
+    for r in rows {
         let _ = writeln!(
             text,
-            "* {}, {}, {} MiB of rows and bodies: {} ns and {:.0} bytes a manifold ({:.0} of the kernels over plain rows), {} million \
-             points a second; {:.0} % of a triad of {} GB/s, {:.0} % of a peak of {} G/s",
-            row.scene,
-            on(row.threads),
-            number(row.held as f64 / f64::from(1 << 20)),
-            number(row.ns),
-            row.lane_bytes,
-            row.kernel_bytes,
-            number(row.sweeps * 1e-6),
-            100.0 * row.of_triad,
-            number(row.triad * 1e-9),
-            100.0 * row.of_peak,
-            number(row.peak * 1e-9)
+            "* {} ({} MiB), {}: {} ns and {:.0} ({:.0}) bytes a manifold, {} million points a second: {:.0} % of a triad of {} GB/s, \
+             {:.0} % of a peak of {} G/s",
+            r.scene,
+            number(r.held as f64 / f64::from(1 << 20)),
+            on(r.threads),
+            number(r.ns),
+            r.lane_bytes,
+            r.kernel_bytes,
+            number(r.sweeps * 1e-6),
+            100.0 * r.of_triad,
+            number(r.triad * 1e-9),
+            100.0 * r.of_peak,
+            number(r.peak * 1e-9)
         );
     }
-    text + "\nA share of the triad above 100 % means that bodies come from a cache more than once."
+    text.trim_end().to_owned()
 }
 
 fn worlds(rows: &[WorldsRow]) -> String {
-    let mut text = String::from("Steps of one world in a second, all worlds at rest:\n\n");
+    let mut text = String::from(
+        "Steps of one world in a second, all worlds at rest; in brackets the share of the best number of worlds:\n\n",
+    );
     for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
         let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
         let list = own.map(|r| format!("{:.0} ({}) of {}", r.per_second, number(r.of_best), r.worlds));
         let _ = writeln!(text, "* {}, {}: {} worlds", key.0, on(key.1), list.collect::<Vec<_>>().join(", "));
     }
-    text + "\nIn brackets is the share of the best number of worlds."
+    text.trim_end().to_owned()
 }
