@@ -74,6 +74,17 @@ pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
     writer.into_inner().map_err(|e| Error::input(format!("rows as CSV: {e}")))
 }
 
+/// The rows of a CSV file.
+pub fn rows<R: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<R>> {
+    let bytes = std::fs::read(path).map_err(Error::file(path))?;
+    let parsed: std::result::Result<Vec<R>, _> = csv::Reader::from_reader(&bytes[..]).deserialize().collect();
+    parsed.map_err(|e| {
+        let line = e.position().map_or(1, csv::Position::line);
+        let path = path.display();
+        Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
+    })
+}
+
 pub fn discard_drafts() {
     drafts().drain(..).for_each(|draft| discard(&draft));
 }

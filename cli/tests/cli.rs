@@ -557,6 +557,29 @@ fn a_bench_is_printed_in_three_forms_and_marks_rows_that_are_slower_than_the_bas
     assert!(text(&refused.stderr).contains("not what `drystone bench --json` prints"), "{}", text(&refused.stderr));
 }
 
+#[test]
+fn every_measurement_of_a_bench_is_printed_in_three_forms() {
+    let folder = Folder::new();
+    for (arguments, rows, column) in [
+        ("bench tower:n=2 pile:n=4 --falling --steps 30", 6, "ms_worst"),
+        ("bench pyramid:base=4 pyramid:base=5 --growth", 2, "growth"),
+        ("bench tower:n=2 --worlds --quick", 3, "of_best"),
+        ("bench pyramid:base=4 --limits --turns 1", 1, "of_triad"),
+    ] {
+        let arguments = format!("{arguments} --threads 1");
+        let measured = folder.json(&format!("{arguments} --json"));
+        let found = measured["rows"].as_array().expect("rows");
+        assert!(found.len() == rows && found.iter().all(|r| r[column].as_f64() > Some(0.0)), "{measured}");
+        assert!(measured["machine"]["cores"].as_u64() > Some(0));
+        let csv = folder.output(&format!("{arguments} --csv"));
+        assert!(csv.lines().count() == rows + 1 && csv.lines().next().is_some_and(|l| l.contains(column)), "{csv}");
+        let table = folder.output(&arguments);
+        assert!(table.lines().count() == rows + 2 && table.contains(column), "{table}");
+    }
+    let both = folder.run(&["bench", "--growth", "--limits"]);
+    assert!(both.status.code() == Some(2) && text(&both.stderr).contains("cannot be used with"), "{both:?}");
+}
+
 /// The number of threads of a run.
 #[cfg(target_os = "linux")]
 fn threads_of(arguments: &[&str]) -> usize {

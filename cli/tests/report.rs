@@ -7,9 +7,12 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use drystone::{Error, Result, Scene, SolverConfig, World};
+use drystone_cli::files;
+use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
 use drystone_cli::report::comparison::{
-    Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, scene, scenes as all,
+    Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all,
 };
+use drystone_cli::report::performance;
 
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
@@ -194,4 +197,93 @@ fn a_page_is_drawn_of_any_numbers() {
             assert!(length < 1_000_000, "{name} = {number}: {length} bytes");
         }
     }
+}
+
+/// The figures of a page of performance are those of the rows beside it, and change with them.
+#[test]
+fn a_page_of_performance_has_the_figures_of_its_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = folder.path().join("performance");
+    std::fs::create_dir(&rows).unwrap();
+    let engines = |name: &str, threads: usize, steps: usize, ms: f64| {
+        let row = |(engine, third): (&str, usize)| WindowRow {
+            scene: "pile:n=9".into(),
+            run: threads.to_string(),
+            machine: "a machine".into(),
+            commit: "c0ffee".into(),
+            threads,
+            bodies: 9,
+            engine: engine.into(),
+            setting: format!("{engine} cpu 8x1"),
+            from: third * steps / 3 + 1,
+            to: (third + 1) * steps / 3,
+            ms: ms * (third + 1) as f64,
+            ms_worst: 1.7 * ms * (third + 1) as f64,
+            ms_first: 2.9 * ms,
+            to_best: Some(if engine == "drystone" { 0.411 + 0.01 * third as f64 } else { 1.3 }),
+            penetration_mean: if engine == "drystone" { 1e-4 } else { 2e-3 },
+            ..WindowRow::default()
+        };
+        let all: Vec<_> =
+            ["drystone", "other"].into_iter().flat_map(|e| (0..3).map(move |k| (e, k))).map(row).collect();
+        files::write(&rows.join(name), &files::csv(&all).unwrap()).unwrap();
+    };
+    let write = |name: &str, bytes: Vec<u8>| files::write(&rows.join(name), &bytes).unwrap();
+    engines("engines-1.csv", 1, 300, 7.77);
+    engines("engines-2.csv", 2, 300, 4.44);
+    let falling =
+        FallingRow { bodies: 9, threads: 1, from: 1, to: 100, detect: 3.21, ms: 9.0, ..FallingRow::default() };
+    write("falling.csv", files::csv(&[falling]).unwrap());
+    let growth = |boxes: usize, ns| GrowthRow {
+        scene: boxes.to_string(),
+        boxes,
+        threads: 1,
+        ns,
+        growth: ns / 20.0,
+        bytes_a_box: Some(3456.0),
+        ..GrowthRow::default()
+    };
+    write("growth.csv", files::csv(&[growth(1000, 20.0), growth(100_000, 36.4)]).unwrap());
+    let worlds =
+        WorldsRow { scene: "tower".into(), threads: 1, worlds: 16, per_second: 190_123.0, ..WorldsRow::default() };
+    write("worlds.csv", files::csv(&[worlds]).unwrap());
+    // One file is missing.
+    let message = performance(folder.path()).unwrap_err().to_string();
+    assert!(message.contains("limits.csv") && message.lines().count() == 1, "{message}");
+    let limits = LimitRow { threads: 1, of_triad: 0.63, of_peak: 0.46, ..LimitRow::default() };
+    write("limits.csv", files::csv(&[limits]).unwrap());
+
+    let page = || {
+        performance(folder.path()).unwrap();
+        std::fs::read_to_string(folder.path().join("performance.md")).unwrap()
+    };
+    let text = page();
+    for figure in [
+        "| pile:n=9, 300 | drystone cpu 8x1 | 7.77, 15.5, 23.3 | 0.411, 0.421, 0.431 | 1.70, 2.90 | 4.44, 8.88, 13.3 |",
+        "|  | other cpu 8x1 | 7.77, 15.5, 23.3 |  | 1.70, 2.90 |",
+        "needs 0.411 to 0.431 (one thread, most in pile:n=9, steps 201 to 300) and 0.411 to 0.431 (2 threads, ",
+        "at most 0.0500 of the least mean overlap",
+        "takes at most 1.70 (pile:n=9, ",
+        "at most 2.90 (pile:n=9, ",
+        "detection 3.21",
+        "36.4 ns (1.82) with one thread; 3456 bytes a box",
+        "63 % of a triad",
+        "46 % of a peak",
+        "190123",
+        "Machine: a machine. Commit c0ffee",
+        "Tried and left out",
+    ] {
+        assert!(text.contains(figure), "{figure} is missing:\n{text}");
+    }
+    assert!(!text.contains("short run"));
+    let picture = std::fs::read_to_string(rows.join("engines.svg")).unwrap();
+    assert!(picture.contains("pile:n=9, threads: 1") && picture.contains("other cpu 8x1"), "{picture}");
+
+    // Rows of a short run are marked, and a file without rows is refused.
+    engines("engines-1.csv", 1, 60, 7.77);
+    engines("engines-2.csv", 2, 60, 4.44);
+    assert!(page().contains("**This is a short run of 60 steps"));
+    write("growth.csv", Vec::new());
+    let message = performance(folder.path()).unwrap_err().to_string();
+    assert!(message.contains("growth.csv: no rows"), "{message}");
 }

@@ -14,8 +14,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs scenes with drystone, Rapier, Box3D and PhysX, each at its defaults and at the settings asked for.
 ///
-/// They step in turns. Time is the median over blocks of 10 steps, in brackets its quartiles; ratio is that to the first row in
-/// the same blocks. Times and overlaps are of the second half of a run.
+/// They step in turns of 10 steps. The first table has the thirds of a run: the median and the worst time of a step, the time relative
+/// to the fastest other engine in the same turns, and errors at the end of the third. The first step of a run has a column of its own.
+/// The second table has the second half: medians over the turns, in brackets the quartiles, and the ratio to the first row.
 #[derive(Parser)]
 #[command(max_term_width = 110, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
@@ -42,9 +43,12 @@ struct Args {
     /// Steps; a scene says how many if this does not.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
-    /// Write all rows as CSV.
+    /// Write the rows of the second half as CSV.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the rows of the thirds as CSV, as docs/performance.md is made of.
+    #[arg(long, value_name = "FILE")]
+    thirds: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -114,36 +118,39 @@ impl Args {
             bar.set_message(scene.name.clone());
             let rows = measure(scene, &mut contenders, &origin, &mut || bar.inc(1))?;
             bar.finish_and_clear();
-            print_table(scene, &rows);
+            print_tables(scene, &rows);
             all.extend(rows);
         }
-        match &self.csv {
-            Some(path) => files::write(path, &files::csv(&all)?),
-            None => Ok(()),
+        if let Some(path) = &self.thirds {
+            let thirds: Vec<_> = all.iter().flat_map(|row| &row.windows).collect();
+            files::write(path, &files::csv(&thirds)?)?;
         }
+        self.csv.as_ref().map_or(Ok(()), |path| files::write(path, &files::csv(&all)?))
     }
 }
 
-fn print_table(scene: &Scene, rows: &[Row]) {
+fn mm(x: f64) -> String {
+    format!("{:.3}", x * 1e3)
+}
+
+fn print_tables(scene: &Scene, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("{}: {} dynamic bodies, {} steps, threads {}", scene.name, first.bodies, first.steps, first.threads);
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header([
-        "",
-        "ms a step",
-        "",
-        "ratio",
-        "deepest mm",
-        "mean mm",
-        "rms mm/s",
-        "drift mm",
-        "in place",
-        "gap mm",
-    ]);
-    for row in rows {
-        let mm = |x: f64| format!("{:.3}", x * 1e3);
-        table.add_row([
+    let heads = ["", "steps", "ms", "worst", "first", "to best", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place"];
+    let thirds = rows.iter().flat_map(|row| &row.windows).map(|w| {
+        let (head, first) = if w.from == 1 { (w.setting.clone(), format!("{:.3}", w.ms_first)) } else { Default::default() };
+        let to_best = w.to_best.map_or_else(String::new, |ratio| format!("{ratio:.2}"));
+        let steps = format!("{} to {}", w.from, w.to);
+        let times = [w.ms, w.ms_worst].map(|ms| format!("{ms:.3}"));
+        let errors = [w.penetration_max, w.penetration_mean, w.speed_rms, w.drift].map(mm);
+        let in_place = w.in_place.map_or_else(String::new, |n| format!("{n}/{}", w.bodies));
+        [vec![head, steps], times.into(), vec![first, to_best], errors.into(), vec![in_place]].concat()
+    });
+    print_table(&heads, thirds);
+    let heads =
+        ["", "ms a step", "", "ratio", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place", "gap mm"];
+    let halves = rows.iter().map(|row| {
+        vec![
             row.setting().label(),
             format!("{:.4}", row.ms),
             format!("({:.4} {:.4})", row.ms_low, row.ms_high),
@@ -154,8 +161,16 @@ fn print_table(scene: &Scene, rows: &[Row]) {
             mm(row.drift),
             row.in_place.map_or_else(String::new, |n| format!("{n}/{}", row.bodies)),
             row.joint_gap.map_or_else(String::new, mm),
-        ]);
-    }
+        ]
+    });
+    print_table(&heads, halves);
+}
+
+fn print_table(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(heads);
+    table.add_rows(rows);
     table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     println!("{table}\n");
 }

@@ -4,42 +4,60 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::{CellAlignment, Table};
+use serde::Serialize;
 
 use super::output::{plain_table, print, print_json};
 use super::progress::Progress;
 use super::words;
 use crate::files;
-use crate::report::bench::{Bench, Change, Machine, QUICK, STANDARD, StagesRow, bench, compare_with, limits};
+use crate::report::bench::{
+    self, Bench, COUNTS, Change, FALLING, FALLING_QUICK, GROWTH, LIMITS, LIMITS_QUICK, Machine, QUICK, STANDARD,
+    StagesRow, WORLDS, compare_with,
+};
+use crate::report::number::number;
 use crate::settings;
 use drystone::backend::{BackendChoice, choose};
-use drystone::{Backend, Result};
+use drystone::{Backend, Error, Result};
 
+/// Times of the stages of a step, and errors: scenes at rest, or as one of the flags says.
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Scenes, as name:key=value,worlds=N; without any, the standard scenes.
+    /// Scenes, as name:key=value,worlds=N; without any, the standard scenes of the measurement.
     scenes: Vec<String>,
-    /// Use smaller standard scenes and fewer turns.
+    /// Use smaller standard scenes, or fewer of them, and fewer turns.
     #[arg(long)]
     quick: bool,
-    /// Compare sweeps of a pile with the limits of memory and arithmetic.
-    #[arg(long, conflicts_with_all = ["scenes", "quick", "set", "baseline", "csv", "backend"])]
+    /// Time scenes from their first step on, in thirds: medians of all stages, the worst step, the first step apart.
+    #[arg(long, group = "subject")]
+    falling: bool,
+    /// Time a manifold and pass, and count bytes a box, of islands of 1,000 to 1,000,000 boxes; with --quick to 100,000.
+    #[arg(long, group = "subject")]
+    growth: bool,
+    /// Count the steps of one world in a second, in 1 to 4096 worlds; with --quick to 256.
+    #[arg(long, group = "subject")]
+    worlds: bool,
+    /// Compare sweeps with the limits of memory and arithmetic: bytes and operations that are counted, beside a triad and the peak.
+    #[arg(long, group = "subject")]
     limits: bool,
+    /// Steps of falling scenes.
+    #[arg(long, requires = "falling", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
     /// Turns of each scene; a turn is 10 steps.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with_all = ["falling", "growth", "worlds"], value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
     /// Backends that run the sweeps.
-    #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
+    #[arg(long, conflicts_with_all = ["growth", "worlds", "limits"], value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
     backend: Vec<BackendChoice>,
     /// Numbers of threads; 0 means one per core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: Vec<u16>,
     /// Any setting; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, conflicts_with_all = ["growth", "worlds", "limits"], value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Show time ratios to an earlier output of --json.
     ///
     /// Rows that are slower or faster beyond the spread are marked.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, conflicts_with = "subject", value_name = "FILE")]
     baseline: Option<PathBuf>,
     /// Print one JSON object instead of a table.
     #[arg(long, conflicts_with = "csv")]
@@ -53,22 +71,53 @@ impl BenchArgs {
     pub fn run(&self) -> Result<()> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads: Vec<_> = self.threads.iter().map(|&t| if t == 0 { cores } else { t.into() }).collect();
-        if self.limits {
-            return self.print_limits(&threads);
+        let quiet = self.json || self.csv;
+        let bar = |count: usize| Progress::steps(count as u32, quiet);
+        if self.falling {
+            let specs = self.specs(if self.quick { &FALLING_QUICK } else { &FALLING });
+            let (config, steps) = (settings::awake(self.set.iter().map(String::as_str))?, self.steps as usize);
+            let bar = bar(specs.len() * threads.len() * self.backend.len() * bench::turns(steps));
+            self.show(&bench::falling(&specs, &config, &threads, &|| self.backends(), steps, &mut || bar.inc())?, &bar)
+        } else if self.growth {
+            let specs = self.specs(&GROWTH[..GROWTH.len() - usize::from(self.quick)]);
+            let bar = bar(specs.len());
+            self.show(&bench::growth(&specs, &threads, &mut || bar.inc())?, &bar)
+        } else if self.worlds {
+            let counts = &COUNTS[..COUNTS.len() - if self.quick { 2 } else { 0 }];
+            let specs = self.specs(&WORLDS);
+            let bar = bar(specs.len() * counts.len());
+            self.show(&bench::worlds(&specs, counts, &threads, &mut || bar.inc())?, &bar)
+        } else if self.limits {
+            let specs = self.specs(if self.quick { &LIMITS_QUICK } else { &LIMITS });
+            let turns = self.turns().into();
+            let bar = bar(specs.len() * threads.len() * turns);
+            self.show(&bench::limits(&specs, &threads, turns, &mut || bar.inc())?, &bar)
+        } else {
+            self.settled(&threads)
         }
+    }
+
+    fn specs(&self, usual: &[&str]) -> Vec<String> {
+        if self.scenes.is_empty() { usual.iter().map(|&s| s.into()).collect() } else { self.scenes.clone() }
+    }
+
+    fn turns(&self) -> u16 {
+        self.turns.unwrap_or(if self.quick { 3 } else { 9 })
+    }
+
+    fn backends(&self) -> Result<Vec<Box<dyn Backend>>> {
+        // Only `auto` uses the number of bodies.
+        self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
+    }
+
+    fn settled(&self, threads: &[usize]) -> Result<()> {
         let config = settings::awake(self.set.iter().map(String::as_str))?;
         // A bad file is refused before the measurement, which takes minutes.
         let baseline = self.baseline.as_deref().map(Bench::read).transpose()?;
-        let usual = if self.quick { &QUICK[..] } else { &STANDARD[..] };
-        let specs =
-            if self.scenes.is_empty() { usual.iter().map(|&s| s.into()).collect() } else { self.scenes.clone() };
-        let turns = self.turns.unwrap_or(if self.quick { 3 } else { 9 });
-        let open = || -> Result<Vec<Box<dyn Backend>>> {
-            // Only `auto` uses the number of bodies.
-            self.backend.iter().map(|&b| Ok(choose(b, 0, false)?.0)).collect()
-        };
+        let specs = self.specs(if self.quick { &QUICK } else { &STANDARD });
+        let turns = self.turns();
         let bar = Progress::steps(specs.len() as u32 * (1 + u32::from(turns)), self.json || self.csv);
-        let now = bench(&specs, &config, &threads, &open, turns.into(), &mut || bar.inc())?;
+        let now = bench::bench(&specs, &config, threads, &|| self.backends(), turns.into(), &mut || bar.inc())?;
         bar.finish();
         if self.json {
             return print_json(&now);
@@ -88,36 +137,33 @@ impl BenchArgs {
         }
     }
 
-    fn print_limits(&self, threads: &[usize]) -> Result<()> {
-        let turns = self.turns.unwrap_or(9);
-        let bar = Progress::steps(threads.len() as u32 * u32::from(turns), self.json);
-        let rows = limits(15_000, threads, turns.into(), &mut || bar.inc())?;
+    /// Prints rows in the form that was asked for; the table has the columns of the CSV.
+    fn show(&self, rows: &[impl Serialize], bar: &Progress) -> Result<()> {
         bar.finish();
         let machine = Machine::this();
         if self.json {
             return print_json(&serde_json::json!({"machine": machine, "rows": rows}));
         }
-        print(machine.line())?;
-        let alone = rows.first().map_or(f64::NAN, |r| r.sweeps / r.threads as f64);
-        for row in &rows {
-            print(format_args!(
-                "{} threads: {:.1} million contact points swept a second, {:.2} times one; {:.0} operations each: {:.0} % of {:.1} G/s",
-                row.threads,
-                row.sweeps * 1e-6,
-                row.sweeps / alone,
-                row.operations,
-                100.0 * row.of_peak(),
-                row.peak * 1e-9
-            ))?;
-            for &(size, rate) in &row.triads {
-                let (mib, share) = (size as f64 / f64::from(1 << 20), 100.0 * row.of_triad(rate));
-                print(format_args!(
-                    "    triad over {mib:.2} MiB: {:.1} GB/s, their stream is {share:.0} % of it",
-                    rate * 1e-9
-                ))?;
-            }
+        let text = files::csv(rows)?;
+        if self.csv {
+            return print(String::from_utf8_lossy(&text).trim_end());
         }
-        Ok(())
+        print(machine.line())?;
+        let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(&text[..]).into_records();
+        let mut next = || lines.next().transpose().map_err(|e| Error::input(format!("a row as CSV: {e}")));
+        let mut table = plain_table();
+        table.set_header(next()?.unwrap_or_default().iter());
+        while let Some(line) = next()? {
+            table.add_row(line.iter().map(|cell| match cell.parse::<f64>() {
+                Ok(x) if cell.contains('.') => number(x),
+                _ => cell.to_owned(),
+            }));
+        }
+        for column in table.column_iter_mut() {
+            column.set_cell_alignment(CellAlignment::Right);
+            column.set_padding((0, 1));
+        }
+        print(table)
     }
 }
 

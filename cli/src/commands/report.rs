@@ -8,7 +8,7 @@ use super::output::print;
 use super::progress::{PERCENT, Progress};
 use crate::files;
 use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
-use crate::report::{RUNS, Solvers, convergence, problems, rules, solvers};
+use crate::report::{RUNS, Solvers, convergence, performance, problems, rules, solvers};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
 
@@ -26,6 +26,14 @@ enum Page {
     /// Effects of each rule of the course sheet.
     Rules {
         /// Directory for the page and its pictures.
+        #[arg(long, default_value = "docs")]
+        out: PathBuf,
+    },
+    /// Times of a step beside other engines and beside the limits of the machine, from the rows in DIR/performance.
+    ///
+    /// `benches/performance` measures the rows and draws the page.
+    Performance {
+        /// Directory for the page; its folder performance has the rows, as CSV, and gets the picture.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
     },
@@ -84,6 +92,10 @@ impl ReportArgs {
                 bar.finish();
                 report.write(out)?;
                 print(out.join("rules.md").display())
+            }
+            Some(Page::Performance { out }) => {
+                performance(out)?;
+                print(out.join("performance.md").display())
             }
             Some(Page::Convergence { out, problems, siconos }) => {
                 // A wrong table is refused before anything runs.

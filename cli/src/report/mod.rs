@@ -4,6 +4,8 @@ pub mod bench;
 pub mod comparison;
 mod convergence;
 pub mod hard_cases;
+pub mod number;
+mod performance;
 mod plot;
 pub mod rounds;
 mod rules;
@@ -14,6 +16,7 @@ mod solvers;
 mod trajectory;
 
 pub use convergence::{convergence, problem_of_step, problems};
+pub use performance::performance;
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
 pub use solve::{CurveRow, NewtonReport, Reached, SolveReport, SolveSettings};

@@ -1,5 +1,6 @@
 //! Interleaved measurements: all participants take turns, so that a slow phase of the machine affects all of them.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
@@ -13,6 +14,11 @@ pub fn interleave<T>(
     mut turn: impl FnMut(usize, &mut T) -> Result<()>,
 ) -> Result<()> {
     (0..rounds).try_for_each(|round| participants.iter_mut().try_for_each(|participant| turn(round, participant)))
+}
+
+/// The thirds of a run, in turns: the windows that a page shows.
+pub fn thirds(turns: usize) -> [Range<usize>; 3] {
+    std::array::from_fn(|k| k * turns / 3..(k + 1) * turns / 3)
 }
 
 /// Lower quartile, median and upper quartile of the measurements of the turns.

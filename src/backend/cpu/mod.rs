@@ -18,6 +18,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 mod threads;
+mod traffic;
 mod transfer;
 
 pub use reference::Reference;

@@ -1,157 +1,171 @@
 //! Sweeps compared with the limits of memory and arithmetic, measured in the same turns.
 
-use std::hint::black_box;
-use std::ops::Range;
-use std::sync::Barrier;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use drystone::stages::backend::{InstructionSet, Lanes, WIDTH, Work};
-use drystone::{Backend, Cpu, Result, SolverConfig, StepPlan, StepProblem};
+use drystone::stages::plan::Kernel;
+use drystone::{Backend, Cpu, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
+use super::rates::{peak, triad};
 use super::settled;
 use crate::report::rounds::interleave;
 
-/// Bytes that a sweep of the lanes streams per point of a manifold of four: the row of the point, its impulses read and written, and a
-/// quarter of the header. Bodies are not counted; those of a small pile stay in a cache.
-pub const BYTES: f64 = 48.0 + 2.0 * 16.0 + (40.0 + 8.0) / 4.0;
+/// A pile whose contacts stay in the cache of a core, one whose contacts stay in a shared cache, and a pyramid of 500,500 boxes, whose
+/// contacts come from memory.
+pub const LIMITS: [&str; 3] = ["pile:n=1000", "pile:n=20000", "pyramid:base=1000"];
+pub const LIMITS_QUICK: [&str; 2] = ["pile:n=1000", "pyramid:base=100"];
 
 /// Operations on single numbers per point and sweep of a contact of four points with friction: the mean, counted by a test.
 const OPERATIONS: f64 = 299.5;
 
-/// The best rates of all turns: disturbances only slow a turn down.
-#[derive(Clone, Debug, Serialize)]
+/// A sweep over all contacts of a scene at rest. Rates are the best of all turns: disturbances only slow a turn down.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LimitRow {
+    pub scene: String,
     pub threads: usize,
+    pub boxes: usize,
     pub manifolds: usize,
     pub points: usize,
+    /// Time of a manifold (ns).
+    pub ns: f64,
     /// Contact points swept per second by all threads together.
     pub sweeps: f64,
+    /// Bytes of all that a sweep of the lanes reads or writes, each counted once.
+    pub held: usize,
+    /// Bytes of a manifold that a sweep of the lanes reads and writes, each body as often as a contact names it; and the same of the
+    /// kernels over plain rows.
+    pub lane_bytes: f64,
+    pub kernel_bytes: f64,
+    /// Operations on single numbers a manifold.
     pub operations: f64,
-    /// Multiplications and additions on registers alone (1/s).
+    /// Bytes per second of a = b + s c over three arrays of `held` bytes together, and the rate of `lane_bytes` relative to it.
+    pub triad: f64,
+    pub of_triad: f64,
+    /// Multiplications and additions per second on registers alone, and the rate of `operations` relative to it.
     pub peak: f64,
-    /// The size of the three arrays of a = b + s c together (bytes), and its rate (bytes/s).
-    pub triads: Vec<(usize, f64)>,
+    pub of_peak: f64,
 }
 
 impl LimitRow {
-    /// Rate of operations in the sweeps over the peak.
-    pub fn of_peak(&self) -> f64 {
-        self.sweeps * self.operations / self.peak
-    }
-
-    /// Rate of bytes in the sweeps over that of a triad.
-    pub fn of_triad(&self, rate: f64) -> f64 {
-        self.sweeps * BYTES / rate
+    fn with_shares(self, seconds: f64) -> Self {
+        let rate = self.manifolds as f64 / seconds;
+        Self {
+            ns: 1e9 / rate,
+            sweeps: self.points as f64 / seconds,
+            of_triad: rate * self.lane_bytes / self.triad,
+            of_peak: rate * self.operations / self.peak,
+            ..self
+        }
     }
 }
 
-/// Sizes of the triads (bytes): within the cache of a core, within a shared cache, and beyond.
-const SIZES: [usize; 3] = [768 << 10, 12 << 20, 384 << 20];
+/// A scene with its problem, on one number of threads: the row so far and the least times of [`FEW`] and [`MANY`] sweeps.
+struct Limit<'a> {
+    problem: &'a StepProblem,
+    pool: rayon::ThreadPool,
+    row: LimitRow,
+    least: [f64; 2],
+}
 
-/// Measures a settled pile of `boxes` with each number of `threads`.
-pub fn limits(boxes: usize, threads: &[usize], turns: usize, after_turn: &mut dyn FnMut()) -> Result<Vec<LimitRow>> {
-    let config = SolverConfig::default().without_sleep();
-    let (mut simulation, _, dt) = settled(&format!("pile:n={boxes}"), &config)?;
-    let problem = simulation.next_problem(dt)?.0;
-    let row = |threads: usize| LimitRow {
-        threads,
-        manifolds: problem.swept_contacts().count(),
-        points: problem.swept_contacts().map(|contact| contact.point_count as usize).sum(),
-        sweeps: 0.0,
-        operations: OPERATIONS,
-        peak: 0.0,
-        triads: SIZES.map(|size| (size, 0.0)).to_vec(),
-    };
-    let participant = |&threads: &usize| Ok((super::pool(threads)?, row(threads), [f64::INFINITY; 2]));
-    let mut all = threads.iter().map(participant).collect::<Result<Vec<_>>>()?;
-    interleave(turns, &mut all, |_, (pool, row, best)| {
+/// Measures the scenes `specs` with each number of `threads`.
+pub fn limits(
+    specs: &[String],
+    threads: &[usize],
+    turns: usize,
+    after_turn: &mut dyn FnMut(),
+) -> Result<Vec<LimitRow>> {
+    let problems = specs.iter().map(|spec| problem(spec)).collect::<Result<Vec<_>>>()?;
+    let mut all = Vec::new();
+    for (spec, (boxes, problem)) in specs.iter().zip(&problems) {
+        for &threads in threads {
+            let row = LimitRow { scene: spec.clone(), threads, boxes: *boxes, ..count(problem)? };
+            all.push(Limit { problem, pool: super::pool(threads)?, row, least: [f64::INFINITY; 2] });
+        }
+    }
+    interleave(turns, &mut all, |_, Limit { problem, pool, row, least }| {
         let mut cpu = Cpu::new();
-        for (best, sweeps) in best.iter_mut().zip([FEW, MANY]) {
-            *best = best.min(pool.install(|| seconds(&mut cpu, &problem, sweeps))?);
+        for (least, sweeps) in least.iter_mut().zip([FEW, MANY]) {
+            *least = least.min(pool.install(|| seconds(&mut cpu, problem, sweeps))?);
         }
         row.peak = row.peak.max(peak(pool));
-        for (size, rate) in &mut row.triads {
-            *rate = rate.max(triad(pool, *size / row.threads));
-        }
+        row.triad = row.triad.max(triad(pool, row.held / row.threads));
         after_turn();
         Ok(())
     })?;
-    let swept = |(_, mut row, [few, many]): (_, LimitRow, [f64; 2])| {
-        row.sweeps = f64::from(MANY - FEW) * row.points as f64 / (many - few);
-        row
+    let swept = |Limit { problem, row, least: [few, many], .. }: Limit| {
+        let sweeps = |sweeps| swept_contacts(problem, &plan(problem, sweeps)) as f64 / row.manifolds as f64;
+        let seconds = (many - few) / (sweeps(MANY) - sweeps(FEW));
+        row.with_shares(seconds)
     };
     Ok(all.into_iter().map(swept).collect())
 }
 
-/// The times of these two numbers of sweeps are subtracted, which cancels the work outside sweeps.
-const FEW: u32 = 4;
-const MANY: u32 = 24;
+/// The next step of a scene at rest, and its boxes. A scene without a container begins at rest.
+fn problem(spec: &str) -> Result<(usize, StepProblem)> {
+    let config = SolverConfig::default().without_sleep();
+    let scene = Scene::find_spec(spec)?;
+    let (boxes, dt) = (scene.world.dynamic_count(), scene.dt);
+    let mut simulation = if scene.container.is_some() {
+        settled(spec, &config)?.0
+    } else {
+        let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new()))?;
+        (0..3).try_for_each(|_| simulation.step(dt).map(drop))?;
+        simulation
+    };
+    Ok((boxes, simulation.next_problem(dt)?.0))
+}
 
-fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
+/// Contacts, bytes and operations of a sweep.
+fn count(problem: &StepProblem) -> Result<LimitRow> {
+    let manifolds = problem.swept_contacts().count();
+    let points = problem.swept_contacts().map(|contact| contact.point_count as usize).sum();
+    let plan = plan(problem, 1);
+    let mut cpu = Cpu::new();
+    cpu.run(&mut problem.clone(), &plan.passes)?;
+    let swept = plan.passes.iter().zip(plan.bytes_of_passes(problem));
+    let (mut kernel, mut kernel_bytes) = (None, 0);
+    for (pass, bytes) in swept.filter(|(pass, _)| matches!(pass.kernel, Kernel::SolveContacts(_))) {
+        (kernel, kernel_bytes) = (Some(pass.kernel), kernel_bytes + bytes);
+    }
+    let a_manifold = |x: f64| x / manifolds as f64;
+    let kernel_bytes = kernel_bytes as f64 / swept_contacts(problem, &plan) as f64;
+    Ok(LimitRow {
+        manifolds,
+        points,
+        held: cpu.bytes_of_contacts(),
+        lane_bytes: kernel.map_or(0.0, |kernel| a_manifold(cpu.bytes_of_sweep(kernel) as f64)),
+        kernel_bytes,
+        operations: a_manifold(OPERATIONS * points as f64),
+        ..LimitRow::default()
+    })
+}
+
+/// Contacts that all sweeps of a plan go over together.
+fn swept_contacts(problem: &StepProblem, plan: &StepPlan) -> usize {
+    let sweeps = plan.passes.iter().filter(|pass| matches!(pass.kernel, Kernel::SolveContacts(_)));
+    sweeps.map(|pass| problem.rows_of(&pass.colors).len()).sum()
+}
+
+/// So many biased sweeps in each substep of the problem.
+fn plan(problem: &StepProblem, sweeps: u32) -> StepPlan {
     let config = SolverConfig::default().without_sleep().with(|c| {
-        c.substeps = 1;
         c.iterations = sweeps;
         c.relax = 0;
     });
-    let plan = StepPlan::new(&config, problem);
+    StepPlan::new(&config, problem)
+}
+
+/// The times of these two numbers of sweeps are subtracted, which cancels the work outside sweeps.
+const FEW: u32 = 1;
+const MANY: u32 = 4;
+
+fn seconds(cpu: &mut Cpu, problem: &StepProblem, sweeps: u32) -> Result<f64> {
+    let plan = plan(problem, sweeps);
     let mut problem = problem.clone();
     let begin = Instant::now();
     cpu.run(&mut problem, &plan.passes)?;
     Ok(begin.elapsed().as_secs_f64())
-}
-
-fn peak(pool: &rayon::ThreadPool) -> f64 {
-    const ROUNDS: usize = 1_000_000;
-    let begin = Instant::now();
-    pool.broadcast(|_| InstructionSet::default().run(&Chains, 0..ROUNDS));
-    let done = pool.current_num_threads() * ROUNDS * 2 * CHAINS * WIDTH;
-    done as f64 / begin.elapsed().as_secs_f64()
-}
-
-/// Independent chains of each operation: enough for all units of a processor.
-const CHAINS: usize = 6;
-
-/// Multiplications and additions on registers alone, not fused, as in the kernels.
-struct Chains;
-
-impl Work for Chains {
-    #[inline(always)]
-    fn over<L: Lanes>(&self, rounds: Range<usize>) {
-        let (factor, summand) = (black_box(L::constant(0.999_999)), black_box(L::constant(1e-3)));
-        let (mut products, mut sums) = ([L::constant(1.0); CHAINS], [L::constant(1.0); CHAINS]);
-        for _ in rounds {
-            for chain in 0..CHAINS {
-                products[chain] = products[chain] * factor;
-                sums[chain] = sums[chain] + summand;
-            }
-        }
-        black_box((products, sums));
-    }
-}
-
-/// Bytes per second of all threads together from the first start to the last end. Each thread has its own arrays of `size` bytes.
-fn triad(pool: &rayon::ThreadPool, size: usize) -> f64 {
-    let length = size / 12;
-    let rounds = (64 << 20) / size + 2;
-    let all_ready = Barrier::new(pool.current_num_threads());
-    let times = pool.broadcast(|_| {
-        let (mut a, b, c) = (vec![0.0_f32; length], vec![1.0_f32; length], vec![2.0_f32; length]);
-        all_ready.wait();
-        let begin = Instant::now();
-        for _ in 0..rounds {
-            let (b, c) = (black_box(&b), black_box(&c));
-            for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
-                *a = b + 3.0 * c;
-            }
-            black_box(&mut a);
-        }
-        (begin, Instant::now())
-    });
-    let (begin, end) = (times.iter().map(|t| t.0).min(), times.iter().map(|t| t.1).max());
-    let seconds = begin.zip(end).map_or(f64::NAN, |(begin, end)| (end - begin).as_secs_f64());
-    (times.len() * rounds * 12 * length) as f64 / seconds
 }
 
 #[cfg(test)]
@@ -236,13 +250,27 @@ mod tests {
 
     // The shares themselves depend on the load of the machine.
     #[test]
-    fn every_limit_is_measured_for_every_number_of_threads() {
-        let rows = limits(200, &[1, 2], 3, &mut || ()).expect("a measurement");
-        assert_eq!(rows.iter().map(|r| r.threads).collect::<Vec<_>>(), [1, 2]);
-        for row in rows {
-            assert!(row.points > 500 && row.sweeps > 0.0 && row.peak > 0.0, "{row:?}");
-            assert_eq!(row.of_peak(), row.sweeps * row.operations / row.peak);
-            assert!(row.triads.iter().all(|t| t.1 > 0.0), "{row:?}");
+    fn every_limit_is_measured_for_every_scene_and_number_of_threads() {
+        let specs = ["pile:n=200".to_owned(), "pyramid:base=10".to_owned()];
+        let rows = limits(&specs, &[1, 2], 3, &mut || ()).expect("a measurement");
+        assert_eq!(
+            rows.iter().map(|r| (r.boxes, r.threads)).collect::<Vec<_>>(),
+            [(200, 1), (200, 2), (55, 1), (55, 2)]
+        );
+        for row in &rows {
+            assert!(row.ns > 0.0 && row.sweeps > 0.0 && row.of_peak > 0.0 && row.of_triad > 0.0, "{row:?}");
+        }
+        let pyramid = &rows[2];
+        // A plan has the substeps of its problem, eight here, whatever the settings say.
+        let (_, problem) = problem("pyramid:base=10").expect("a scene");
+        assert_eq!([1, 3].map(|n| swept_contacts(&problem, &plan(&problem, n))), [800, 2400]);
+        assert_eq!((pyramid.manifolds, pyramid.points, pyramid.operations), (100, 400, 4.0 * OPERATIONS));
+        // Four points of 48 bytes and four impulses of 16, read and written; two bodies of 64 read at least, and their velocities written.
+        for row in &rows {
+            let least = row.points as f64 / row.manifolds as f64 * 80.0 + 2.0 * 96.0;
+            assert!(row.lane_bytes > least && row.lane_bytes < 4.0 * least, "{row:?}");
+            assert!(row.kernel_bytes > least && row.kernel_bytes < 4.0 * least, "{row:?}");
+            assert!((row.held as f64) < row.lane_bytes * row.manifolds as f64, "{row:?}");
         }
     }
 
@@ -250,14 +278,16 @@ mod tests {
     fn shares_are_of_what_the_machine_can_do() {
         let row = LimitRow {
             threads: 2,
-            manifolds: 1,
-            points: 4,
-            sweeps: 1e6,
-            operations: 300.0,
-            peak: 1.2e9,
-            triads: vec![],
+            manifolds: 1000,
+            points: 4000,
+            lane_bytes: 600.0,
+            operations: 1200.0,
+            triad: 2.4e9,
+            peak: 4.8e9,
+            ..LimitRow::default()
         };
-        assert_eq!(row.of_peak(), 0.25);
-        assert_eq!(row.of_triad(4e6 * BYTES), 0.25);
+        // A million manifolds a second.
+        let row = row.with_shares(1e-3);
+        assert_eq!((row.ns, row.sweeps, row.of_triad, row.of_peak), (1000.0, 4e6, 0.25, 0.25));
     }
 }

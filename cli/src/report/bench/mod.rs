@@ -2,15 +2,24 @@
 //!
 //! All scenes are settled first. Then they take turns of a few steps, so that a slow phase of the machine affects all of them. A time
 //! is the median over the turns, its spread the quartiles. All backends and numbers of threads share one simulation of a scene, so that
-//! they do the same work.
+//! they do the same work. Other measurements have files of their own: scenes from their first step on (`falling`), one island of
+//! growing size (`growth`), many worlds (`worlds`), and sweeps against the limits of the machine (`limits`).
 
 mod baseline;
+mod falling;
+mod growth;
 mod limits;
 mod machine;
+mod memory;
+mod rates;
+mod worlds;
 
 pub use baseline::{Change, compare_with};
-pub use limits::{LimitRow, limits};
+pub use falling::{FALLING, FALLING_QUICK, FallingRow, falling, turns};
+pub use growth::{GROWTH, GrowthRow, growth};
+pub use limits::{LIMITS, LIMITS_QUICK, LimitRow, limits};
 pub use machine::Machine;
+pub use worlds::{COUNTS, WORLDS, WorldsRow, worlds};
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +30,7 @@ use drystone::metrics::rms_speed;
 use drystone::residuals::Residuals;
 use drystone::stages::plan::Kernel;
 use drystone::stats::median;
-use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig};
+use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig, StepStats};
 
 /// The scenes of a full bench, as in [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [
@@ -107,7 +116,7 @@ struct Case {
     dt: f32,
     simulation: Simulation,
     ways: Vec<Way>,
-    last: drystone::StepStats,
+    last: StepStats,
 }
 
 /// Measures the scenes `specs` on each of the backends that `open` makes, with each number of `threads`. `after_turn` is called after
@@ -129,7 +138,7 @@ pub fn bench(
             }
         }
         let (simulation, hash, dt) = settled(spec, config)?;
-        cases.push(Case { spec: spec.clone(), hash, dt, simulation, ways, last: drystone::StepStats::default() });
+        cases.push(Case { spec: spec.clone(), hash, dt, simulation, ways, last: StepStats::default() });
         after_turn();
     }
     interleave(turns, &mut cases, |_, case| {
@@ -169,8 +178,7 @@ impl Case {
             let stepped: Result<()> = way.pool.install(|| {
                 (0..TURN).try_for_each(|_| {
                     *last = simulation.step(*dt)?;
-                    let [detect, color, prepare, run, store] = last.times.stages().map(|s| s.1.as_secs_f64() * 1e3);
-                    steps.push([detect, color, prepare, run, store, last.times.total().as_secs_f64() * 1e3]);
+                    steps.push(stage_times(last));
                     Ok(())
                 })
             });
@@ -223,7 +231,13 @@ impl Case {
     }
 }
 
-fn column(rows: &[[f64; 6]], column: usize) -> Vec<f64> {
+/// The five stages of a step and their sum (ms).
+fn stage_times(stats: &StepStats) -> [f64; 6] {
+    let [detect, color, prepare, run, store] = stats.times.stages().map(|s| s.1.as_secs_f64() * 1e3);
+    [detect, color, prepare, run, store, stats.times.total().as_secs_f64() * 1e3]
+}
+
+fn column<const N: usize>(rows: &[[f64; N]], column: usize) -> Vec<f64> {
     rows.iter().map(|row| row[column]).collect()
 }
 

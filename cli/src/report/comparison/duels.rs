@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::html::number;
 use super::measure::Row;
 use super::pareto::{Fault, fastest};
+use crate::report::number::number;
 use drystone::Result;
 
 /// The engine that is compared with all others.

@@ -37,14 +37,6 @@ pub(super) fn profile_picture(
     svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 
-pub(super) fn number(x: f64) -> String {
-    if !x.is_finite() || x == 0.0 {
-        return if x.is_nan() { "-".into() } else { x.to_string() };
-    }
-    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{x:.digits$}")
-}
-
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -52,22 +44,4 @@ pub(super) fn escape(text: &str) -> String {
 /// An SVG picture inside HTML, where it needs no name space.
 pub(super) fn inline(svg: &str) -> String {
     svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
-}
-
-/// Pictures of one size in rows of `columns`.
-pub(super) fn grid(pictures: &[String], columns: usize) -> String {
-    let size = |name: &str| {
-        let of = |p: &String| p.split(&format!(" {name}=\"")).nth(1)?.split('"').next()?.parse::<usize>().ok();
-        pictures.first().and_then(of).unwrap_or(0)
-    };
-    let (width, height) = (size("width"), size("height"));
-    let rows = pictures.len().div_ceil(columns);
-    let (w, h) = (width * columns.min(pictures.len()), height * rows);
-    let mut all =
-        format!("<svg width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" xmlns=\"http://www.w3.org/2000/svg\">\n");
-    for (i, picture) in pictures.iter().enumerate() {
-        let (x, y) = (i % columns * width, i / columns * height);
-        all.push_str(&picture.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1));
-    }
-    all + "</svg>\n"
 }

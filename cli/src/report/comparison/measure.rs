@@ -4,16 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
+use super::windows::{WindowRow, windows};
 use crate::hard::energy;
-use crate::report::rounds::{Clock, interleave, quartiles};
+use crate::report::rounds::{Clock, interleave, quartiles, thirds};
 use crate::report::scene_hash::content_hash;
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
-use drystone::stats::quantile;
+use drystone::stats::{median, quantile};
 use drystone::{Error, Result, Scene, SolverConfig, World};
 
 /// Steps of a contender in each of its turns.
-const BLOCK: u32 = 10;
+pub(super) const BLOCK: u32 = 10;
 
 /// Time and errors of one contender on one scene, over the second half of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -64,6 +65,9 @@ pub struct Row {
     /// Kinetic and potential energy gained over the whole run (J).
     pub energy_gained: f64,
     pub finite: bool,
+    /// The thirds of the run that the contender finished; none in rows that were read from a file.
+    #[serde(skip)]
+    pub windows: Vec<WindowRow>,
 }
 
 impl Row {
@@ -88,14 +92,23 @@ impl Row {
     }
 }
 
-/// Measurements of one contender, one for each block.
+/// Measurements of one contender.
 #[derive(Default)]
-struct Lane {
-    ms: Vec<f64>,
-    penetration: Vec<Penetration>,
-    speed: Vec<f64>,
-    gap: Vec<f64>,
-    finite: bool,
+pub(super) struct Lane {
+    /// Time of each step (ms), of complete blocks with finite bodies.
+    pub steps: Vec<f64>,
+    /// Errors at the end of the blocks of the second half, and of the last block of each third, with the number of the block.
+    pub errors: Vec<(usize, Errors)>,
+    pub finite: bool,
+}
+
+#[derive(Default)]
+pub(super) struct Errors {
+    pub penetration: Penetration,
+    pub speed: f64,
+    pub drift: f64,
+    pub in_place: Option<usize>,
+    pub gap: f64,
 }
 
 /// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called [`blocks`] times per contender.
@@ -106,34 +119,57 @@ pub fn measure(
     after_block: &mut dyn FnMut(),
 ) -> Result<Vec<Row>> {
     let blocks = blocks(scene.steps) as usize;
+    let ends = thirds(blocks).map(|third| third.end - 1);
     let run = Origin::now();
     let lane = |contender| (contender, Lane { finite: true, ..Lane::default() });
     let mut lanes: Vec<_> = contenders.iter_mut().map(lane).collect();
     interleave(blocks, &mut lanes, |block, (contender, lane)| {
         if lane.finite {
             let clock = Clock::of(&contender.setting().backend);
-            let mut timed = |steps| {
+            let mut times = Vec::with_capacity(BLOCK as usize);
+            let mut step = |contender: &mut Box<dyn Contender + '_>| {
                 let begin = clock.now();
-                for _ in 0..steps {
-                    contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
-                }
-                Ok((clock.now() - begin, poses(contender.world())))
+                contender.step().map_err(|e| Error::input(format!("{}: {e}", contender.setting().label())))?;
+                times.push((clock.now() - begin).as_secs_f64() * 1e3);
+                Ok::<_, Error>(())
             };
-            let ((most, before), (last, _)) = (timed(BLOCK - 1)?, timed(1)?);
+            (1..BLOCK).try_for_each(|_| step(contender))?;
+            let before = poses(contender.world());
+            step(contender)?;
             let world = contender.world();
             lane.finite = world.first_non_finite().is_none();
-            if lane.finite && 2 * block >= blocks {
-                lane.ms.push((most + last).as_secs_f64() * 1e3 / f64::from(BLOCK));
-                lane.penetration.push(Penetration::of_world(world, &SolverConfig::default()));
-                lane.speed.push(rms_speed(world).min(moved(world, &before, scene.dt)));
-                lane.gap.push(world.joint_gap().into());
+            if lane.finite {
+                lane.steps.extend(times);
+            }
+            if lane.finite && (2 * block >= blocks || ends.contains(&block)) {
+                let errors = Errors {
+                    penetration: Penetration::of_world(world, &SolverConfig::default()),
+                    speed: rms_speed(world).min(moved(world, &before, scene.dt)),
+                    drift: drift(&scene.world, world),
+                    in_place: scene.stands.then(|| in_place_count(&scene.world, world)),
+                    gap: world.joint_gap().into(),
+                };
+                lane.errors.push((block, errors));
             }
         }
         after_block();
         Ok(())
     })?;
-    let first = lanes[0].1.ms.clone();
-    Ok(lanes.iter_mut().map(|(c, lane)| row(scene, c.setting(), c.world(), lane, &first, origin, &run)).collect())
+    let first = lanes[0].1.late_blocks(blocks);
+    let mut rows: Vec<_> =
+        lanes.iter_mut().map(|(c, lane)| row(scene, c.setting(), c.world(), lane, &first, origin, &run)).collect();
+    let lanes: Vec<_> = lanes.into_iter().map(|(_, lane)| lane).collect();
+    let of_each = windows(&rows, &lanes, &thirds(blocks));
+    rows.iter_mut().zip(of_each).for_each(|(row, windows)| row.windows = windows);
+    Ok(rows)
+}
+
+impl Lane {
+    /// Mean time of a step in each block of the second half (ms).
+    fn late_blocks(&self, blocks: usize) -> Vec<f64> {
+        let late = self.steps.chunks(BLOCK as usize).skip(blocks.div_ceil(2));
+        late.map(|steps| steps.iter().sum::<f64>() / f64::from(BLOCK)).collect()
+    }
 }
 
 fn poses(world: &World) -> Vec<(Vec3, Quat)> {
@@ -150,9 +186,9 @@ fn moved(world: &World, before: &[(Vec3, Quat)], dt: f32) -> f64 {
     rms_speed(&world)
 }
 
-/// Blocks of a run with this number of steps.
+/// Blocks of a run with this number of steps: at least one in each third.
 pub fn blocks(steps: u32) -> u32 {
-    steps.div_ceil(BLOCK).max(2)
+    steps.div_ceil(BLOCK).max(3)
 }
 
 pub(super) fn steps(scene: &Scene) -> u32 {
@@ -160,10 +196,13 @@ pub(super) fn steps(scene: &Scene) -> u32 {
 }
 
 fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64], origin: &Origin, run: &str) -> Row {
-    let ratios: Vec<f64> = lane.ms.iter().zip(first).map(|(ms, first)| ms / first).collect();
-    let [ms_low, ms, ms_high] = quartiles(&lane.ms);
+    let blocks = blocks(scene.steps) as usize;
+    let times = lane.late_blocks(blocks);
+    let ratios: Vec<f64> = times.iter().zip(first).map(|(ms, first)| ms / first).collect();
+    let [ms_low, ms, ms_high] = quartiles(&times);
     let [ratio_low, ratio, ratio_high] = quartiles(&ratios);
-    let middle = |of: fn(&Penetration) -> f64| quantile(&lane.penetration.iter().map(of).collect::<Vec<_>>(), 0.5);
+    let late = || lane.errors.iter().filter(|(block, _)| 2 * block >= blocks).map(|(_, errors)| errors);
+    let all = |of: fn(&Errors) -> f64| late().map(of).collect::<Vec<_>>();
     let clock = Clock::of(&setting.backend).name().into();
     let Setting { engine, backend, substeps, sweeps, method, friction, more } = setting;
     Row {
@@ -190,15 +229,16 @@ fn row(scene: &Scene, setting: Setting, world: &World, lane: &Lane, first: &[f64
         ratio,
         ratio_low,
         ratio_high,
-        penetration_max: quantile(&lane.penetration.iter().map(|p| p.max).collect::<Vec<_>>(), 1.0),
-        penetration_p95: middle(|p| p.p95),
-        penetration_mean: middle(|p| p.mean),
-        speed_rms: quantile(&lane.speed, 0.5),
+        penetration_max: quantile(&all(|e| e.penetration.max), 1.0),
+        penetration_p95: median(&all(|e| e.penetration.p95)),
+        penetration_mean: median(&all(|e| e.penetration.mean)),
+        speed_rms: median(&all(|e| e.speed)),
         drift: drift(&scene.world, world),
         in_place: scene.stands.then(|| in_place_count(&scene.world, world)),
-        joint_gap: (!world.joints.is_empty()).then(|| quantile(&lane.gap, 1.0)),
+        joint_gap: (!world.joints.is_empty()).then(|| quantile(&all(|e| e.gap), 1.0)),
         energy_gained: energy(world) - energy(&scene.world),
         finite: lane.finite,
+        windows: Vec::new(),
     }
 }
 

@@ -11,6 +11,7 @@ mod points;
 mod problems;
 mod solves;
 mod survey;
+mod windows;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
 pub use measure::{Row, blocks, measure};
@@ -18,6 +19,7 @@ pub use origin::Origin;
 pub use points::{drystone, scene, scenes, substeps};
 pub use solves::SolveRow;
 pub use survey::{Report, Survey};
+pub use windows::WindowRow;
 
 #[cfg(test)]
 mod tests {

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::duels::OWN;
-use super::html::{cell, escape, grid, inline, number, profile_picture, table};
+use super::html::{cell, escape, inline, profile_picture, table};
 use super::measure::Row;
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least};
 use super::problems::problems;
 use super::solves::SolveRow;
+use crate::report::number::number;
 use crate::report::plot::Scale::Decades;
-use crate::report::plot::{Frame, Series, svg};
+use crate::report::plot::{Frame, Series, grid, svg};
 use drystone::Result;
 
 pub struct Page {

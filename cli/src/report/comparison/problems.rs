@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::html::{cell, escape, inline, number, profile_picture, table};
+use super::html::{cell, escape, inline, profile_picture, table};
 use super::solves::SolveRow;
+use crate::report::number::number;
 use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Series, svg};
 

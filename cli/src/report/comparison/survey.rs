@@ -105,16 +105,7 @@ struct Table<R> {
 impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
     /// Reads the rows of a file; a missing file has none.
     fn open(path: PathBuf) -> Result<Self> {
-        if !path.exists() {
-            return Ok(Self { path, rows: Vec::new() });
-        }
-        let bytes = std::fs::read(&path).map_err(Error::file(&path))?;
-        let parsed: std::result::Result<Vec<R>, _> = csv::Reader::from_reader(&bytes[..]).deserialize().collect();
-        let rows = parsed.map_err(|e| {
-            let line = e.position().map_or(1, csv::Position::line);
-            let path = path.display();
-            Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
-        })?;
+        let rows = if path.exists() { files::rows(&path)? } else { Vec::new() };
         Ok(Self { path, rows })
     }
 

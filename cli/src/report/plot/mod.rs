@@ -50,6 +50,24 @@ pub fn svg(frame: &Frame, series: &[Series]) -> String {
     text
 }
 
+/// Pictures of one size in rows of `columns`.
+pub fn grid(pictures: &[String], columns: usize) -> String {
+    let size = |name: &str| {
+        let of = |p: &String| p.split(&format!(" {name}=\"")).nth(1)?.split('"').next()?.parse::<usize>().ok();
+        pictures.first().and_then(of).unwrap_or(0)
+    };
+    let (width, height) = (size("width"), size("height"));
+    let rows = pictures.len().div_ceil(columns);
+    let (w, h) = (width * columns.min(pictures.len()), height * rows);
+    let mut all =
+        format!("<svg width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" xmlns=\"http://www.w3.org/2000/svg\">\n");
+    for (i, picture) in pictures.iter().enumerate() {
+        let (x, y) = (i % columns * width, i / columns * height);
+        all.push_str(&picture.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1));
+    }
+    all + "</svg>\n"
+}
+
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series], x: Axis, y: Axis) -> Drawn {

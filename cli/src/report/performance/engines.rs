@@ -1,0 +1,93 @@
+//! All engines, scene by scene: the table and the picture.
+
+use std::fmt::Write as _;
+
+use crate::report::comparison::WindowRow;
+use crate::report::number::number;
+use crate::report::plot::{Frame, Scale, Series, grid, svg};
+
+/// The engine of the page.
+pub(super) const OWN: &str = "drystone";
+
+/// Values in the order in which they first occur.
+pub(super) fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
+    let mut kept = Vec::new();
+    all.for_each(|value| {
+        if !kept.contains(&value) {
+            kept.push(value);
+        }
+    });
+    kept
+}
+
+/// The thirds of one setting in a scene, on one number of threads.
+fn thirds<'a>(rows: &'a [WindowRow], scene: &str, threads: usize, setting: &str) -> Vec<&'a WindowRow> {
+    rows.iter().filter(|r| (&*r.scene, r.threads, &*r.setting) == (scene, threads, setting)).collect()
+}
+
+/// Some numbers as one cell.
+fn cell(numbers: impl Iterator<Item = f64>) -> String {
+    numbers.map(number).collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn table(rows: &[WindowRow]) -> String {
+    let all_threads = distinct(rows.iter().map(|r| r.threads));
+    let mut text = String::from("| scene, steps | engine |");
+    for threads in &all_threads {
+        let plural = if *threads == 1 { "thread" } else { "threads" };
+        let _ = write!(text, " {threads} {plural}: ms in each third | to the best other | worst, first |");
+    }
+    let _ = write!(text, " mean overlap mm | deepest mm | rms mm/s | in place |\n|---|---|");
+    let _ = writeln!(text, "{}--:|--:|--:|--:|", "--:|--:|--:|".repeat(all_threads.len()));
+    for scene in distinct(rows.iter().map(|r| &*r.scene)) {
+        let of_scene = || rows.iter().filter(|r| r.scene == scene);
+        let steps = of_scene().map(|r| r.to).max().unwrap_or(0);
+        for (k, setting) in distinct(of_scene().map(|r| &*r.setting)).into_iter().enumerate() {
+            let head = if k == 0 { format!("{scene}, {steps}") } else { String::new() };
+            let _ = write!(text, "| {head} | {setting} |");
+            for &threads in &all_threads {
+                let own = thirds(rows, scene, threads, setting);
+                let is_own = own.first().is_some_and(|r| r.engine == OWN);
+                let to_best = cell(own.iter().filter(|_| is_own).filter_map(|r| r.to_best));
+                let worst = own.iter().map(|r| r.ms_worst / r.ms).reduce(f64::max);
+                let first = own.first().map(|r| r.ms_first / r.ms);
+                let slow = cell(worst.into_iter().chain(first));
+                let ms = cell(own.iter().map(|r| r.ms));
+                let _ = write!(text, " {ms} | {to_best} | {slow} |");
+            }
+            // Errors of the first number of threads.
+            let own = thirds(rows, scene, all_threads[0], setting);
+            let mean = cell(own.iter().map(|r| 1e3 * r.penetration_mean));
+            let Some(end) = own.last() else {
+                let _ = writeln!(text, " | | | |");
+                continue;
+            };
+            let place = end.in_place.map_or_else(String::new, |n| format!("{n} of {}", end.bodies));
+            let (deepest, speed) = (number(1e3 * end.penetration_max), number(1e3 * end.speed_rms));
+            let _ = writeln!(text, " {mean} | {deepest} | {speed} | {place} |");
+        }
+    }
+    text
+}
+
+/// Time of a step over the run, one frame a scene, on the least number of threads.
+pub(super) fn picture(rows: &[WindowRow]) -> String {
+    let threads = rows.iter().map(|r| r.threads).min().unwrap_or(1);
+    let engines = distinct(rows.iter().map(|r| &*r.engine));
+    let frame_of = |scene: &str| {
+        let settings = distinct(rows.iter().filter(|r| r.scene == scene).map(|r| &*r.setting));
+        let series = settings.iter().filter_map(|setting| {
+            let own = thirds(rows, scene, threads, setting);
+            let engine = &*own.first()?.engine;
+            let line: Vec<_> = own.iter().map(|r| ((r.from - 1 + r.to) as f64 / 2.0, r.ms)).collect();
+            let points = line.iter().map(|&(x, y)| (x, y, String::new())).collect();
+            let look = engines.iter().position(|&known| known == engine).unwrap_or(0);
+            Some(Series { name: (*setting).to_owned(), look, points, line })
+        });
+        let title = format!("{scene}, threads: {threads}");
+        let scales = (Scale::Linear, Scale::Decades);
+        let frame = Frame { title: &title, x: "step", y: "ms a step", scales, size: (440, 300) };
+        svg(&frame, &series.collect::<Vec<_>>())
+    };
+    grid(&distinct(rows.iter().map(|r| &*r.scene)).into_iter().map(frame_of).collect::<Vec<_>>(), 2)
+}

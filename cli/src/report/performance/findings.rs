@@ -1,0 +1,155 @@
+//! A paragraph a finding, with the figures of the rows.
+
+use std::fmt::Write as _;
+
+use super::Rows;
+use super::engines::{OWN, distinct};
+use crate::report::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
+use crate::report::comparison::WindowRow;
+use crate::report::number::number;
+
+pub(super) fn findings(rows: &Rows) -> String {
+    [
+        ("Beside other engines", "engines-1.csv, engines-2.csv", beside(&rows.engines)),
+        ("No step that stalls", "engines-1.csv, engines-2.csv", stalls(&rows.engines)),
+        ("Stages of a step, falling and at rest", "falling.csv", stages(&rows.falling)),
+        ("One island of any size", "growth.csv", growth(&rows.growth)),
+        ("Sweeps and the limits of the machine", "limits.csv", limits(&rows.limits)),
+        ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
+    ]
+    .map(|(title, files, text)| format!("\n## {title}\n\n{text}\n\nRows: {}.\n", links(files)))
+    .concat()
+}
+
+fn links(files: &str) -> String {
+    files.split(", ").map(|file| format!("[{file}](performance/{file})")).collect::<Vec<_>>().join(", ")
+}
+
+/// `one thread`, `2 threads`.
+fn on(threads: usize) -> String {
+    if threads == 1 { "one thread".into() } else { format!("{threads} threads") }
+}
+
+/// The least and the largest number, as text.
+fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
+    let (low, high) = (numbers.clone().fold(f64::INFINITY, f64::min), numbers.fold(0.0, f64::max));
+    format!("{} to {}", number(low), number(high))
+}
+
+fn beside(rows: &[WindowRow]) -> String {
+    let own = || rows.iter().filter(|r| r.engine == OWN);
+    let times = distinct(own().map(|r| r.threads)).into_iter().map(|threads| {
+        let ratios = || own().filter(move |r| r.threads == threads).filter_map(|r| Some((r.to_best?, r)));
+        let most = ratios().max_by(|a, b| a.0.total_cmp(&b.0));
+        let of_most =
+            most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
+        format!("{} ({}{of_most})", range(ratios().map(|r| r.0)), on(threads))
+    });
+    // Of the overlap of the other engine that has least, third by third.
+    let to_least = |mine: &WindowRow| {
+        let same = |r: &&WindowRow| r.engine != OWN && (&r.run, r.from) == (&mine.run, mine.from);
+        let least = rows.iter().filter(same).map(|r| r.penetration_mean).reduce(f64::min)?;
+        Some(mine.penetration_mean / least)
+    };
+    let overlap = own().filter_map(to_least).fold(0.0, f64::max);
+    format!(
+        "Over all thirds of all scenes, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is at most {} of the \
+         least mean overlap of another engine at the end of the same third.",
+        times.collect::<Vec<_>>().join(" and "),
+        number(overlap)
+    )
+}
+
+fn stalls(rows: &[WindowRow]) -> String {
+    let own = || rows.iter().filter(|r| r.engine == OWN);
+    let largest = |of: fn(&WindowRow) -> f64| own().map(|r| (of(r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let name = |found: Option<(f64, &WindowRow)>| {
+        found.map_or_else(String::new, |(x, r)| format!("{} ({}, {})", number(x), r.scene, on(r.threads)))
+    };
+    let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
+    format!(
+        "The slowest step of a third takes at most {} times the median of the third. The first step of a run takes at most {} times \
+         the median of the first third: it computes all pairs, chooses all colors and takes all memory.",
+        name(largest(|r| r.ms_worst / r.ms)),
+        name(largest(first))
+    )
+}
+
+/// The thirds of the largest scene on the least number of threads.
+fn stages(rows: &[FallingRow]) -> String {
+    let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
+    let Some(most) = rows.iter().map(key).max() else { return String::new() };
+    let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
+    let mut text = format!("Medians of {}, {}, in ms:\n\n", shown[0].scene, on(shown[0].threads));
+    for r in shown {
+        let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
+        let _ = writeln!(
+            text,
+            "* steps {} to {}: {ms}, of it detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} \
+             pairs computed anew, {} manifolds",
+            r.from, r.to, r.computed, r.pairs, r.manifolds
+        );
+    }
+    text.trim_end().to_owned()
+}
+
+fn growth(rows: &[GrowthRow]) -> String {
+    let mut text = String::from(
+        "A plane pyramid is one island. The least time of the stage `run` for a manifold and a pass over all contacts, relative to the \
+         smallest island in brackets, and bytes of the whole process at its peak:\n\n",
+    );
+    for scene in distinct(rows.iter().map(|r| &r.scene)) {
+        let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
+        let times = own.iter().map(|r| format!("{} ns ({}) with {}", number(r.ns), number(r.growth), on(r.threads)));
+        let memory = own[0].bytes_a_box.map_or_else(String::new, |bytes| format!("; {bytes:.0} bytes a box"));
+        let [ms, detect, rows, run] = [own[0].ms, own[0].detect, own[0].prepare, own[0].run].map(number);
+        let _ = writeln!(
+            text,
+            "* {} boxes: {}{memory}; a step with {} takes {ms} ms, of it detection {detect}, rows {rows}, sweeps {run}",
+            own[0].boxes,
+            times.collect::<Vec<_>>().join(", "),
+            on(own[0].threads)
+        );
+    }
+    text.trim_end().to_owned()
+}
+
+fn limits(rows: &[LimitRow]) -> String {
+    let mut text = String::from(
+        "A sweep over one point with friction takes 299.5 operations on single numbers, counted by running the kernel over a number type \
+         that counts. Bytes are those that the lanes read and write, and in brackets those of the kernels over plain rows, each body as often \
+         as a contact names it; bodies that come from a cache take the rate beyond 100 % of the triad. The triad is a = b + s c over as \
+         many bytes as the lanes hold; the peak is that of multiplications and additions on registers alone:\n\n",
+    );
+    for r in rows {
+        let _ = writeln!(
+            text,
+            "* {} ({} MiB), {}: {} ns and {:.0} ({:.0}) bytes a manifold, {} million points a second: {:.0} % of a triad of {} GB/s, \
+             {:.0} % of a peak of {} G/s",
+            r.scene,
+            number(r.held as f64 / f64::from(1 << 20)),
+            on(r.threads),
+            number(r.ns),
+            r.lane_bytes,
+            r.kernel_bytes,
+            number(r.sweeps * 1e-6),
+            100.0 * r.of_triad,
+            number(r.triad * 1e-9),
+            100.0 * r.of_peak,
+            number(r.peak * 1e-9)
+        );
+    }
+    text.trim_end().to_owned()
+}
+
+fn worlds(rows: &[WorldsRow]) -> String {
+    let mut text = String::from(
+        "Steps of one world in a second, all worlds at rest; in brackets the share of the best number of worlds:\n\n",
+    );
+    for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
+        let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
+        let list = own.map(|r| format!("{:.0} ({}) of {}", r.per_second, number(r.of_best), r.worlds));
+        let _ = writeln!(text, "* {}, {}: {} worlds", key.0, on(key.1), list.collect::<Vec<_>>().join(", "));
+    }
+    text.trim_end().to_owned()
+}

@@ -1,0 +1,78 @@
+//! `drystone report performance`: a table, a picture and a paragraph a finding, from rows that other commands measured.
+
+mod engines;
+mod findings;
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use super::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
+use super::comparison::WindowRow;
+use crate::files;
+use drystone::{Error, Result};
+
+/// The rows in the folder of the page, file by file.
+struct Rows {
+    engines: Vec<WindowRow>,
+    falling: Vec<FallingRow>,
+    growth: Vec<GrowthRow>,
+    worlds: Vec<WorldsRow>,
+    limits: Vec<LimitRow>,
+}
+
+/// Files of `drystone-peers --thirds`, one for each number of threads: Rapier's builds for one and for several differ.
+const ENGINES: [&str; 2] = ["engines-1.csv", "engines-2.csv"];
+
+/// Steps of the longest run of a page that is no short run.
+const FULL: usize = 300;
+
+impl Rows {
+    fn read(folder: &Path) -> Result<Self> {
+        Ok(Self {
+            engines: [rows(folder, ENGINES[0])?, rows(folder, ENGINES[1])?].concat(),
+            falling: rows(folder, "falling.csv")?,
+            growth: rows(folder, "growth.csv")?,
+            worlds: rows(folder, "worlds.csv")?,
+            limits: rows(folder, "limits.csv")?,
+        })
+    }
+
+    /// The machine and the program of the rows, and whether their runs are shorter than those of a full page.
+    fn origin(&self) -> String {
+        let first = &self.engines[0];
+        let steps = self.engines.iter().map(|row| row.to).max().unwrap_or(0);
+        let short = if steps < FULL {
+            format!("**This is a short run of {steps} steps, to see that the page is made; its figures are rough.** ")
+        } else {
+            String::new()
+        };
+        format!("{short}Machine: {}. Commit {}, {}.", first.machine, first.commit, first.run)
+    }
+}
+
+/// The rows of a file; at least one.
+fn rows<R: DeserializeOwned>(folder: &Path, name: &str) -> Result<Vec<R>> {
+    let path = folder.join(name);
+    let rows: Vec<R> = files::rows(&path)?;
+    if rows.is_empty() {
+        return Err(Error::input(format!("{}: no rows; `benches/performance` measures them", path.display())));
+    }
+    Ok(rows)
+}
+
+/// Writes `performance.md` and `performance/engines.svg` into a directory, from the CSV files in its folder `performance`.
+pub fn performance(directory: &Path) -> Result<()> {
+    let folder = directory.join("performance");
+    let rows = Rows::read(&folder)?;
+    let page = [
+        include_str!("../performance_head.md"),
+        &format!("\n{}\n\n", rows.origin()),
+        &engines::table(&rows.engines),
+        "\n![time of a step over the run, one picture a scene](performance/engines.svg)\n",
+        &findings::findings(&rows),
+        include_str!("../performance_tail.md"),
+    ];
+    files::write(&folder.join("engines.svg"), engines::picture(&rows.engines).as_bytes())?;
+    files::write(&directory.join("performance.md"), page.concat().as_bytes())
+}
