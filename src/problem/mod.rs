@@ -15,6 +15,7 @@ mod rescale;
 mod rows;
 mod slots;
 pub mod softness;
+mod summary;
 mod write;
 
 pub use blocks::{Block, lay_out};
@@ -28,6 +29,7 @@ pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
     MomentumRow, Params, PassRow, PointRow, Softness, Substep, TurningRow,
 };
+pub use summary::ContactSummary;
 
 use std::ops::Range;
 
@@ -162,20 +164,5 @@ impl StepProblem {
             let first = contact.first_point as usize;
             self.impulses[first..first + contact.point_count as usize + patch].fill(ImpulseRow::default());
         }
-    }
-
-    /// Whether any contact has friction.
-    pub fn has_friction(&self) -> bool {
-        self.swept_contacts().any(|c| c.friction > 0.0)
-    }
-
-    /// Whether any contact can bounce.
-    pub fn has_restitution(&self) -> bool {
-        self.swept_contacts().any(|c| c.restitution > 0.0)
-    }
-
-    /// Whether any contact is made by a round surface, whose radius its rows carry.
-    pub fn has_round_shapes(&self) -> bool {
-        self.swept_contacts().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
     }
 }
