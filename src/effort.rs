@@ -151,10 +151,9 @@ impl Effort {
 
     /// Classes by the loads of statics.
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
-        let loads = Load::all(world, config);
-        let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         // Boxes of bodies beside each other may overlap.
-        let touches = |load: &&Load| load.gap.abs() < 0.1 * f64::from(world.bodies[load.upper].smallest_half_extent());
+        let touches = |upper: usize, gap: f64| gap.abs() < 0.1 * f64::from(world.bodies[upper].smallest_half_extent());
+        let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
             let sag = load.overlap(config.substeps, dt, config);
@@ -162,7 +161,8 @@ impl Effort {
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
             Interface { a, b, need: need as f32, is_joint: false }
         };
-        self.follow_islands(world, &[], loads.iter().filter(touches).map(interface), false);
+        let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
+        self.follow_islands(world, &[], interfaces.iter().copied(), false);
     }
 
     fn follow_islands(

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DVec3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use rayon::prelude::*;
 
 use crate::config::{SolverConfig, Stabilization};
 use crate::error::{Error, Result, input};
@@ -42,29 +43,32 @@ impl Load {
     /// their bounding boxes overlap seen from above. A ball touches in one point, everything else in four corners.
     pub fn heaviest(world: &World, config: &SolverConfig) -> Option<Self> {
         let deeper = |a: Self, b: Self| if b.stress > a.stress { b } else { a };
-        Self::all(world, config).into_iter().reduce(deeper)
+        Self::all(world, config, |_, _| true).into_iter().reduce(deeper)
     }
 
-    /// All interfaces of `world`, as those of [`Self::heaviest`].
-    pub fn all(world: &World, config: &SolverConfig) -> Vec<Self> {
-        let boxes = upright_boxes(world);
-        let tree = tree(&boxes);
+    /// The interfaces of `world`, as those of [`Self::heaviest`], that are wanted by their upper bodies and their gaps (m).
+    pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
+        let up = up(world);
+        let boxes = upright_boxes(world, up);
+        let ground = Ground::new(&boxes);
         let gravity = world.gravity.as_dvec3().length();
         let weight = |b: &Body| f64::from(b.mass.mass) * gravity;
         let mut borne: Vec<f64> = world.bodies.iter().map(weight).collect();
         let mut from_the_top: Vec<usize> =
             (0..boxes.len()).filter(|&i| world.bodies[i].kind == BodyKind::Dynamic && !boxes[i].is_empty()).collect();
         from_the_top.sort_by(|&i, &j| boxes[j].low.y.total_cmp(&boxes[i].low.y).then(i.cmp(&j)));
+        let below: Vec<_> = from_the_top.par_iter().with_min_len(64).map(|&upper| ground.supports(upper)).collect();
         let mut all = Vec::new();
-        for upper in from_the_top {
-            let below = supports(&tree, &boxes, upper);
+        for (upper, below) in from_the_top.into_iter().zip(below) {
             let total: f64 = below.iter().map(|s| s.1).sum();
             for (lower, area) in below {
                 let force = borne[upper] * area / total;
                 borne[lower] += force;
-                let stress = stress(world, &boxes, upper, lower, force, config);
                 let gap = boxes[upper].low.y - boxes[lower].high.y;
-                all.push(Self { upper, lower, force, stress, gap });
+                if is_wanted(upper, gap) {
+                    let stress = stress(world, (&boxes, up), upper, lower, force, config);
+                    all.push(Self { upper, lower, force, stress, gap });
+                }
             }
         }
         all
@@ -98,8 +102,14 @@ impl Load {
 }
 
 /// Force on one point over the mass that it feels, and over the square of what its frequency is multiplied by.
-fn stress(world: &World, boxes: &[Box3], upper: usize, lower: usize, force: f64, config: &SolverConfig) -> f64 {
-    let up = up(world);
+fn stress(
+    world: &World,
+    (boxes, up): (&[Box3], DMat3),
+    upper: usize,
+    lower: usize,
+    force: f64,
+    config: &SolverConfig,
+) -> f64 {
     let overlap = boxes[upper].overlap_from_above(&boxes[lower]);
     let one_point = [upper, lower].iter().any(|&i| world.bodies[i].colliders.iter().all(|c| c.shape.is_ball()));
     let at = if one_point { overlap.center() } else { overlap.high };
@@ -147,9 +157,9 @@ impl Box3 {
     }
 }
 
-/// The bounding box of each body; empty without shapes. A half-space is as wide as the world.
-fn upright_boxes(world: &World) -> Vec<Box3> {
-    let turn = up(world).as_mat3();
+/// The bounding box of each body, turned by `up`; empty without shapes. A half-space is as wide as the world.
+fn upright_boxes(world: &World, up: DMat3) -> Vec<Box3> {
+    let turn = up.as_mat3();
     let rotation = glam::Quat::from_mat3(&turn);
     let empty = Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
     let of = |b: &Body| {
@@ -167,41 +177,73 @@ fn upright_boxes(world: &World) -> Vec<Box3> {
     world.bodies.iter().map(of).collect()
 }
 
+/// How many times deeper the next search for bodies that bear goes, where one found none.
+const DEEPER: f64 = 4.0;
 /// Farther than any body is (m), and small enough for areas in single precision.
 const FAR: f64 = 1e15;
-
-/// The boxes of all bodies that have shapes, to be asked for those under a body.
-fn tree(boxes: &[Box3]) -> Bvh {
-    let leaves = boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
-    Bvh::from_iter(BvhBuildStrategy::Binned, leaves.map(|(i, b)| (i, aabb(b.low, b.high))))
-}
 
 fn aabb(low: DVec3, high: DVec3) -> Aabb {
     Aabb::new(low.max(DVec3::splat(-FAR)).as_vec3(), high.min(DVec3::splat(FAR)).as_vec3())
 }
 
-/// The bodies that bear `upper`, with the areas by which they overlap it from above.
-fn supports(tree: &Bvh, boxes: &[Box3], upper: usize) -> Vec<(usize, f64)> {
-    let above = &boxes[upper];
-    let height = above.high.y - above.low.y;
-    let area = |i: usize| {
-        let shared = above.overlap_from_above(&boxes[i]);
-        (shared.high.x - shared.low.x).max(0.0) * (shared.high.z - shared.low.z).max(0.0)
-    };
-    let middle = above.low.y + 0.5 * height;
-    let column = aabb(above.low.with_y(-FAR), above.high.with_y(middle));
-    let lower = |i: &usize| *i != upper && boxes[*i].high.y < middle;
-    let near = tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
-    let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
-    below.sort_unstable_by_key(|s| s.0);
-    let top = below.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
-    below.retain(|s| boxes[s.0].high.y >= top - LEVEL * height);
-    below
+/// The boxes of all bodies that have shapes, to be asked for those under a body.
+struct Ground<'a> {
+    boxes: &'a [Box3],
+    tree: Bvh,
+    /// The height of the lowest top of a box (m).
+    lowest: f64,
+}
+
+impl<'a> Ground<'a> {
+    fn new(boxes: &'a [Box3]) -> Self {
+        let leaves = || boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves().map(|(i, b)| (i, aabb(b.low, b.high))));
+        Self { boxes, tree, lowest: leaves().map(|(_, b)| b.high.y).fold(f64::INFINITY, f64::min) }
+    }
+
+    /// The bodies that bear `upper`, with the areas by which they overlap it from above.
+    ///
+    /// The search goes as deep as the boxes that it finds bear: in a pile, all that is under a body is a column of dozens of boxes.
+    fn supports(&self, upper: usize) -> Vec<(usize, f64)> {
+        let above = &self.boxes[upper];
+        let height = above.high.y - above.low.y;
+        let mut depth = height;
+        let mut floor = above.low.y - depth;
+        loop {
+            let mut below = self.boxes_between(upper, floor);
+            let top = below.iter().map(|s| self.boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
+            let level = top - LEVEL * height;
+            let goes_deeper = floor > self.lowest && floor > level;
+            if !goes_deeper {
+                below.retain(|s| self.boxes[s.0].high.y >= level);
+                return below;
+            }
+            depth *= DEEPER;
+            floor = if below.is_empty() { above.low.y - depth } else { level };
+        }
+    }
+
+    /// The bodies whose boxes end above `floor` and below the middle of `upper`, and overlap it from above, by so much.
+    fn boxes_between(&self, upper: usize, floor: f64) -> Vec<(usize, f64)> {
+        let above = &self.boxes[upper];
+        let middle = above.low.y + 0.5 * (above.high.y - above.low.y);
+        let area = |i: usize| {
+            let shared = above.overlap_from_above(&self.boxes[i]);
+            (shared.high.x - shared.low.x).max(0.0) * (shared.high.z - shared.low.z).max(0.0)
+        };
+        let column = aabb(above.low.with_y(floor), above.high.with_y(middle));
+        let lower = |i: &usize| *i != upper && self.boxes[*i].high.y < middle;
+        let near = self.tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
+        let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
+        below.sort_unstable_by_key(|s| s.0);
+        below
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::SplitMix64;
     use crate::scenes::Scene;
 
     fn heaviest(scene: &str, parameters: &[&str]) -> (Load, Scene) {
@@ -224,6 +266,33 @@ mod tests {
         let substeps = load.substeps(1e-3, scene.dt, &config).unwrap();
         assert!(load.overlap(substeps, scene.dt, &config) <= 1e-3);
         assert!(load.overlap(substeps - 1, scene.dt, &config) > 1e-3);
+    }
+
+    /// Boxes of many sizes in a high and narrow space, so that bodies rest on near ones, on far ones and on nothing.
+    #[test]
+    fn the_search_for_what_bears_finds_it_at_any_depth() {
+        let mut random = SplitMix64::new(7);
+        let mut number = |low: f32, high: f32| low + (high - low) * (0.5 + 0.5 * random.symmetric() as f32);
+        let mut world = World::new();
+        for height in [3.0, 30.0, 300.0, 3000.0].repeat(50) {
+            let half = number(0.01, 1.0);
+            let at = [number(-3.0, 3.0), number(0.0, height), number(-3.0, 3.0)];
+            world
+                .add(Body::dynamic().shape(crate::Shape::cuboid(half, 0.3 * half, half)).position(at[0], at[1], at[2]));
+        }
+        let boxes = upright_boxes(&world, up(&world));
+        let ground = Ground::new(&boxes);
+        let (mut alone, mut deep) = (0, 0);
+        for upper in 0..boxes.len() {
+            let height = boxes[upper].high.y - boxes[upper].low.y;
+            let all = ground.boxes_between(upper, -FAR);
+            let top = all.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
+            let bearing: Vec<_> = all.into_iter().filter(|s| boxes[s.0].high.y >= top - LEVEL * height).collect();
+            assert_eq!(ground.supports(upper), bearing, "{upper}");
+            alone += usize::from(bearing.is_empty());
+            deep += usize::from(top < boxes[upper].low.y - height && !bearing.is_empty());
+        }
+        assert!(alone > 3 && deep > 50, "{alone} rest on nothing, {deep} on what lies deep below");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use drystone::glam::Vec3;
 use drystone::stages::backend::{CheckedStep, crossover};
 use drystone::stages::compare::{Difference, compare};
 use drystone::stages::plan::Kernel;
+use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
@@ -149,7 +150,8 @@ fn a_mixture_has_work_for_every_kernel() {
         simulation.step(scene.dt).expect("the reference runs");
     }
     let problem = simulation.problem();
-    assert!(problem.has_friction() && problem.has_restitution() && problem.has_round_shapes());
+    let swept = ContactSummary::of(problem);
+    assert!(swept.friction && swept.restitution && swept.round);
     assert!(problem.contacts.len() >= 5, "{} contacts", problem.contacts.len());
     assert_eq!(problem.joints.len(), 8);
     assert!(problem.inertias.len() > 8);

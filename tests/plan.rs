@@ -1,6 +1,7 @@
 //! Plans: what a scene lacks is absent from its plan, and saves what it would have moved.
 
 use drystone::stages::plan::Kernel;
+use drystone::stages::problem::ContactSummary;
 use drystone::{Backend, Body, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
 use glam::Vec3;
 
@@ -9,7 +10,7 @@ fn planned(world: World, config: SolverConfig) -> (StepPlan, u64, Simulation) {
     let backend = Box::new(Reference::<f32>::new());
     let mut simulation = Simulation::new(world, config, backend).expect("good settings");
     let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
-    let bytes = plan.bytes_moved(&problem);
+    let bytes = plan.bytes_moved(&problem, &ContactSummary::of(&problem));
     (plan, bytes, simulation)
 }
 

@@ -6,31 +6,26 @@ use super::{Kernel, Pass, StepPlan};
 use crate::config::FrictionRule;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
-    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, PointRow,
-    StepProblem, TurningRow,
+    BodyRow, ContactRow, ContactSummary, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
+    MassRow, PointRow, StepProblem, TurningRow,
 };
 
 impl StepPlan {
     /// Bytes that the kernels read and write when every row that a thread names is moved once.
-    pub fn bytes_moved(&self, problem: &StepProblem) -> u64 {
-        self.bytes_of_passes(problem).sum()
+    pub fn bytes_moved(&self, problem: &StepProblem, contacts: &ContactSummary) -> u64 {
+        self.passes.iter().map(|pass| pass.bytes_moved(problem, contacts)).sum()
     }
 
     /// The same, pass by pass.
     pub fn bytes_of_passes(&self, problem: &StepProblem) -> impl Iterator<Item = u64> {
-        // Points of the contacts before each place in the order.
-        let mut points = vec![0];
-        points.extend(problem.swept_contacts().scan(0, |sum, contact| {
-            *sum += contact.point_count as usize;
-            Some(*sum)
-        }));
-        self.passes.iter().map(move |pass| pass.bytes_moved(problem, &points))
+        let contacts = ContactSummary::of(problem);
+        self.passes.iter().map(move |pass| pass.bytes_moved(problem, &contacts))
     }
 }
 
 impl Pass {
-    /// Bytes that this pass reads and writes; `points` are those of the contacts before each place in the order.
-    fn bytes_moved(&self, problem: &StepProblem, points: &[usize]) -> u64 {
+    /// Bytes that this pass reads and writes.
+    fn bytes_moved(&self, problem: &StepProblem, contacts: &ContactSummary) -> u64 {
         const BODY: usize = size_of::<BodyRow>();
         const MASS: usize = size_of::<MassRow>();
         // Velocities are the half of a body that a sweep writes.
@@ -40,7 +35,7 @@ impl Pass {
         const IMPULSE: usize = size_of::<ImpulseRow>();
         let rows = problem.rows_of(&self.colors);
         let points_of = |colors: &Range<u32>| {
-            let [first, end] = [colors.start, colors.end].map(|color| points[problem.colors[color as usize] as usize]);
+            let [first, end] = [colors.start, colors.end].map(|color| contacts.points[color as usize]);
             end - first
         };
         let bytes = match self.kernel {

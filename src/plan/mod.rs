@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use crate::config::{Clamping, FUSE_BELOW, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig};
 use crate::kernels::Rules;
-use crate::problem::{Block, StepProblem};
+use crate::problem::{Block, ContactSummary, StepProblem};
 
 /// One dispatch: a kernel over some colors of a block, one after another.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,13 +81,18 @@ const LONGEST_FROM_START: f32 = 1.0 / 1000.0;
 impl StepPlan {
     /// The plan of `problem` under `config`: one block after another.
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
-        let friction = if problem.has_friction() { config.friction_rule() } else { FrictionRule::None };
+        Self::with_summary(config, problem, &ContactSummary::of(problem))
+    }
+
+    /// The same, where the summary of the contacts is known.
+    pub fn with_summary(config: &SolverConfig, problem: &StepProblem, contacts: &ContactSummary) -> Self {
+        let friction = if contacts.friction { config.friction_rule() } else { FrictionRule::None };
         let rules = Rules {
             friction,
             patch: problem.has_patches(),
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.rules.clamping == Clamping::Accumulated,
-            round: problem.has_round_shapes(),
+            round: contacts.round,
             driven: false,
             passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
@@ -95,11 +100,11 @@ impl StepPlan {
             from_start: false,
             isotropic: false,
         };
-        let bounces = problem.has_restitution();
+        let bounces = contacts.restitution;
         let mut plan = Self::default();
         for block in 0..problem.blocks.len() as u32 {
             let own = &problem.blocks[block as usize];
-            let [contacts, _, bodies, ..] = own.colors();
+            let [contact_colors, _, bodies, ..] = own.colors();
             let from_start = own.substep.length < LONGEST_FROM_START && !problem.rows_of(&bodies).is_empty();
             let rules = Rules { from_start, isotropic: problem.is_isotropic(problem.rows_of(&bodies)), ..rules };
             if from_start {
@@ -108,8 +113,8 @@ impl StepPlan {
             plan.substeps(config, problem, block, rules);
             if bounces {
                 let rules = Rules { patch: rules.patch, from_start, isotropic: rules.isotropic, ..Rules::default() };
-                let contacts = color_groups(&problem.colors, contacts, config.fuse_colors_below);
-                plan.over_colors(Kernel::ApplyRestitution(rules), block, &contacts);
+                let groups = color_groups(&problem.colors, contact_colors, config.fuse_colors_below);
+                plan.over_colors(Kernel::ApplyRestitution(rules), block, &groups);
             }
             if from_start {
                 plan.over_colors(Kernel::EndChanges, block, &[bodies]);
@@ -177,11 +182,12 @@ impl StepPlan {
     /// Sweeps over a problem without time: what is wanted of the velocities stands in its rows, no body moves, and every
     /// contact is hard. Every manifold is swept `passes` times before the next. `range` begins at 0, or where the sweeps of the run before ended.
     pub fn of_sweeps(problem: &StepProblem, method: Method, passes: u8, range: Range<u32>) -> Self {
+        let friction = ContactSummary::of(problem).friction;
         let driven = problem.points.iter().any(|p| p.slip_1 != 0.0 || p.slip_2 != 0.0);
         let rules = Rules {
             biased: problem.points.iter().any(|p| p.separation < 0.0),
-            friction: if problem.has_friction() { FrictionRule::Disc } else { FrictionRule::None },
-            driven: driven && problem.has_friction(),
+            friction: if friction { FrictionRule::Disc } else { FrictionRule::None },
+            driven: driven && friction,
             passes,
             ..Rules::default()
         };

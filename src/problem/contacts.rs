@@ -63,6 +63,9 @@ impl Materials {
     }
 }
 
+/// Slots that one task goes over at least.
+const LEAST_SLOTS: usize = 1024;
+
 impl ContactRows {
     /// Gives rows to manifolds that began since, and takes those of manifolds that ended.
     pub fn follow(&mut self, world: &World, detector: &mut Detector) {
@@ -116,8 +119,7 @@ impl ContactRows {
         problem: &StepProblem,
     ) -> Option<HardestContact> {
         let Slots { all, edges, .. } = &mut self.slots;
-        let mut hardest: Option<(usize, f32)> = None;
-        for (i, slot) in all.iter_mut().enumerate().filter(|(_, slot)| slot.takes_part) {
+        let need_of = |(i, slot): (usize, &mut Slot)| {
             slot.need = match problem.sags.get(i).filter(|_| slot.write != Write::New) {
                 Some(sag) => {
                     let share = if is_one_class { 1.0 } else { problem.contacts[i].substep_share };
@@ -126,10 +128,12 @@ impl ContactRows {
                 }
                 None => 0.0,
             };
-            if hardest.is_none_or(|(_, need)| slot.need > need) {
-                hardest = Some((i, slot.need));
-            }
-        }
+            (i, slot.need)
+        };
+        // Of equal ones the first.
+        let harder = |one: (usize, f32), other: (usize, f32)| if other.1 > one.1 { other } else { one };
+        let slots = all.par_iter_mut().with_min_len(LEAST_SLOTS).enumerate();
+        let hardest = slots.filter(|(_, slot)| slot.takes_part).map(need_of).reduce_with(harder);
         let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
         hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }

@@ -16,6 +16,7 @@ mod rescale;
 mod rows;
 mod slots;
 pub mod softness;
+mod summary;
 mod write;
 
 pub use blocks::{Block, lay_out};
@@ -29,6 +30,7 @@ pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
     MomentumRow, Params, PassRow, PointRow, Softness, Substep, TurningRow,
 };
+pub use summary::ContactSummary;
 
 use std::ops::Range;
 
@@ -171,20 +173,5 @@ impl StepProblem {
             let ([xx, xy, xz], [yy, yz, zz]) = (mass.inv_inertia_x, mass.inv_inertia_yz);
             [xy, xz, yz] == [0.0; 3] && [yy, zz] == [xx; 2]
         })
-    }
-
-    /// Whether any contact has friction.
-    pub fn has_friction(&self) -> bool {
-        self.swept_contacts().any(|c| c.friction > 0.0)
-    }
-
-    /// Whether any contact can bounce.
-    pub fn has_restitution(&self) -> bool {
-        self.swept_contacts().any(|c| c.restitution > 0.0)
-    }
-
-    /// Whether any contact is made by a round surface, whose radius its rows carry.
-    pub fn has_round_shapes(&self) -> bool {
-        self.swept_contacts().any(|c| c.radius_a > 0.0 || c.radius_b > 0.0)
     }
 }

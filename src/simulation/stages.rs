@@ -5,7 +5,7 @@ use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, ContactRows, JointRows, StepProblem, StepScale};
+use crate::problem::{self, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
 use crate::rest;
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
@@ -198,9 +198,10 @@ impl Stages {
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
-                self.plan = StepPlan::new(config, problem);
-                self.points = problem.swept_contacts().map(|contact| contact.point_count as usize).sum();
-                self.bytes_moved = self.plan.bytes_moved(problem);
+                let swept = ContactSummary::of(problem);
+                self.plan = StepPlan::with_summary(config, problem, &swept);
+                self.points = swept.point_count();
+                self.bytes_moved = self.plan.bytes_moved(problem, &swept);
                 self.plan_key = Some(PlanKey::of(problem));
             }
         });

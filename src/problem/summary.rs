@@ -1,0 +1,57 @@
+//! What the contacts of a step have in common, in one pass over their rows.
+
+use rayon::prelude::*;
+
+use super::{ContactRow, StepProblem};
+
+/// What plans, counts of points and counts of bytes ask of the contacts that take part.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ContactSummary {
+    /// Whether any has friction.
+    pub friction: bool,
+    /// Whether any can bounce.
+    pub restitution: bool,
+    /// Whether any is made by a round surface, whose radius its rows carry.
+    pub round: bool,
+    /// Points of the contacts before each color, and of all.
+    pub points: Vec<usize>,
+}
+
+/// Contacts that one task goes over.
+const CONTACTS_A_TASK: usize = 2048;
+
+impl ContactSummary {
+    /// The summary of the contacts that take part in a step.
+    pub fn of(problem: &StepProblem) -> Self {
+        let mut all = Self { points: vec![0], ..Self::default() };
+        for color in problem.contact_colors() {
+            let rows = problem.rows_of(&(color..color + 1)).par_chunks(CONTACTS_A_TASK);
+            let (friction, restitution, round, points) = rows
+                .map(|rows| rows.iter().map(|&row| of_contact(&problem.contacts[row as usize])).fold(NONE, and))
+                .reduce(|| NONE, and);
+            all.friction |= friction;
+            all.restitution |= restitution;
+            all.round |= round;
+            all.points.push(all.points[all.points.len() - 1] + points);
+        }
+        all
+    }
+
+    /// Points of all contacts.
+    pub fn point_count(&self) -> usize {
+        self.points.last().copied().unwrap_or(0)
+    }
+}
+
+/// Friction, restitution, round surfaces, points.
+type Of = (bool, bool, bool, usize);
+
+const NONE: Of = (false, false, false, 0);
+
+fn of_contact(c: &ContactRow) -> Of {
+    (c.friction > 0.0, c.restitution > 0.0, c.radius_a > 0.0 || c.radius_b > 0.0, c.point_count as usize)
+}
+
+fn and(x: Of, y: Of) -> Of {
+    (x.0 | y.0, x.1 | y.1, x.2 | y.2, x.3 + y.3)
+}
