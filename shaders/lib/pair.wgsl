@@ -2,16 +2,6 @@
 
 struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass, start_a: Free, start_b: Free }
 
-fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
-    let p = m.inv_inertia_x;
-    let q = m.inv_inertia_yz;
-    return vec3f(
-        p.x * u.x + p.y * u.y + p.z * u.z,
-        p.y * u.x + q.x * u.y + q.y * u.z,
-        p.z * u.x + q.y * u.y + q.z * u.z,
-    );
-}
-
 // Applies the impulse p to b at r_b, and -p to a at r_a.
 fn apply_impulse(pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f, p: vec3f) {
     (*pair).a.v -= p * (*pair).mass_a.inv_mass;
