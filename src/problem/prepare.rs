@@ -184,19 +184,19 @@ impl Over<'_> {
             let (r_a, r_b) = (vec3(ax, ay, az), vec3(bx, by, bz));
             let masses = point_masses(tangents, jams, &frame, &a, &b, r_a, r_b);
             let (normal, tangent, jamming) = (masses.normal.store(), masses.tangent.store(), masses.jamming.store());
-            for lane in 0..group.len {
+            for (lane, jams) in jammed.iter_mut().enumerate().take(group.len) {
                 if k < group.counts[lane] as usize {
                     let at = group.slots[lane] as usize * self.rows.stride + k;
                     // SAFETY: tasks have different slots.
                     let point = unsafe { &mut self.rows.points.slice(at..at + 1)[0] };
                     (point.normal_mass, point.tangent_mass) = (normal.0[lane], tangent.0[lane]);
-                    jammed[lane] |= jamming.0[lane] > 1.0;
+                    *jams |= jamming.0[lane] > 1.0;
                 }
             }
         }
-        for lane in 0..group.len {
+        for (lane, &jams) in jammed.iter().enumerate().take(group.len) {
             // SAFETY: as above.
-            unsafe { self.rows.jams.write(group.slots[lane] as usize, jammed[lane]) };
+            unsafe { self.rows.jams.write(group.slots[lane] as usize, jams) };
         }
     }
 
