@@ -49,7 +49,7 @@ pub mod backend {
     pub mod shader {
         pub use crate::backend::gpu::bindings::Binding;
         pub use crate::backend::gpu::reflect::Reflected;
-        pub use crate::backend::gpu::resident::ResidentParams;
+        pub use crate::backend::gpu::resident::{ResidentParams, WrittenContact};
         pub use crate::backend::gpu::rows::{JOINT_BLOCK, JOINT_NODE, SCRATCH_ROW};
         pub use crate::backend::gpu::spirv_exact::exact_spirv;
         pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, WORKGROUP};

@@ -8,9 +8,10 @@ use common::gpu;
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
+use drystone::stages::backend::shader::WrittenContact;
 use drystone::stages::compare::Difference;
-use drystone::stages::problem::carry::Carry;
-use drystone::stages::problem::{ContactRow, ConvergenceRow, MomentumRow, PointRow};
+use drystone::stages::problem::carry::{Carry, Written};
+use drystone::stages::problem::{ContactRow, ConvergenceRow, MomentumRow};
 use drystone::stats::Traffic;
 use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
@@ -301,8 +302,9 @@ fn a_falling_pile_sends_what_was_computed_and_the_order() {
     let (_, mut simulation) = traffic_of(&scene, 60, 1);
     for _ in 0..30 {
         let stats = simulation.step(scene.dt).expect("a step");
-        // Four separations and a place in the order for all, rows for those that were computed.
-        let computed = stats.computed * (size_of::<ContactRow>() + 4 * size_of::<PointRow>() + 8);
+        // Four separations and a place in the order for all, manifolds and up to four pairs of arms for those that were computed.
+        let computed =
+            stats.computed * (size_of::<WrittenContact>() + 4 * size_of::<[[f32; 3]; 2]>() + size_of::<Written>());
         let most = stats.manifolds * (16 + 4) + computed + 2048;
         assert!(stats.traffic.up as usize <= most, "{:?} of {most}: {stats:?}", stats.traffic);
         assert_eq!(stats.traffic.down, moved(simulation.problem()));

@@ -32,6 +32,17 @@ fn reciprocal(x: f32) -> f32 {
     return scaled * (y * y) * scale;
 }
 
+// The inverse inertia of a body, times a vector. Double: src/kernels/rows.rs.
+fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
+    let p = m.inv_inertia_x;
+    let q = m.inv_inertia_yz;
+    return vec3f(
+        p.x * u.x + p.y * u.y + p.z * u.z,
+        p.y * u.x + q.x * u.y + q.y * u.z,
+        p.z * u.x + q.y * u.y + q.z * u.z,
+    );
+}
+
 fn quat_mul(a: vec4f, b: vec4f) -> vec4f {
     return vec4f(
         a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,

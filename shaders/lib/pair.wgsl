@@ -2,16 +2,6 @@
 
 struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass, start_a: Free, start_b: Free }
 
-fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
-    let p = m.inv_inertia_x;
-    let q = m.inv_inertia_yz;
-    return vec3f(
-        p.x * u.x + p.y * u.y + p.z * u.z,
-        p.y * u.x + q.x * u.y + q.y * u.z,
-        p.z * u.x + q.y * u.y + q.z * u.z,
-    );
-}
-
 // How an impulse turns a body: its inverse inertia times the moment u.
 fn spin_of(isotropic: bool, m: Mass, u: vec3f) -> vec3f {
     if isotropic { return u * m.inv_inertia_x.x; }

@@ -55,6 +55,12 @@ fn jamming(friction: f32, parted: f32, pressed_1: f32, pressed_2: f32) -> f32 {
 
 fn normal_step(ratio: f32) -> f32 { return select(1.0, inverse_or_zero(1.0 + ratio), ratio > 1.0); }
 
+// One over the inverse inertia about the normal.
+fn twist_mass(frame: Contact, a: Mass, b: Mass) -> f32 {
+    let n = frame.normal;
+    return inverse_or_zero(dot3(n, inv_inertia_times(a, n)) + dot3(n, inv_inertia_times(b, n)));
+}
+
 struct PointMasses { normal: f32, tangent: f32, jamming: f32 }
 
 // The effective masses of a point. `tangents`: friction has two directions.

@@ -78,7 +78,16 @@ struct ResidentParams {
     written_count: u32,
     // 1 if the host sent all points.
     has_points: u32,
+    // 1 if friction at points has two directions.
+    tangents: u32,
 }
 
 // A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.
 struct Written { row: u32, points_before: u32 }
+
+// Its manifold. Arms of its points are six numbers each, from number `first_arms` on.
+struct WrittenContact {
+    normal: vec3f, friction: f32,
+    restitution: f32, radius_a: f32, radius_b: f32, substep_share: f32,
+    body_a: u32, body_b: u32, first_arms: u32, point_count: u32,
+}

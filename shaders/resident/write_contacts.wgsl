@@ -1,7 +1,7 @@
-// write_contacts: one thread writes the rows of one manifold that the host computed anew, and moves its impulses to the new points
+// write_contacts: one thread computes the rows of one manifold that the host found anew, and moves its impulses to the new points
 // and tangents.
-// Reads written, written_contacts, written_points. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::bring_impulses and retangented in src/problem/write.rs.
+// Reads masses, written, written_contacts, written_arms. Writes contacts, points, impulses; one thread a manifold.
+// Doubles: Writer::write_header, write_masses, patch_of, bring_impulses and retangented in src/problem/write.rs and prepare.rs.
 
 // Rules and materials are those of the step before: where they change, no row stays on the device.
 fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
@@ -10,19 +10,53 @@ fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
     return Impulse(impulse.normal, dot3(friction, now.tangent), dot3(friction, tangent_2), 0.0);
 }
 
+fn written_arm(at: u32) -> vec3f { return vec3f(written_arms[at], written_arms[at + 1u], written_arms[at + 2u]); }
+
+// The points of a contact, and the patch that follows them.
+fn write_points(contact: Contact, first_arms: u32) {
+    let a = masses[contact.body_a];
+    let b = masses[contact.body_b];
+    let first = contact.first_point;
+    var middle_a = vec3f();
+    var middle_b = vec3f();
+    var count = 0.0;
+    for (var k = 0u; k < contact.point_count; k++) {
+        let r_a = written_arm(6u * (first_arms + k));
+        let r_b = written_arm(6u * (first_arms + k) + 3u);
+        let own = point_masses(resident.tangents == 1u, contact, a, b, r_a, r_b);
+        points[first + k] = Point(r_a, 0.0, r_b, own.normal, own.tangent, 0.0, 0.0, 0.0);
+        middle_a += r_a;
+        middle_b += r_b;
+        count += 1.0;
+    }
+    if params.patches == 0u { return; }
+    let share = inverse_or_zero(count);
+    middle_a = middle_a * share;
+    middle_b = middle_b * share;
+    for (var k = first; k < first + contact.point_count; k++) {
+        let lever = points[k].r_a - middle_a;
+        points[k].slip_1 = square_root(dot3(lever, lever));
+    }
+    let own = point_masses(true, contact, a, b, middle_a, middle_b);
+    let twist = twist_mass(contact, a, b);
+    points[first + contact.point_count] = Point(middle_a, 0.0, middle_b, twist, own.tangent, 0.0, 0.0, 0.0);
+}
+
 fn write_contact(i: u32) {
     let row = written[i].row;
     let points_before = written[i].points_before;
     let is_new = points_before == 0xffffffffu;
     let before = contacts[row];
-    var now = written_contacts[i];
-    now.preload = select(before.preload, 0.0, is_new);
+    let own = written_contacts[i];
+    let first = row * (MAX_POINTS + params.patches);
+    let now = Contact(
+        own.normal, own.friction,
+        tangent_of(own.normal), own.restitution,
+        own.body_a, own.body_b, first, own.point_count,
+        own.radius_a, own.radius_b, select(before.preload, 0.0, is_new), own.substep_share,
+    );
     contacts[row] = now;
-    let first = now.first_point;
-    let stride = MAX_POINTS + params.patches;
-    if resident.has_points == 0u {
-        for (var k = 0u; k < now.point_count + params.patches; k++) { points[first + k] = written_points[i * stride + k]; }
-    }
+    if resident.has_points == 0u { write_points(now, own.first_arms); }
     let nothing = Impulse(0.0, 0.0, 0.0, 0.0);
     var old = array(nothing, nothing, nothing, nothing);
     var patch_impulse = nothing;

@@ -79,6 +79,12 @@ pub fn normal_step<L: Lane>(jamming: L) -> L {
     L::select(one, inverse_or_zero(one + jamming), jamming.gt(one))
 }
 
+/// One over the inverse inertia of both bodies about the normal.
+#[inline(always)]
+pub fn twist_mass<L: Lane>(n: Vec3<L>, a: &Mass<L>, b: &Mass<L>) -> L {
+    inverse_or_zero(dot3(n, a.inv_inertia.times(n)) + dot3(n, b.inv_inertia.times(n)))
+}
+
 /// The normal and the tangents of a manifold, and its friction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Frame<L> {
@@ -157,4 +163,63 @@ pub fn movement_since<L: Lane>(
     let [turn_a, turn_b] = [turn_since(a.rotation, then[0]), turn_since(b.rotation, then[1])];
     let movement = NormalMovement::new(normal, (b.center - a.center) - apart, turn_a, turn_b);
     movement.round(normal, radius_a, radius_b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_that_did_not_turn_moves_no_arm_to_the_bit() {
+        for k in 1..1000 {
+            let q = glam::Quat::from_array([1.0, k as f32, 0.37 * k as f32, -0.2]).normalize();
+            let q = Quat::<f32>::load(q.to_array());
+            assert_eq!(turn_since(q, q).axis, Vec3::default());
+        }
+    }
+
+    #[test]
+    fn a_turn_is_the_rotation_between_two() {
+        let (then, turn) = (glam::DQuat::from_rotation_x(0.7), glam::DQuat::from_rotation_z(0.02));
+        let [now, then] = [turn * then, then].map(|q| Quat { axis: vec3(q.x, q.y, q.z), w: q.w });
+        let apart = turn_since(now, then).axis - vec3(turn.x, turn.y, turn.z);
+        assert!(dot3(apart, apart) < 1e-30, "{apart:?}");
+    }
+
+    #[test]
+    fn inverses_of_powers_of_two_are_exact_and_of_others_to_an_ulp() {
+        for k in 1..10_000 {
+            let x = k as f32 * 0.013;
+            let error = (f64::from(inverse_or_zero(x)) * f64::from(x) - 1.0).abs();
+            assert!(error < 1.01 * f64::from(f32::EPSILON), "{x}: {error:e}");
+        }
+        for exponent in -30..30 {
+            assert_eq!(inverse_or_zero(2_f32.powi(exponent)), 2_f32.powi(-exponent));
+        }
+        assert_eq!([0.0, -1.0, f32::NAN].map(inverse_or_zero), [0.0; 3]);
+    }
+
+    #[test]
+    fn a_root_squared_is_the_number() {
+        for k in 1..1000 {
+            let x = k as f32 * 0.37;
+            assert!((square_root(x).powi(2) / x - 1.0).abs() < 1e-6, "{x}");
+        }
+        assert_eq!([0.0, 1e-38].map(square_root::<f32>), [0.0; 2]);
+    }
+
+    /// Contacts of boxes on planes have the axes of the world.
+    #[test]
+    fn tangents_across_the_axes_are_axes_and_all_are_unit_vectors_across() {
+        for n in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0_f32]] {
+            let t = tangent_of(Vec3::<f32>::load(n)).store();
+            assert_eq!(t.iter().filter(|x| x.abs() == 1.0).count(), 1, "{t:?}");
+            assert_eq!(t.iter().filter(|x| **x == 0.0).count(), 2, "{t:?}");
+        }
+        for k in 0..1000 {
+            let n = glam::Vec3::new((k as f32).sin(), (1.7 * k as f32).cos(), (0.3 * k as f32).sin()).normalize();
+            let (n, t) = (Vec3::<f32>::load(n.to_array()), tangent_of(Vec3::load(n.to_array())));
+            assert!(dot3(n, t).abs() < 3e-7 && (dot3(t, t) - 1.0).abs() < 1e-6, "{n:?}: {t:?}");
+        }
+    }
 }

@@ -1,8 +1,8 @@
 //! How the rows of contacts follow from those of the step before, for a backend that keeps them on a device.
 //!
-//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels. Only the rows
-//! of manifolds that were computed since are sent, with the points that their impulses belonged to, and how far the surfaces of all
-//! others are apart now.
+//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels. Only manifolds
+//! that were computed since are sent, with the points that their impulses belonged to, and how far the surfaces of all are apart now. The
+//! device computes the rows from them.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -19,6 +19,8 @@ pub struct Carry {
     pub written: Vec<Written>,
     /// Whether more than the separations of reused points follows the bodies: the velocity of an approach, the slip.
     pub approach: bool,
+    /// Whether friction at points has two directions.
+    pub tangents: bool,
     /// The coefficients of the preloads.
     pub preload: Preload,
 }

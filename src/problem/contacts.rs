@@ -212,6 +212,7 @@ impl ContactRows {
         problem.params.patches = patches.into();
         let materials = *self.materials.get_or_insert_with(|| Materials::of(world));
         self.carry.approach = config.friction_rule() == FrictionRule::Slip || materials.bounce;
+        self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
             movable_compliance: substep.movable.compliance(),

@@ -4,7 +4,7 @@
 use glam::{Mat3, Vec3};
 
 use super::rows::{ContactRow, MassRow};
-use crate::kernels::prepare::{self, inverse_or_zero, tangent_mass};
+use crate::kernels::prepare::{self, inverse_or_zero, tangent_mass, twist_mass};
 use crate::kernels::{Mass, Sym3};
 use crate::math;
 
@@ -65,8 +65,7 @@ impl EffectiveMass<'_> {
     /// One over the inverse inertia about the normal.
     pub fn twist(&self) -> f32 {
         let n = math::Vec3::load(self.row.normal);
-        let [a, b] = self.inverse.each_ref().map(|inverse| math::dot3(n, inverse.lane().inv_inertia.times(n)));
-        inverse_or_zero(a + b)
+        twist_mass(n, &self.inverse[0].lane(), &self.inverse[1].lane())
     }
 
     /// How far friction jams a point: [`prepare::jamming`].

@@ -184,19 +184,19 @@ impl Over<'_> {
             let (r_a, r_b) = (vec3(ax, ay, az), vec3(bx, by, bz));
             let masses = point_masses(tangents, jams, &frame, &a, &b, r_a, r_b);
             let (normal, tangent, jamming) = (masses.normal.store(), masses.tangent.store(), masses.jamming.store());
-            for lane in 0..group.len {
+            for (lane, jams) in jammed.iter_mut().enumerate().take(group.len) {
                 if k < group.counts[lane] as usize {
                     let at = group.slots[lane] as usize * self.rows.stride + k;
                     // SAFETY: tasks have different slots.
                     let point = unsafe { &mut self.rows.points.slice(at..at + 1)[0] };
                     (point.normal_mass, point.tangent_mass) = (normal.0[lane], tangent.0[lane]);
-                    jammed[lane] |= jamming.0[lane] > 1.0;
+                    *jams |= jamming.0[lane] > 1.0;
                 }
             }
         }
-        for lane in 0..group.len {
+        for (lane, &jams) in jammed.iter().enumerate().take(group.len) {
             // SAFETY: as above.
-            unsafe { self.rows.jams.write(group.slots[lane] as usize, jammed[lane]) };
+            unsafe { self.rows.jams.write(group.slots[lane] as usize, jams) };
         }
     }
 
@@ -282,4 +282,158 @@ fn places(rows: &[u32; WIDTH], stride: u32, offset: u32) -> [u32; WIDTH] {
         *place = *place * stride + offset;
     }
     places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::simd::InstructionSet;
+    use crate::math::{self, NormalMovement};
+    use crate::random::SplitMix64;
+
+    const STRIDE: usize = MAX_POINTS + 1;
+    const SLOTS: usize = 53;
+    const BODIES: usize = 7;
+    const PRELOAD: Preload = Preload { movable_compliance: 0.5, fixed_compliance: 0.2, share: 0.1, warm_start: 1 };
+
+    #[derive(Clone, Debug, PartialEq)]
+    struct Tables {
+        masses: Vec<MassRow>,
+        poses: Vec<PoseRow>,
+        contacts: Vec<ContactRow>,
+        points: Vec<PointRow>,
+        impulses: Vec<ImpulseRow>,
+        computed: Vec<ComputedRow>,
+        sags: Vec<f32>,
+        jams: Vec<bool>,
+    }
+
+    fn random_tables() -> Tables {
+        let mut random = SplitMix64::new(14);
+        let mut number = || random.symmetric() as f32;
+        let mut rotation =
+            |near: [f32; 4]| glam::Quat::from_array(near.map(|x| x + 0.02 * number())).normalize().to_array();
+        let rotations: Vec<[f32; 4]> = (0..BODIES).map(|k| rotation([0.3, k as f32, -0.5, 1.0])).collect();
+        let before: Vec<[f32; 4]> = rotations.iter().map(|&q| rotation(q)).collect();
+        let mut random = SplitMix64::new(15);
+        let mut number = || random.symmetric() as f32;
+        let mut vector = || [number(), number(), number()];
+        let poses = rotations.iter().map(|&rotation| PoseRow { center: vector(), pad: 0.0, rotation }).collect();
+        let masses = (0..BODIES).map(|k| {
+            let [x, y, z] = vector();
+            let movable = if k == 0 { 0.0 } else { 1.0 };
+            MassRow {
+                inv_inertia_x: [3.0 + x, 0.3 * y, 0.2 * z].map(|i| movable * i),
+                inv_inertia_yz: [2.0 + y, 0.1 * x, 4.0 + z].map(|i| movable * i),
+                inv_mass: movable * (1.5 + x),
+                heap: if k == 3 { 1.0 } else { 0.0 },
+                ..MassRow::default()
+            }
+        });
+        let masses = masses.collect();
+        let contacts: Vec<_> = (0..SLOTS as u32)
+            .map(|i| ContactRow {
+                body_a: i % BODIES as u32,
+                body_b: (i * i + i + 1) % BODIES as u32,
+                first_point: i * STRIDE as u32,
+                point_count: 1 + i % 4,
+                friction: 0.1 * (i % 30) as f32,
+                radius_a: if i % 5 == 0 { 0.5 } else { 0.0 },
+                preload: 0.01,
+                substep_share: if i % 3 == 0 { 0.5 } else { 1.0 },
+                ..ContactRow::framed(glam::Vec3::from_array(vector()).normalize())
+            })
+            .collect();
+        let computed = contacts.iter().map(|c| {
+            let [x, y, z] = vector();
+            ComputedRow {
+                apart: vector(),
+                pad: 0.0,
+                rotation_a: before[c.body_a as usize],
+                rotation_b: before[c.body_b as usize],
+                separations: [x, y, z, x],
+            }
+        });
+        let computed = computed.collect();
+        let point = |_| PointRow { r_a: vector(), r_b: vector(), normal_mass: 1.0, ..PointRow::default() };
+        let points = (0..SLOTS * STRIDE).map(point).collect();
+        let impulse = |_| ImpulseRow { normal: vector()[0].abs(), tangent_1: 0.5, tangent_2: 0.1, peak: 2.0 };
+        let impulses = (0..SLOTS * STRIDE).map(impulse).collect();
+        let (sags, jams) = (vec![0.0; SLOTS], vec![false; SLOTS]);
+        Tables { masses, poses, contacts, points, impulses, computed, sags, jams }
+    }
+
+    fn in_lanes(tables: &mut Tables, slots: &[u32], set: InstructionSet) {
+        for what in [What::Masses { tangents: true, jams: true }, What::Begin { separations: true, loads: true }] {
+            let rows = Prepare {
+                stride: STRIDE,
+                masses: &tables.masses,
+                poses: &tables.poses,
+                preload: &PRELOAD,
+                contacts: Shared::new(&mut tables.contacts),
+                points: Shared::new(&mut tables.points),
+                impulses: Shared::new(&mut tables.impulses),
+                computed: &tables.computed,
+                sags: Shared::new(&mut tables.sags),
+                jams: Shared::new(&mut tables.jams),
+            };
+            set.run(&Over { rows: &rows, slots, what }, 0..slots.len().div_ceil(WIDTH));
+        }
+    }
+
+    /// One slot after another, with the kernels over plain numbers.
+    fn one_by_one(tables: &mut Tables, slots: &[u32]) {
+        for i in slots.iter().map(|&slot| slot as usize) {
+            let contact = &mut tables.contacts[i];
+            let load = math::Vec3::<f32>::load;
+            let (normal, tangent) = (load(contact.normal), load(contact.tangent));
+            let frame = Frame { normal, tangent, friction: contact.friction };
+            let bodies = [contact.body_a as usize, contact.body_b as usize];
+            let [a, b] = bodies.map(|body| Mass::<f32>::load(&tables.masses[body]));
+            let pose = |body: usize| {
+                let PoseRow { center, rotation, .. } = tables.poses[body];
+                Pose { center: load(center), rotation: Quat::load(rotation) }
+            };
+            let from = &tables.computed[i];
+            let then = [from.rotation_a, from.rotation_b].map(Quat::load);
+            let radii = [contact.radius_a, contact.radius_b];
+            let movement: NormalMovement<f32> = movement_since(normal, radii, bodies.map(pose), load(from.apart), then);
+            let own = i * STRIDE..i * STRIDE + contact.point_count as usize;
+            let (mut pressed, mut mass) = (0.0, 0.0);
+            for (k, at) in own.enumerate() {
+                let point = &mut tables.points[at];
+                let (r_a, r_b) = (load(point.r_a), load(point.r_b));
+                let masses = point_masses(true, true, &frame, &a, &b, r_a, r_b);
+                (point.normal_mass, point.tangent_mass) = (masses.normal, masses.tangent);
+                point.separation = from.separations[k] + movement.between(r_a, r_b);
+                tables.jams[i] |= masses.jamming > 1.0;
+                pressed += tables.impulses[at].normal;
+                mass += masses.normal;
+            }
+            let both = a.inv_mass > 0.0 && b.inv_mass > 0.0;
+            let in_heap = bodies.iter().any(|&body| tables.masses[body].heap > 0.0);
+            let yields = PRELOAD.yielding(contact.substep_share, both, in_heap, pressed);
+            contact.preload = preloaded(&PRELOAD, in_heap, contact.preload, yields * reciprocal(mass));
+            tables.sags[i] = yields * (a.inv_mass + b.inv_mass);
+            tables.impulses[i * STRIDE..(i + 1) * STRIDE].iter_mut().for_each(|impulse| impulse.peak = 0.0);
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_prepares_slots_with_the_bits_of_plain_numbers() {
+        // The last group has free lanes, and some slots are left out.
+        let slots: Vec<u32> = (0..SLOTS as u32).filter(|i| i % 7 != 2).collect();
+        assert!(slots.len() % WIDTH != 0);
+        let before = random_tables();
+        let mut expected = before.clone();
+        one_by_one(&mut expected, &slots);
+        assert!(expected.jams.contains(&true) && expected.jams.contains(&false));
+        assert!(expected.points.iter().all(|p| p.separation.is_finite() && p.tangent_mass.is_finite()));
+        assert!(slots.iter().all(|&i| expected.contacts[i as usize].preload != before.contacts[i as usize].preload));
+        for set in InstructionSet::each() {
+            let mut tables = before.clone();
+            in_lanes(&mut tables, &slots, set);
+            assert_eq!(tables, expected, "{}", set.name());
+        }
+    }
 }

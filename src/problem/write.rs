@@ -19,7 +19,8 @@ use crate::backend::cpu::simd::{InstructionSet, WIDTH};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
-use crate::math::reciprocal;
+use crate::kernels::prepare::{inverse_or_zero, square_root};
+use crate::math::{self, dot3, reciprocal};
 use crate::world::World;
 
 /// The sources of the rows of contacts.
@@ -107,8 +108,8 @@ impl Writer<'_> {
             let is_new = contact.substep_share == 0.0;
             follows |= slot.takes_part && !is_new && self.share(contact) != contact.substep_share;
         }
-        let has_two_tangents = matches!(self.config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
-        self.prepare(&mut rows, written.all(), What::Masses { tangents: has_two_tangents, jams: self.may_jam });
+        let what = What::Masses { tangents: self.carry.tangents, jams: self.may_jam };
+        self.prepare(&mut rows, written.all(), what);
         if self.patches {
             for &i in written.all() {
                 let contact = &rows.contacts[i as usize];
@@ -175,7 +176,8 @@ impl Writer<'_> {
             .computed_at(slot.world, slot.pair)
             .map_or_else(Default::default, |placed| ComputedRow::of(placed, manifold));
         for (point, p) in rows.points[i * stride..].iter_mut().zip(manifold.points()) {
-            *point = PointRow { r_a: p.r_a.to_array(), r_b: p.r_b.to_array(), ..PointRow::default() };
+            let (r_a, r_b) = (p.r_a.to_array(), p.r_b.to_array());
+            *point = PointRow { r_a, r_b, separation: p.separation, ..PointRow::default() };
         }
         if !self.carry.on_device {
             let impulses = &mut rows.impulses[i * stride..(i + 1) * stride];
@@ -310,18 +312,23 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
 
 /// The row that stands for the friction of all `points`, which learn how far from it they are.
 fn patch_of(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
+    let share = inverse_or_zero(points.len() as f32);
     let middle = |arm: fn(&PointRow) -> [f32; 3]| {
-        points.iter().map(|p| Vec3::from_array(arm(p))).sum::<Vec3>() / points.len() as f32
+        let mut sum = math::Vec3::default();
+        points.iter().for_each(|p| sum += math::Vec3::<f32>::load(arm(p)));
+        sum * share
     };
     let (r_a, r_b) = (middle(|p| p.r_a), middle(|p| p.r_b));
     for p in points {
-        p.slip_1 = Vec3::from_array(p.r_a).distance(r_a);
+        let lever = math::Vec3::load(p.r_a) - r_a;
+        p.slip_1 = square_root(dot3(lever, lever));
     }
+    let (r_a, r_b) = (r_a.store(), r_b.store());
     PointRow {
-        r_a: r_a.to_array(),
-        r_b: r_b.to_array(),
+        r_a,
+        r_b,
         normal_mass: effective.twist(),
-        tangent_mass: effective.tangent(r_a, r_b),
+        tangent_mass: effective.tangent(r_a.into(), r_b.into()),
         ..PointRow::default()
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 
 use super::parsed;
-use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW};
+use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW, WrittenContact};
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
@@ -91,9 +91,12 @@ fn in_rust() -> BTreeMap<String, Layout> {
         }
         Preload = Preload { movable_compliance fixed_compliance share warm_start }
         ResidentParams = ResidentParams {
-            preload body_count contact_count order written_count has_points
+            preload body_count contact_count order written_count has_points tangents
         }
         Written = Written { row points_before }
+        WrittenContact = WrittenContact {
+            normal friction restitution radius_a radius_b substep_share body_a body_b first_arms point_count
+        }
     }
 }
 

@@ -88,10 +88,10 @@ bindings! {
     Resident "resident": "ResidentParams", Uniform;
     /// Contacts whose rows the host computed anew.
     Written "written": "array<Written>", Read;
-    /// The rows of these contacts.
-    WrittenContacts "written_contacts": "array<Contact>", Read;
-    /// The points of these contacts.
-    WrittenPoints "written_points": "array<Point>", Read;
+    /// The manifolds of these contacts.
+    WrittenContacts "written_contacts": "array<WrittenContact>", Read;
+    /// The arms of their points.
+    WrittenArms "written_arms": "array<f32>", Read;
     /// Separations of the points when the step begins.
     Separations "separations": "array<f32>", Read;
     /// How deep each manifold sags under what it bore in the step before; read back.

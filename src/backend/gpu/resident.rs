@@ -10,7 +10,7 @@ use super::wgsl::Program;
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 use crate::problem::carry::{Carry, NO_POINT, Preload};
-use crate::problem::{StepProblem, points_a_slot};
+use crate::problem::{ContactRow, StepProblem};
 
 // The shader writes no impulse to a point whose number before is `MAX_POINTS` or more.
 const _: () = assert!(NO_POINT as usize == MAX_POINTS);
@@ -47,8 +47,55 @@ pub struct ResidentParams {
     pub written_count: u32,
     /// 1 if the host sent all points.
     pub has_points: u32,
+    /// 1 if friction at points has two directions.
+    pub tangents: u32,
     #[doc(hidden)]
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
+}
+
+/// The manifold of a contact whose rows were written again, 48 B. Twin of the WGSL struct of this name.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct WrittenContact {
+    /// Unit normal from a to b, world axes.
+    pub normal: [f32; 3],
+    /// Coulomb coefficient.
+    pub friction: f32,
+    /// Restitution.
+    pub restitution: f32,
+    /// Radius of curvature of a's surface (m).
+    pub radius_a: f32,
+    /// Radius of curvature of b's surface (m).
+    pub radius_b: f32,
+    /// Length of its substeps over that of class 0.
+    pub substep_share: f32,
+    /// One body.
+    pub body_a: u32,
+    /// The other one.
+    pub body_b: u32,
+    /// Where the arms of its points begin, in points.
+    pub first_arms: u32,
+    /// How many points it has.
+    pub point_count: u32,
+}
+
+impl WrittenContact {
+    fn of(contact: &ContactRow, first_arms: u32) -> Self {
+        let &ContactRow { normal, friction, restitution, radius_a, radius_b, substep_share, .. } = contact;
+        let &ContactRow { body_a, body_b, point_count, .. } = contact;
+        Self {
+            normal,
+            friction,
+            restitution,
+            radius_a,
+            radius_b,
+            substep_share,
+            body_a,
+            body_b,
+            first_arms,
+            point_count,
+        }
+    }
 }
 
 /// Sends what changed since the step before, and returns the programs that bring its rows to those of `problem`. `separations` is
@@ -68,6 +115,7 @@ pub(super) fn begin(
         order: problem.colors.len() as u32,
         written_count: carry.written.len() as u32,
         has_points: carry.approach.into(),
+        tangents: carry.tangents.into(),
         ..ResidentParams::default()
     };
     buffers.update(Binding::Resident, bytemuck::bytes_of(&params));
@@ -96,23 +144,22 @@ pub(super) fn begin(
     Ok(programs)
 }
 
-/// Sends the rows that the host computed anew.
+/// Sends the manifolds that the host computed anew; the device computes their rows.
 fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> Result<()> {
     if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
         return Err(Error::input("contacts written again: a row that is not there"));
     }
-    let stride = points_a_slot(problem.has_patches());
-    let (mut contacts, mut points) = (Vec::new(), Vec::new());
+    let (mut contacts, mut arms) = (Vec::with_capacity(carry.written.len()), Vec::new());
     for written in &carry.written {
-        let contact = problem.contacts[written.row as usize];
-        let first = contact.first_point as usize;
-        contacts.push(contact);
-        points.extend_from_slice(&problem.points[first..first + stride]);
+        let contact = &problem.contacts[written.row as usize];
+        contacts.push(WrittenContact::of(contact, arms.len() as u32));
+        let own = &problem.points[contact.first_point as usize..][..contact.point_count as usize];
+        arms.extend(own.iter().map(|point| [point.r_a, point.r_b]));
     }
     let rows: [(Binding, &[u8]); 3] = [
         (Binding::Written, bytemuck::cast_slice(&carry.written)),
         (Binding::WrittenContacts, bytemuck::cast_slice(&contacts)),
-        (Binding::WrittenPoints, bytemuck::cast_slice(&points)),
+        (Binding::WrittenArms, bytemuck::cast_slice(&arms)),
     ];
     for (binding, bytes) in rows {
         buffers.check(binding, bytes.len())?;

@@ -61,9 +61,12 @@ impl Program {
                 of_plan(&[*kernel], WORKGROUP, "pass_row.first, pass_row.end", |calls| calls.concat())
             }
             Self::OneDispatch(kernels, threads) => of_plan(kernels, *threads, "step.y, step.z", follow_passes),
-            Self::BeginBodies => of_begin(part!("resident/begin_bodies"), "begin_body", "body_count"),
-            Self::WriteContacts => of_begin(part!("resident/write_contacts"), "write_contact", "written_count"),
-            Self::BeginContacts => of_begin(part!("resident/begin_contacts"), "begin_contact", "contact_count"),
+            Self::BeginBodies => of_begin(&[part!("resident/begin_bodies")], "begin_body", "body_count"),
+            Self::WriteContacts => {
+                let parts = &[part!("lib/prepare"), part!("resident/write_contacts")];
+                of_begin(parts, "write_contact", "written_count")
+            }
+            Self::BeginContacts => of_begin(&[part!("resident/begin_contacts")], "begin_contact", "contact_count"),
         }
     }
 }
@@ -203,9 +206,10 @@ fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[Strin
 }
 
 /// The WGSL of a program that begins a step: a function that is called for each of `count` rows.
-fn of_begin(own: &str, function: &str, count: &str) -> String {
+fn of_begin(own: &[&str], function: &str, count: &str) -> String {
     let main = over_count(&format!("resident.{count}"), &format!("{function}(row)"));
-    text(false, WORKGROUP, &[part!("lib/types"), part!("lib/math"), own], "", &main)
+    let parts = [&[part!("lib/types"), part!("lib/math")], own].concat();
+    text(false, WORKGROUP, &parts, "", &main)
 }
 
 fn over_count(count: &str, call: &str) -> String {
