@@ -59,6 +59,8 @@ pub struct Effort {
     movable: u32,
     /// Bodies that are awake and can be pushed, class by class.
     counts: [u32; EFFORT_CLASSES],
+    /// Bodies that are awake and not fixed, and whether they can be pushed.
+    awake: Vec<(u32, bool)>,
     islands: Islands,
     /// The island whose root each body is.
     of_root: Vec<Island>,
@@ -179,12 +181,14 @@ impl Effort {
                 self.islands.join(a, b);
             }
         }
+        let roots = self.islands.roots();
+        let root = |body: u32| roots[body as usize] as usize;
         self.of_root.clear();
         self.of_root.resize(bodies, Island::NONE);
         for Interface { a, b, need, is_joint } in interfaces {
             let body = if a == IMMOVABLE { b } else { a };
             if body != IMMOVABLE {
-                let island = &mut self.of_root[self.islands.root(body) as usize];
+                let island = &mut self.of_root[root(body)];
                 if is_joint {
                     island.whole_need = island.whole_need.max(need);
                     island.has_joints = true;
@@ -195,38 +199,42 @@ impl Effort {
                 }
             }
         }
-        let is_awake = |body: usize| asleep.get(body) != Some(&true) && world.bodies[body].kind != BodyKind::Fixed;
-        for body in (0..bodies).filter(|&body| is_awake(body)) {
-            let island = &mut self.of_root[self.islands.root(body as u32) as usize];
+        self.awake.clear();
+        for (i, body) in (0..).zip(&world.bodies) {
+            if body.kind == BodyKind::Fixed || asleep.get(i as usize) == Some(&true) {
+                continue;
+            }
+            self.awake.push((i, body.kind == BodyKind::Dynamic));
+            let island = &mut self.of_root[root(i)];
+            let i = i as usize;
             island.bodies += 1;
-            island.class = island.class.max(self.classes[body]);
-            island.calm_for = island.calm_for.min(self.calm_for[body]);
-            island.is_heap |= self.heaps[body];
-            island.fastest = island.fastest.max(world.bodies[body].linear_velocity.length());
+            island.class = island.class.max(self.classes[i]);
+            island.calm_for = island.calm_for.min(self.calm_for[i]);
+            island.is_heap |= self.heaps[i];
+            island.fastest = island.fastest.max(body.linear_velocity.length());
         }
         for &body in &self.restless {
-            let need = &mut self.of_root[self.islands.root(body) as usize].whole_need;
+            let need = &mut self.of_root[root(body)].whole_need;
             *need = need.max(self.restless_need);
         }
-        if looks_for_heaps {
-            for island in &mut self.of_root {
+        for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
+            if looks_for_heaps {
                 island.is_heap = self.has_heaps && island.becomes_heap();
             }
+            (island.class, island.calm_for) = island.next(self.highest);
         }
         let mut changed = false;
-        self.counts = [0; EFFORT_CLASSES];
         let mut kinds = [[0; 2]; EFFORT_CLASSES];
-        for body in (0..bodies).filter(|&body| is_awake(body)) {
-            let island = self.of_root[self.islands.root(body as u32) as usize];
-            let (class, calm) = island.next(self.highest);
+        for &(body, is_dynamic) in &self.awake {
+            let Island { class, calm_for, is_heap, .. } = self.of_root[root(body)];
+            let body = body as usize;
             changed |= class != self.classes[body];
-            (self.classes[body], self.calm_for[body]) = (class, calm);
-            self.heaps[body] = island.is_heap;
-            self.heaps_change |= island.is_heap != self.heaps_before[body];
-            let is_dynamic = u32::from(world.bodies[body].kind == BodyKind::Dynamic);
-            kinds[usize::from(class)][usize::from(island.is_heap)] += is_dynamic;
-            self.counts[usize::from(class)] += is_dynamic;
+            (self.classes[body], self.calm_for[body]) = (class, calm_for);
+            self.heaps[body] = is_heap;
+            self.heaps_change |= is_heap != self.heaps_before[body];
+            kinds[usize::from(class)][usize::from(is_heap)] += u32::from(is_dynamic);
         }
+        self.counts = kinds.map(|kinds| kinds.iter().sum());
         self.used.clear();
         let all = (0..=HIGHEST).flat_map(|class| [(class, false), (class, true)]);
         self.used.extend(all.filter(|&(class, is_heap)| kinds[usize::from(class)][usize::from(is_heap)] > 0));

@@ -135,6 +135,15 @@ impl Islands {
         self.toward_root[a.max(b) as usize] = a.min(b);
     }
 
+    /// The root of each body, after all joins.
+    pub fn roots(&mut self) -> &[u32] {
+        // A body nearer to the root has a smaller index, and so knows its root already.
+        for i in 0..self.toward_root.len() {
+            self.toward_root[i] = self.toward_root[self.toward_root[i] as usize];
+        }
+        &self.toward_root
+    }
+
     /// The body of the island with the smallest index; shortens the way there.
     pub fn root(&mut self, body: u32) -> u32 {
         let (to, mut i) = (&mut self.toward_root, body as usize);

@@ -177,8 +177,8 @@ fn upright_boxes(world: &World, up: DMat3) -> Vec<Box3> {
     world.bodies.iter().map(of).collect()
 }
 
-/// How many times deeper the next search for bodies that bear goes, where one found none.
-const DEEPER: f64 = 4.0;
+/// How deep the searches go after one of a body's height found nothing that bears the body, in its heights. The last one has no end.
+const DEPTHS: [f64; 2] = [4.0, 16.0];
 /// Farther than any body is (m), and small enough for areas in single precision.
 const FAR: f64 = 1e15;
 
@@ -190,15 +190,13 @@ fn aabb(low: DVec3, high: DVec3) -> Aabb {
 struct Ground<'a> {
     boxes: &'a [Box3],
     tree: Bvh,
-    /// The height of the lowest top of a box (m).
-    lowest: f64,
 }
 
 impl<'a> Ground<'a> {
     fn new(boxes: &'a [Box3]) -> Self {
-        let leaves = || boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves().map(|(i, b)| (i, aabb(b.low, b.high))));
-        Self { boxes, tree, lowest: leaves().map(|(_, b)| b.high.y).fold(f64::INFINITY, f64::min) }
+        let leaves = boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves.map(|(i, b)| (i, aabb(b.low, b.high))));
+        Self { boxes, tree }
     }
 
     /// The bodies that bear `upper`, with the areas by which they overlap it from above.
@@ -207,19 +205,18 @@ impl<'a> Ground<'a> {
     fn supports(&self, upper: usize) -> Vec<(usize, f64)> {
         let above = &self.boxes[upper];
         let height = above.high.y - above.low.y;
-        let mut depth = height;
-        let mut floor = above.low.y - depth;
+        let mut deeper = DEPTHS.iter().map(|depth| above.low.y - depth * height);
+        let mut floor = above.low.y - height;
         loop {
             let mut below = self.boxes_between(upper, floor);
             let top = below.iter().map(|s| self.boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
             let level = top - LEVEL * height;
-            let goes_deeper = floor > self.lowest && floor > level;
-            if !goes_deeper {
-                below.retain(|s| self.boxes[s.0].high.y >= level);
-                return below;
+            if floor > level {
+                floor = if below.is_empty() { deeper.next().unwrap_or(f64::NEG_INFINITY) } else { level };
+                continue;
             }
-            depth *= DEEPER;
-            floor = if below.is_empty() { above.low.y - depth } else { level };
+            below.retain(|s| self.boxes[s.0].high.y >= level);
+            return below;
         }
     }
 
@@ -280,12 +277,16 @@ mod tests {
             world
                 .add(Body::dynamic().shape(crate::Shape::cuboid(half, 0.3 * half, half)).position(at[0], at[1], at[2]));
         }
+        // So far away that rounding leaves boxes without a height.
+        for y in [1e12, 1.1e12, 1e20, 1.1e20] {
+            world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0));
+        }
         let boxes = upright_boxes(&world, up(&world));
         let ground = Ground::new(&boxes);
         let (mut alone, mut deep) = (0, 0);
         for upper in 0..boxes.len() {
             let height = boxes[upper].high.y - boxes[upper].low.y;
-            let all = ground.boxes_between(upper, -FAR);
+            let all = ground.boxes_between(upper, f64::NEG_INFINITY);
             let top = all.iter().map(|s| boxes[s.0].high.y).fold(f64::NEG_INFINITY, f64::max);
             let bearing: Vec<_> = all.into_iter().filter(|s| boxes[s.0].high.y >= top - LEVEL * height).collect();
             assert_eq!(ground.supports(upper), bearing, "{upper}");
