@@ -25,6 +25,7 @@ use settings::set;
 tests! {
     exact_gpu {
         a_falling_pile_has_the_bits_of_the_reference_in_exact_mode,
+        work_cut_as_for_hardware_has_the_bits_of_the_reference,
         every_rule_has_the_bits_of_the_reference_in_exact_mode,
         several_efforts_have_the_bits_of_the_reference_in_exact_mode,
         friction_per_manifold_without_friction_has_the_bits_of_the_reference,
@@ -79,6 +80,20 @@ fn assert_same(scene: &Scene, config: &SolverConfig, steps: u32, what: &str) {
 
 fn a_falling_pile_has_the_bits_of_the_reference_in_exact_mode() {
     assert_same(&pile(), &SolverConfig::default().without_sleep(), 60, "pile");
+}
+
+/// A thread of hardware goes over one row, and one of a software adapter over some.
+fn work_cut_as_for_hardware_has_the_bits_of_the_reference() {
+    let mut config = SolverConfig::default().without_sleep();
+    config.fuse_colors_below = 0;
+    let scene = pile();
+    let after = |backend: Box<dyn Backend>| {
+        let mut simulation = Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings");
+        (0..LANDED).for_each(|_| drop(simulation.step(scene.dt).expect("a step")));
+        simulation.world
+    };
+    let (ours, theirs) = (after(reference()), after(Box::new(gpu::exact().cut_as_hardware())));
+    assert_eq!(Difference::between(&ours, &theirs).bodies, 0);
 }
 
 /// One body of every shape, all of which bounce, and a chain of long links: every kernel has work.

@@ -12,15 +12,21 @@ use crate::problem::{PassRow, StepProblem};
 /// One dispatch.
 pub(super) struct Dispatch {
     pub program: Program,
-    pub workgroups: u32,
+    /// Rows that its threads share.
+    rows: usize,
     /// Offset of the row of the pass in its buffer (B).
     pub pass_row: u32,
 }
 
 impl Dispatch {
-    /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes several.
+    /// A dispatch over so many rows.
     pub fn over(program: Program, rows: usize) -> Self {
-        Self { program, workgroups: (rows as u32).div_ceil(WORKGROUP).clamp(1, 65_535), pass_row: 0 }
+        Self { program, rows, pass_row: 0 }
+    }
+
+    /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes more rows.
+    fn workgroups(&self, rows_a_thread: u32) -> u32 {
+        (self.rows as u32).div_ceil(WORKGROUP * rows_a_thread).clamp(1, 65_535)
     }
 }
 
@@ -38,33 +44,38 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
             at as u32
         })
     };
-    let dispatch = |pass: &Pass| Dispatch {
-        pass_row: place(pass),
-        ..Dispatch::over(Program::Pass(pass.kernel), threads(problem, pass))
+    let dispatch = |pass: &Pass| {
+        // The order of the rows of some kernels does not matter.
+        let is_ordered = !matches!(pass.kernel, Kernel::ClearImpulses | Kernel::MeasureJoints(_));
+        let (program, rows) = if pass.colors.len() > 1 && is_ordered {
+            // One workgroup.
+            (Program::Fused(pass.kernel), 1)
+        } else {
+            (Program::Pass(pass.kernel), rows_of(problem, pass))
+        };
+        Dispatch { pass_row: place(pass), ..Dispatch::over(program, rows) }
     };
     let dispatches = passes.iter().map(dispatch).collect();
     (dispatches, bytes)
 }
 
-/// Threads that have work in a pass. One workgroup sweeps several colors, one after another.
-fn threads(problem: &StepProblem, pass: &Pass) -> usize {
+/// Rows of a pass that threads can share.
+fn rows_of(problem: &StepProblem, pass: &Pass) -> usize {
     match pass.kernel {
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
         // A workgroup a chunk.
         Kernel::MeasureStep => problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
-        // The order of their rows does not matter.
-        Kernel::ClearImpulses | Kernel::MeasureJoints(_) => problem.rows_of(&pass.colors).len(),
-        _ if pass.colors.len() > 1 => 1,
         _ => problem.rows_of(&pass.colors).len(),
     }
 }
 
-/// Encodes dispatches as one compute pass.
+/// Encodes dispatches as one compute pass. A thread goes over `rows_a_thread` rows where there are that many for each.
 pub(super) fn encode(
     encoder: &mut wgpu::CommandEncoder,
     dispatches: &[Dispatch],
     pipelines: &Pipelines,
+    rows_a_thread: u32,
     mut timer: Option<&mut Timer>,
 ) {
     let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -78,7 +89,7 @@ pub(super) fn encode(
         for dispatch in run {
             let offsets: &[u32] = if compiled.has_pass_row() { &[dispatch.pass_row] } else { &[] };
             compute.set_bind_group(0, &compiled.bind_group, offsets);
-            compute.dispatch_workgroups(dispatch.workgroups, 1, 1);
+            compute.dispatch_workgroups(dispatch.workgroups(rows_a_thread), 1, 1);
         }
     }
     if let Some(timer) = timer {

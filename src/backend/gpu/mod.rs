@@ -40,12 +40,18 @@ use pipelines::Pipelines;
 use resident::ResidentRows;
 use timer::Timer;
 
+/// Rows that a thread of a software adapter goes over. llvmpipe starts every thread of a workgroup anew, which costs it more than the loop
+/// to another row: a step of a settled pile of 1,000 takes 13.1 ms with 1 row a thread and 11.7 ms with 4.
+const SOFTWARE_ROWS_A_THREAD: u32 = 4;
+
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
     summary: AdapterSummary,
     exact: bool,
+    /// Rows that a thread of a dispatch goes over.
+    rows_a_thread: u32,
     pipelines: Pipelines,
     buffers: Buffers,
     timer: Option<Timer>,
@@ -86,6 +92,7 @@ impl Gpu {
             timer: None,
             device,
             queue,
+            rows_a_thread: if summary.hardware { 1 } else { SOFTWARE_ROWS_A_THREAD },
             summary,
             exact,
             times: Vec::new(),
@@ -102,6 +109,12 @@ impl Gpu {
     /// What it runs on.
     pub fn summary(&self) -> &AdapterSummary {
         &self.summary
+    }
+
+    /// Cuts its work as for hardware, so that a software adapter runs the dispatches that hardware runs.
+    pub fn cut_as_hardware(mut self) -> Self {
+        self.rows_a_thread = 1;
+        self
     }
 
     /// Whether its results are the reference's to the last bit.
@@ -182,7 +195,7 @@ impl Gpu {
             self.pipelines.prepare(&dispatch.program, &self.buffers)?;
         }
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        dispatch::encode(&mut encoder, &all, &self.pipelines, self.timer.as_mut());
+        dispatch::encode(&mut encoder, &all, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
         Ok(encoder)
     }
 

@@ -27,8 +27,10 @@ macro_rules! part {
 /// What a pipeline runs.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Program {
-    /// A kernel of a plan.
+    /// A kernel of a plan over the rows of its colors, in any order.
     Pass(Kernel),
+    /// A kernel of a plan over its colors, one after another. One workgroup goes over them, with a barrier after each.
+    Fused(Kernel),
     /// All kernels of a plan. One workgroup with this number of threads follows the passes.
     OneDispatch(Arc<[Kernel]>, u32),
     /// Sets the movements of all bodies to zero.
@@ -46,7 +48,7 @@ impl Program {
     /// Its name in measurements and messages, and of a kernel the name of the file.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Pass(kernel) => kernel.name(),
+            Self::Pass(kernel) | Self::Fused(kernel) => kernel.name(),
             Self::OneDispatch(..) => "one_dispatch",
             Self::BeginBodies => "begin_bodies",
             Self::WriteContacts => "write_contacts",
@@ -58,9 +60,13 @@ impl Program {
     pub fn source(&self) -> String {
         match self {
             Self::Pass(kernel) => {
-                of_plan(&[*kernel], WORKGROUP, "pass_row.first, pass_row.end", |calls| calls.concat())
+                let range = "colors[pass_row.first], colors[pass_row.end]";
+                of_plan(&[*kernel], WORKGROUP, false, range, |calls| calls.concat())
             }
-            Self::OneDispatch(kernels, threads) => of_plan(kernels, *threads, "step.y, step.z", follow_passes),
+            Self::Fused(kernel) => {
+                of_plan(&[*kernel], WORKGROUP, true, "pass_row.first, pass_row.end", |calls| calls.concat())
+            }
+            Self::OneDispatch(kernels, threads) => of_plan(kernels, *threads, true, "step.y, step.z", follow_passes),
             Self::BeginBodies => of_begin(&[part!("resident/begin_bodies")], "begin_body", "body_count"),
             Self::WriteContacts => {
                 let parts = &[part!("lib/prepare"), part!("resident/write_contacts")];
@@ -171,8 +177,9 @@ fn rules_text(rules: Rules) -> String {
     )
 }
 
-/// The WGSL of some kernels. `colors` is the WGSL of the colors of a pass; `main` makes the body of the entry point of the calls.
-fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[String]) -> String) -> String {
+/// The WGSL of some kernels. `range` is the WGSL of the colors of a pass where the colors are `fused`, and else of the places of its
+/// rows; `main` makes the body of the entry point of the calls.
+fn of_plan(kernels: &[Kernel], threads: u32, fused: bool, range: &str, main: impl Fn(&[String]) -> String) -> String {
     // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections, and `free` only
     // where a kernel reads it.
     let is_measured = kernels.iter().any(|kernel| kernel.is_measured());
@@ -196,9 +203,12 @@ fn of_plan(kernels: &[Kernel], threads: u32, colors: &str, main: impl Fn(&[Strin
             Over::Own => format!("{call};"),
             Over::Count(count) => over_count(count, &call),
             Over::Colors => {
-                let name = format!("over_colors_{at}");
-                loops += &part!("lib/over_colors").replace("over_colors", &name).replace("over_row(row)", &call);
-                format!("{name}({colors}, first, stride);")
+                let [rows, colors] = ["over_rows", "over_colors"].map(|name| format!("{name}_{at}"));
+                loops += &part!("lib/over_rows").replace("over_rows", &rows).replace("over_row(row)", &call);
+                if fused {
+                    loops += &part!("lib/over_colors").replace("over_rows", &rows).replace("over_colors", &colors);
+                }
+                format!("{}({range}, first, stride);", if fused { colors } else { rows })
             }
         });
     }
