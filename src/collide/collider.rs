@@ -46,10 +46,10 @@ impl ColliderInfo {
     }
 }
 
-/// Pose and velocity of a body, as far as the detection needs it: four rows of eight numbers, so that lanes can gather them. The first two
-/// are what the test of a pair reads, one line of the cache.
+/// Pose and velocity of a body, as far as the detection needs it: three rows of eight numbers, so that lanes can gather them. The first two
+/// are what the test of a pair reads.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(64))]
+#[repr(C, align(32))]
 pub(super) struct BodyState {
     pub rotation: Quat,
     pub center: Vec3,
@@ -62,7 +62,7 @@ pub(super) struct BodyState {
     /// 0 if it is still, 1 if it moves by itself, 2 if it is awake.
     pub activity: f32,
     pub position: Vec3,
-    pub rest: [f32; 13],
+    pub rest: [f32; 5],
 }
 
 /// The row of a [`BodyState`] that begins with rotation and center.
@@ -74,7 +74,7 @@ pub(super) const POSITION: usize = 2;
 
 /// A cuboid in the form that lanes gather: two rows of eight numbers.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(64))]
+#[repr(C, align(32))]
 pub(super) struct CuboidPlace {
     /// In the body's frame.
     pub rotation: Quat,
@@ -116,7 +116,7 @@ impl BodyState {
             in_range: f32::from(in_range),
             activity: [0.0, 1.0, 2.0][activity as usize],
             position,
-            rest: [0.0; 13],
+            rest: [0.0; 5],
         }
     }
 }

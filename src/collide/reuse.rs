@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use super::collider::{BodyState, Margins, POSE, VELOCITY};
 use super::lane_pose::{Pose, Turn, backwards, choose, length, negative, product};
 use super::pairs::Track;
-use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns, prefetch};
+use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, dot3, vec3};
 
 /// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
@@ -57,12 +57,6 @@ impl Work for ReuseTest<'_> {
                 which[lane] = place as u32;
                 bodies[0][lane] = self.tracks[place].bodies[0];
                 bodies[1][lane] = self.tracks[place].bodies[1];
-            }
-            // Bodies are anywhere in memory: those of the next but one group are asked for now.
-            let soon = self.tracks.len().min((group + 2) * WIDTH)..self.tracks.len().min((group + 3) * WIDTH);
-            for track in &self.tracks[soon] {
-                prefetch(&self.moving[track.bodies[0] as usize]);
-                prefetch(&self.moving[track.bodies[1] as usize]);
             }
             results.push(self.test::<L>(&which, &bodies));
         }
@@ -160,7 +154,7 @@ mod tests {
             let [v, w] = [self.vector(), self.vector() * 10.0_f32.powf(3.0 * self.next())];
             let activity = (1.49 * (self.next() + 1.0)) as u32 as f32;
             let [kinematic, in_range] = [self.next() > 0.8, self.next() > -0.95].map(f32::from);
-            BodyState { rotation, center: at, kinematic, v, w, in_range, activity, position: at, rest: [0.0; 13] }
+            BodyState { rotation, center: at, kinematic, v, w, in_range, activity, position: at, rest: [0.0; 5] }
         }
 
         /// A little before a body was where it is.
@@ -212,7 +206,7 @@ mod tests {
             let bodies = [body(0), body(1)];
             let then = bodies.map(|body| random.before(&moving[body as usize]));
             let [size, reach_b] = [1.1, 1.5].map(|least| least + random.next());
-            let predicted = if place % 7 == 0 { NEVER } else { 1.0 + random.next() };
+            let predicted = if place.is_multiple_of(7) { NEVER } else { 1.0 + random.next() };
             let [unbounded, takes_part] = [random.next() > 0.5, random.next() > 0.0].map(f32::from);
             Track { size, reach_b, predicted, unbounded, takes_part, rest: 0.0, bodies, then }
         };

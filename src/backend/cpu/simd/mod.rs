@@ -93,18 +93,6 @@ pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; 
     unsafe { L::gathered(all.as_ptr().cast::<Row8>().add(row), &places) }
 }
 
-/// Tells the processor that something will be read soon.
-#[inline(always)]
-pub fn prefetch<T>(soon: &T) {
-    // SAFETY: every x86-64 processor has the instruction, which changes nothing.
-    #[cfg(target_arch = "x86_64")]
-    unsafe {
-        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(std::ptr::from_ref(soon).cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = soon;
-}
-
 /// An array of what an expression is for each lane, without a closure: a closure would be compiled for the plain
 /// instruction set.
 macro_rules! lanes {
