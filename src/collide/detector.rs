@@ -77,16 +77,30 @@ impl Detector {
                 self.begins.len() + 1
             ));
         }
-        let mut colliders = self.worlds.iter().flat_map(WorldContacts::colliders).peekable();
-        for (i, (body, kind)) in world.bodies.iter().zip(&self.kinds).enumerate() {
-            let same = |c: &Collider| colliders.next().is_some_and(|known| known.is(i, c));
-            let all = body.kind == *kind && body.colliders.iter().all(same);
-            if !all || colliders.peek().is_some_and(|next| next.body as usize == i) {
-                let name = &body.name;
-                return Err(input!("body {i} {name:?} changed its kind or shapes: {ANEW}"));
-            }
-        }
-        Ok(())
+        let begin = |k: usize| if k == 0 { 0 } else { self.begins[k - 1] };
+        let end = |k: usize| self.begins.get(k).copied().unwrap_or(has);
+        let worlds = self.worlds.par_iter().enumerate();
+        let changed = worlds.find_map_first(|(k, part)| self.first_changed(world, part, begin(k)..end(k)));
+        let Some(i) = changed else { return Ok(()) };
+        let name = &world.bodies[i].name;
+        Err(input!("body {i} {name:?} changed its kind or shapes: {ANEW}"))
+    }
+
+    /// The first body of a part of the world that changed its kind or shapes.
+    fn first_changed(&self, world: &World, part: &WorldContacts, bodies: Range<usize>) -> Option<usize> {
+        const CHUNK: usize = 512;
+        let chunks = world.bodies[bodies.clone()].par_chunks(CHUNK).zip(self.kinds[bodies.clone()].par_chunks(CHUNK));
+        chunks.enumerate().find_map_first(|(chunk, (all, kinds))| {
+            let first = bodies.start + CHUNK * chunk;
+            let from = part.colliders().partition_point(|known| (known.body as usize) < first);
+            let mut colliders = part.colliders()[from..].iter().peekable();
+            let changed = |(i, (body, kind)): (usize, (&Body, &BodyKind))| {
+                let same = |c: &Collider| colliders.next().is_some_and(|known| known.is(i, c));
+                let all = body.kind == *kind && body.colliders.iter().all(same);
+                (!all || colliders.peek().is_some_and(|next| next.body as usize == i)).then_some(i)
+            };
+            (first..).zip(all.iter().zip(kinds)).find_map(changed)
+        })
     }
 
     /// Takes over which bodies joints keep from colliding.

@@ -1,7 +1,7 @@
-//! Collision detection: parry's tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
+//! Collision detection: a tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
 //!
-//! The tree holds fattened boxes, and only a collider that left its fattened box changes the tree. Pairs live in slots, in the
-//! order in which they were found, so that every later stage is deterministic for any number of threads. Each of several worlds
+//! The tree holds fattened boxes, and only a collider that left its fattened box gets another. Two colliders are a pair while their
+//! fattened boxes overlap; the pairs of a step begin in the order of their colliders, so that every later stage is deterministic for any number of threads. Each of several worlds
 //! beside each other has its own tree and pairs, so that the pairs of a world do not depend on the other worlds.
 
 mod collider;
@@ -19,6 +19,7 @@ mod query;
 mod report;
 mod reuse;
 mod solid;
+mod tree;
 mod world_contacts;
 
 pub use detector::Detector;

@@ -83,11 +83,17 @@ pub(super) struct PairChunk<'a> {
 const PAIRS_A_TASK: usize = 2048;
 
 impl Pairs {
-    /// A new pair of two colliders.
-    pub fn push(&mut self, collider_a: u32, collider_b: u32, colliders: &[ColliderInfo]) {
-        let pair = Pair::new(collider_a, collider_b, colliders);
-        self.tracks.push(Track::of(&pair, colliders));
-        self.all.push(pair);
+    /// Begins pairs of two colliders each, the further reaching first.
+    pub fn begin(&mut self, found: &[(u32, u32)], colliders: &[ColliderInfo]) {
+        let begin = |&(i, j): &(u32, u32)| {
+            let swap = colliders[j as usize].reach > colliders[i as usize].reach;
+            let (a, b) = if swap { (j, i) } else { (i, j) };
+            Pair::new(a, b, colliders)
+        };
+        let first = self.all.len();
+        self.all.par_extend(found.par_iter().with_min_len(1024).map(begin));
+        let new = self.all[first..].par_iter().with_min_len(1024);
+        self.tracks.par_extend(new.map(|pair| Track::of(pair, colliders)));
     }
 
     /// Ends a pair; the last takes its place.

@@ -1,11 +1,9 @@
 //! The colliders of one world: which of them are near each other, and what they touch with.
 
-use std::collections::{HashMap, HashSet};
-use std::hash::{BuildHasherDefault, DefaultHasher};
+use std::collections::HashSet;
 
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use rayon::prelude::*;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
@@ -13,6 +11,7 @@ use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Scratch, Updated};
 use super::pairs::Pairs;
 use super::report::{Activity, Change, DetectStats};
+use super::tree::{NOWHERE, Tree};
 use crate::world::BodyKind;
 
 /// The input of one detection, for all worlds; body indices count over all worlds.
@@ -31,18 +30,20 @@ pub(super) struct WorldContacts {
     colliders: Vec<ColliderInfo>,
     /// The same, of those that are cuboids.
     cuboids: Vec<CuboidPlace>,
-    unbounded: Vec<u32>,
-    tree: Bvh,
-    workspace: BvhWorkspace,
-    /// Fattened box of each collider, as the tree has it.
+    /// Fattened box of each collider.
     fat: Vec<Aabb>,
-    /// Box now of each collider that left its fattened one.
-    left: Vec<Option<Aabb>>,
-    /// Colliders whose fattened boxes are new.
-    moved: Vec<u32>,
+    /// Whether it is new in this detection; a half-space, whether it moved.
+    moved: Vec<bool>,
+    /// The box before, if it is new.
+    before: Vec<Aabb>,
+    tree: Tree,
+    /// The half-spaces.
+    planes: Vec<Plane>,
     /// The pairs whose boxes overlap.
     pub pairs: Pairs,
-    slots: HashMap<(u32, u32), u32, BuildHasherDefault<DefaultHasher>>,
+    /// The colliders of each, the smaller index first.
+    keys: Vec<(u32, u32)>,
+    /// Colliders whose boxes overlap since this detection, likewise.
     found: Vec<(u32, u32)>,
     /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`WorldContacts::take_changes`] last told of them.
     ended: Vec<u32>,
@@ -58,14 +59,23 @@ struct PairChange {
     computed: bool,
 }
 
+/// A half-space, and where it was when its pairs were looked for.
+#[derive(Clone)]
+struct Plane {
+    collider: u32,
+    then: Option<Pose>,
+}
+
 /// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
 const FAT: f32 = 0.1;
 
 impl WorldContacts {
     pub fn new(colliders: Vec<ColliderInfo>) -> Self {
-        let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded).collect();
+        let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded);
+        let planes = unbounded.map(|collider| Plane { collider, then: None }).collect();
         let cuboids = colliders.iter().map(CuboidPlace::of).collect();
-        Self { colliders, cuboids, unbounded, ..Self::default() }
+        let (fat, moved) = (vec![NOWHERE; colliders.len()], vec![false; colliders.len()]);
+        Self { colliders, cuboids, planes, before: fat.clone(), fat, moved, ..Self::default() }
     }
 
     /// The colliders, in the order of the bodies.
@@ -82,7 +92,8 @@ impl WorldContacts {
     pub fn take_changes(&mut self, world: u32, tell: &mut dyn FnMut(Change)) {
         self.ended.drain(..).for_each(|slot| tell(Change::Ended(slot)));
         for PairChange { pair: i, computed } in self.changed.drain(..) {
-            if let Some(pair) = self.pairs.get_mut(i as usize) {
+            // A pair without contacts has no slot.
+            if let Some(pair) = self.pairs.get_mut(i as usize).filter(|pair| !pair.manifolds.is_empty()) {
                 tell(Change::Pair { place: [world, i], pair, computed });
             }
         }
@@ -95,143 +106,121 @@ impl WorldContacts {
         DetectStats { reshaped: stats.reshaped | parted, ..stats }
     }
 
-    /// Finds new pairs and ends parted ones; returns whether it ended any.
+    /// Finds new pairs and ends parted ones; returns whether an ended one had a contact.
     fn broad_phase(&mut self, input: &DetectionInput) -> bool {
-        let mut parted = false;
-        // Each collider's box now: what it sweeps in this step, and the distance at which it makes contact.
-        let tight = |c: &ColliderInfo| {
-            let body = &input.moving[c.body as usize];
-            let pose = Pose::from_parts(body.position, body.rotation);
-            // The size of a half-space is infinite, and no margin at all of it no number.
-            let margin = input.margins.speculative * c.size.min(FARTHEST) + input.margins.fall;
-            let mut aabb = c.aabb(pose).loosened(margin);
-            let sweep = body.v * input.margins.dt;
-            // A collider that turns reaches no further out than from one side of the body to the other, and its box no further than its
-            // longest half diagonal.
-            let most = c.reach - c.size + c.local.translation.length();
-            aabb = aabb.loosened((c.reach * body.w.length() * input.margins.dt).min(most).max(0.0));
-            aabb.mins += sweep.min(glam::Vec3::ZERO);
-            aabb.maxs += sweep.max(glam::Vec3::ZERO);
-            aabb
-        };
-        if self.fat.is_empty() {
-            let fatten = |c: &ColliderInfo| {
-                let fat = tight(c).loosened(FAT * c.size);
-                if c.unbounded || !is_in_range(&fat) { empty_box() } else { fat }
-            };
-            self.fat = self.colliders.iter().map(fatten).collect();
-            self.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &self.fat);
-            self.found.clear();
-            let found = &mut self.found;
-            self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-            // In the order of the bodies in memory, in which every later stage then goes over them.
-            found.iter_mut().for_each(|pair| *pair = key(pair.0, pair.1));
-            found.sort_unstable();
-            self.moved.extend(0..self.colliders.len() as u32);
-            self.find_unbounded(input);
-        } else {
-            let left = |(c, fat): (&ColliderInfo, &Aabb)| {
-                let still = input.activity.get(c.body as usize) == Some(&Activity::Still);
-                if input.kinds[c.body as usize] == BodyKind::Fixed || c.unbounded || still {
-                    return None;
-                }
-                let aabb = tight(c);
-                (!fat.contains(&aabb) && is_in_range(&aabb)).then_some(aabb)
-            };
-            let colliders = self.colliders.par_iter().with_min_len(256);
-            colliders.zip(&self.fat).map(left).collect_into_vec(&mut self.left);
-            self.found.clear();
-            self.moved.clear();
-            for (i, aabb) in self.left.iter().enumerate().filter_map(|(i, left)| Some((i, left.as_ref()?))) {
-                let margin = FAT * self.colliders[i].size;
-                self.tree.insert_or_update_partially(*aabb, i as u32, margin);
-                self.fat[i] = aabb.loosened(margin);
-                self.moved.push(i as u32);
-            }
-            if !self.moved.is_empty() {
-                self.tree.optimize_incremental(&mut self.workspace);
-                self.tree.refit(&mut self.workspace);
-            }
-            if self.look_again {
-                self.moved.clear();
-                self.moved.extend(0..self.colliders.len() as u32);
-                let found = &mut self.found;
-                self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-            } else if !self.moved.is_empty() {
-                let found = &mut self.found;
-                self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| found.push((a, b)));
-            }
-            if !self.moved.is_empty() {
-                self.find_unbounded(input);
-                parted = self.drop_parted(input);
-            }
+        let look_again = std::mem::take(&mut self.look_again);
+        if !self.fatten(input) && !look_again {
+            return false;
         }
-        self.add_found(input);
-        self.look_again = false;
+        if look_again {
+            self.moved.fill(true);
+            self.before.fill(NOWHERE);
+        }
+        self.find(input);
+        if look_again {
+            let known: HashSet<_> = self.keys.iter().collect();
+            self.found.retain(|pair| !known.contains(pair));
+        }
+        let parted = self.drop_parted(input, look_again);
+        self.add_found();
         parted
     }
 
-    /// Half-spaces against the colliders that moved, by the corner of the box that lies deepest.
-    fn find_unbounded(&mut self, input: &DetectionInput) {
-        let mut found = std::mem::take(&mut self.found);
-        for &plane in &self.unbounded {
-            let near = self.moved.iter().filter(|&&c| plane != c && self.touches(input, plane, c));
-            found.extend(near.map(|&c| (plane, c)));
+    /// Gives a new fattened box to each collider that left its own; returns whether any did, or a half-space moved.
+    fn fatten(&mut self, input: &DetectionInput) -> bool {
+        let fatten = |((c, fat), (moved, before)): ((&ColliderInfo, &mut Aabb), (&mut bool, &mut Aabb))| {
+            *moved = false;
+            let still = input.activity.get(c.body as usize) == Some(&Activity::Still);
+            let stays = still || input.kinds[c.body as usize] == BodyKind::Fixed;
+            if c.unbounded || stays && *fat != NOWHERE {
+                return false;
+            }
+            let tight = tight(c, input);
+            if fat.contains(&tight) || !is_in_range(&tight) {
+                return false;
+            }
+            *moved = true;
+            *before = std::mem::replace(fat, tight.loosened(FAT * c.size));
+            true
+        };
+        let boxes = self.colliders.par_iter().zip(&mut self.fat).with_min_len(256);
+        let moved = boxes.zip(self.moved.par_iter_mut().zip(&mut self.before)).map(fatten);
+        let mut any = moved.reduce(|| false, |a, b| a | b);
+        for plane in &self.planes {
+            let moved = plane.then != Some(pose_of(&self.colliders[plane.collider as usize], input));
+            self.moved[plane.collider as usize] = moved;
+            any |= moved;
         }
-        self.found = found;
+        any
     }
 
-    /// Whether the fattened boxes of two colliders still overlap.
+    /// Finds the pairs whose boxes overlap, and did not before: those that both overlapped have a pair. In the order of the bodies in
+    /// memory, in which every later stage then goes over them.
+    fn find(&mut self, input: &DetectionInput) {
+        let Self { colliders, fat, moved, before, tree, planes, found, .. } = self;
+        let (fat, moved) = (&*fat, &*moved);
+        // Different bodies of which one can be pushed.
+        let may_touch = |i: u32, j: u32| {
+            let bodies = key(colliders[i as usize].body, colliders[j as usize].body);
+            let dynamic = |body: u32| input.kinds[body as usize] == BodyKind::Dynamic;
+            bodies.0 != bodies.1 && (dynamic(bodies.0) || dynamic(bodies.1)) && !input.jointed.contains(&bodies)
+        };
+        tree.follow(fat, before, moved);
+        *found = tree.overlaps(&may_touch);
+        found.par_sort_unstable();
+        let box_before = |c: u32| if moved[c as usize] { &before[c as usize] } else { &fat[c as usize] };
+        for Plane { collider, then } in planes {
+            let plane = &colliders[*collider as usize];
+            let now = pose_of(plane, input);
+            let is_new = |c: u32| {
+                let looks = !colliders[c as usize].unbounded && (moved[c as usize] || moved[*collider as usize]);
+                looks
+                    && box_reaches_plane(plane, now, &fat[c as usize])
+                    && !then.is_some_and(|then| box_reaches_plane(plane, then, box_before(c)))
+                    && may_touch(*collider, c)
+            };
+            found.extend((0..colliders.len() as u32).filter(|&c| is_new(c)).map(|c| key(*collider, c)));
+            *then = Some(now);
+        }
+    }
+
+    /// Whether the fattened boxes of two colliders overlap.
     fn touches(&self, input: &DetectionInput, a: u32, b: u32) -> bool {
         let (ca, cb) = (&self.colliders[a as usize], &self.colliders[b as usize]);
         match (ca.unbounded, cb.unbounded) {
             (false, false) => self.fat[a as usize].intersects(&self.fat[b as usize]),
             (true, true) => false,
-            (true, false) => box_reaches_plane(input, ca, &self.fat[b as usize]),
-            (false, true) => box_reaches_plane(input, cb, &self.fat[a as usize]),
+            (true, false) => box_reaches_plane(ca, pose_of(ca, input), &self.fat[b as usize]),
+            (false, true) => box_reaches_plane(cb, pose_of(cb, input), &self.fat[a as usize]),
         }
     }
 
-    /// Ends the pairs whose boxes came apart or whose bodies a joint holds; the last pair takes an ended one's slot. Returns
-    /// whether it ended any.
-    fn drop_parted(&mut self, input: &DetectionInput) -> bool {
-        let (mut slot, before) = (0, self.pairs.len());
-        while slot < self.pairs.len() {
-            let pair = &self.pairs[slot];
-            let jointed = self.look_again && input.jointed.contains(&key(pair.body_a, pair.body_b));
-            if !jointed && self.touches(input, pair.collider_a, pair.collider_b) {
-                slot += 1;
-                continue;
-            }
-            self.slots.remove(&key(pair.collider_a, pair.collider_b));
-            let ended = self.pairs.swap_remove(slot);
+    /// Ends the pairs whose boxes came apart or, if joints changed, whose bodies a joint holds; the last pair takes an ended one's place.
+    /// Returns whether an ended one had a contact.
+    fn drop_parted(&mut self, input: &DetectionInput, joints_changed: bool) -> bool {
+        let ends = |&(i, &(a, b)): &(usize, &(u32, u32))| {
+            let jointed = |i: usize| input.jointed.contains(&key(self.pairs[i].body_a, self.pairs[i].body_b));
+            let moved = self.moved[a as usize] || self.moved[b as usize];
+            moved && !self.touches(input, a, b) || joints_changed && jointed(i)
+        };
+        let parted = self.keys.par_iter().enumerate().with_min_len(1024).filter(ends).map(|(i, _)| i);
+        let (parted, before): (Vec<usize>, _) = (parted.collect(), self.ended.len());
+        for i in parted.into_iter().rev() {
+            self.keys.swap_remove(i);
+            let ended = self.pairs.swap_remove(i);
             self.ended.extend(ended.manifolds.iter().map(|m| m.slot).filter(|&slot| slot != NO_SLOT));
-            if let Some(moved) = self.pairs.get(slot) {
-                self.slots.insert(key(moved.collider_a, moved.collider_b), slot as u32);
-                self.changed.push(PairChange { pair: slot as u32, computed: false });
+            if i < self.pairs.len() {
+                self.changed.push(PairChange { pair: i as u32, computed: false });
             }
         }
-        self.pairs.len() < before
+        self.ended.len() > before
     }
 
-    /// Begins the pairs that are new, of different bodies of which one can be pushed, the further reaching first.
-    fn add_found(&mut self, input: &DetectionInput) {
-        for &(i, j) in &self.found {
-            let (ci, cj) = (&self.colliders[i as usize], &self.colliders[j as usize]);
-            let dynamic = |c: &ColliderInfo| input.kinds[c.body as usize] == BodyKind::Dynamic;
-            let apart = ci.body == cj.body || input.jointed.contains(&key(ci.body, cj.body));
-            if apart || !(dynamic(ci) || dynamic(cj)) {
-                continue;
-            }
-            let slot = self.pairs.len() as u32;
-            if let std::collections::hash_map::Entry::Vacant(entry) = self.slots.entry(key(i, j)) {
-                entry.insert(slot);
-                let (first, second) = (i.min(j), i.max(j));
-                let swap = self.colliders[second as usize].reach > self.colliders[first as usize].reach;
-                let (a, b) = if swap { (second, first) } else { (first, second) };
-                self.pairs.push(a, b, &self.colliders);
-            }
-        }
+    /// Begins the pairs that are new, the further reaching first.
+    fn add_found(&mut self) {
+        let Self { colliders, pairs, keys, found, .. } = self;
+        keys.extend(&*found);
+        pairs.begin(found, colliders);
     }
 
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
@@ -250,10 +239,28 @@ impl WorldContacts {
     }
 }
 
-/// Whether a box reaches a half-space, by its corner that lies deepest.
-fn box_reaches_plane(input: &DetectionInput, plane: &ColliderInfo, aabb: &Aabb) -> bool {
-    let body = &input.moving[plane.body as usize];
-    let pose = Pose::from_parts(body.position, body.rotation) * plane.local;
+/// The box of a collider now: what it sweeps in this step, and the distance at which it makes contact.
+fn tight(c: &ColliderInfo, input: &DetectionInput) -> Aabb {
+    let body = &input.moving[c.body as usize];
+    let pose = Pose::from_parts(body.position, body.rotation);
+    let mut aabb = c.aabb(pose).loosened(input.margins.speculative * c.size + input.margins.fall);
+    let sweep = body.v * input.margins.dt;
+    // A collider that turns reaches no further out than from one side of the body to the other, and its box no further than its
+    // longest half diagonal.
+    let most = c.reach - c.size + c.local.translation.length();
+    aabb = aabb.loosened((c.reach * body.w.length() * input.margins.dt).min(most).max(0.0));
+    aabb.mins += sweep.min(glam::Vec3::ZERO);
+    aabb.maxs += sweep.max(glam::Vec3::ZERO);
+    aabb
+}
+
+fn pose_of(c: &ColliderInfo, input: &DetectionInput) -> Pose {
+    let body = &input.moving[c.body as usize];
+    Pose::from_parts(body.position, body.rotation) * c.local
+}
+
+/// Whether a box reaches a half-space at `pose`, by its corner that lies deepest.
+fn box_reaches_plane(plane: &ColliderInfo, pose: Pose, aabb: &Aabb) -> bool {
     let Some(half_space) = plane.shape.as_halfspace() else { return false };
     let normal = pose.rotation * half_space.normal;
     let deepest = (aabb.center() - pose.translation).dot(normal) - aabb.half_extents().dot(normal.abs());
@@ -262,11 +269,6 @@ fn box_reaches_plane(input: &DetectionInput, plane: &ColliderInfo, aabb: &Aabb) 
 
 pub(super) fn key(i: u32, j: u32) -> (u32, u32) {
     (i.min(j), i.max(j))
-}
-
-/// A box that overlaps no other but its like, far from everything.
-fn empty_box() -> Aabb {
-    Aabb::new(glam::Vec3::splat(2.0 * FARTHEST), glam::Vec3::splat(2.0 * FARTHEST))
 }
 
 fn is_in_range(aabb: &Aabb) -> bool {
