@@ -63,8 +63,8 @@ impl Materials {
     }
 }
 
-/// Slots that one task goes over at least.
-const LEAST_SLOTS: usize = 1024;
+/// Slots that one task goes over.
+const SLOTS_A_TASK: usize = 4096;
 
 impl ContactRows {
     /// Gives rows to manifolds that began since, and takes those of manifolds that ended.
@@ -119,21 +119,26 @@ impl ContactRows {
         problem: &StepProblem,
     ) -> Option<HardestContact> {
         let Slots { all, edges, .. } = &mut self.slots;
-        let need_of = |(i, slot): (usize, &mut Slot)| {
-            slot.need = match problem.sags.get(i).filter(|_| slot.write != Write::New) {
-                Some(sag) => {
-                    let share = if is_one_class { 1.0 } else { problem.contacts[i].substep_share };
-                    // In class 0 the substeps are longer, and sags grow with the square.
-                    effort::lasting(sag / (share * share * config.promised_sag(slot.size)), slot.need)
+        let follow = |(chunk, slots): (usize, &mut [Slot])| {
+            let mut hardest: Option<(usize, f32)> = None;
+            for (i, slot) in (chunk * SLOTS_A_TASK..).zip(slots).filter(|(_, slot)| slot.takes_part) {
+                slot.need = match problem.sags.get(i).filter(|_| slot.write != Write::New) {
+                    Some(sag) => {
+                        let share = if is_one_class { 1.0 } else { problem.contacts[i].substep_share };
+                        // In class 0 the substeps are longer, and sags grow with the square.
+                        effort::lasting(sag / (share * share * config.promised_sag(slot.size)), slot.need)
+                    }
+                    None => 0.0,
+                };
+                if hardest.is_none_or(|(_, need)| slot.need > need) {
+                    hardest = Some((i, slot.need));
                 }
-                None => 0.0,
-            };
-            (i, slot.need)
+            }
+            hardest
         };
+        let of_tasks: Vec<_> = all.par_chunks_mut(SLOTS_A_TASK).enumerate().filter_map(follow).collect();
         // Of equal ones the first.
-        let harder = |one: (usize, f32), other: (usize, f32)| if other.1 > one.1 { other } else { one };
-        let slots = all.par_iter_mut().with_min_len(LEAST_SLOTS).enumerate();
-        let hardest = slots.filter(|(_, slot)| slot.takes_part).map(need_of).reduce_with(harder);
+        let hardest = of_tasks.into_iter().reduce(|one, other| if other.1 > one.1 { other } else { one });
         let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
         hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }
