@@ -50,7 +50,7 @@ impl Load {
     pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
         let up = up(world);
         let boxes = upright_boxes(world, up);
-        let ground = Ground::new(&boxes);
+        let ground = Ground::new(&boxes, world);
         let gravity = world.gravity.as_dvec3().length();
         let weight = |b: &Body| f64::from(b.mass.mass) * gravity;
         let mut borne: Vec<f64> = world.bodies.iter().map(weight).collect();
@@ -186,17 +186,20 @@ fn aabb(low: DVec3, high: DVec3) -> Aabb {
     Aabb::new(low.max(DVec3::splat(-FAR)).as_vec3(), high.min(DVec3::splat(FAR)).as_vec3())
 }
 
-/// The boxes of all bodies that have shapes, to be asked for those under a body.
+/// The boxes of all bodies that have shapes, to be asked for those under a body of the same world.
 struct Ground<'a> {
     boxes: &'a [Box3],
-    tree: Bvh,
+    /// The end of the bodies of each world, and a tree over their boxes.
+    trees: Vec<(usize, Bvh)>,
 }
 
 impl<'a> Ground<'a> {
-    fn new(boxes: &'a [Box3]) -> Self {
-        let leaves = boxes.iter().enumerate().filter(|(_, b)| !b.is_empty());
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves.map(|(i, b)| (i, aabb(b.low, b.high))));
-        Self { boxes, tree }
+    fn new(boxes: &'a [Box3], world: &World) -> Self {
+        let tree = |own: std::ops::Range<usize>| {
+            let leaves = own.clone().filter(|&i| !boxes[i].is_empty()).map(|i| (i, aabb(boxes[i].low, boxes[i].high)));
+            (own.end, Bvh::from_iter(BvhBuildStrategy::Binned, leaves))
+        };
+        Self { boxes, trees: world.worlds().map(tree).collect() }
     }
 
     /// The bodies that bear `upper`, with the areas by which they overlap it from above.
@@ -230,7 +233,8 @@ impl<'a> Ground<'a> {
         };
         let column = aabb(above.low.with_y(floor), above.high.with_y(middle));
         let lower = |i: &usize| *i != upper && self.boxes[*i].high.y < middle;
-        let near = self.tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
+        let (_, tree) = &self.trees[self.trees.partition_point(|tree| tree.0 <= upper)];
+        let near = tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
         let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
         below.sort_unstable_by_key(|s| s.0);
         below
@@ -282,7 +286,7 @@ mod tests {
             world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0));
         }
         let boxes = upright_boxes(&world, up(&world));
-        let ground = Ground::new(&boxes);
+        let ground = Ground::new(&boxes, &world);
         let (mut alone, mut deep) = (0, 0);
         for upper in 0..boxes.len() {
             let height = boxes[upper].high.y - boxes[upper].low.y;
@@ -294,6 +298,20 @@ mod tests {
             deep += usize::from(top < boxes[upper].low.y - height && !bearing.is_empty());
         }
         assert!(alone > 3 && deep > 50, "{alone} rest on nothing, {deep} on what lies deep below");
+    }
+
+    /// Worlds beside each other stand at the same place.
+    #[test]
+    fn no_body_bears_one_of_another_world() {
+        let scene = Scene::find_worlds("tower", &["n=10".into()], 3, None).unwrap();
+        let loads = Load::all(&scene.world, &SolverConfig::default(), |_, _| true);
+        let alone =
+            Load::all(&Scene::find("tower", &["n=10".into()]).unwrap().world, &SolverConfig::default(), |_, _| true);
+        let count = scene.world.bodies.len() / 3;
+        assert_eq!(loads.len(), 3 * alone.len());
+        assert!(loads.iter().all(|load| load.upper / count == load.lower / count));
+        let force = |loads: &[Load]| loads.iter().map(|load| load.force).fold(0.0, f64::max);
+        assert_eq!(force(&loads), force(&alone));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The contacts of pairs, brought to where the bodies are: reused while the bodies hardly moved, else computed. Sixteen pairs at a time are
 //! tested, and those of cuboids are computed as many at a time; each pair is updated by itself, so that it does not matter with which others.
 
+use std::cell::RefCell;
 use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
@@ -27,9 +28,13 @@ pub(super) struct Updated {
     pub reshaped: bool,
 }
 
-/// Memory that one thread reuses from chunk to chunk.
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// Memory that one thread reuses from chunk to chunk and from step to step.
 #[derive(Default)]
-pub(super) struct Scratch {
+struct Scratch {
     pair: PairScratch,
     tests: Vec<Tested>,
     events: Vec<Event>,
@@ -47,7 +52,11 @@ struct Event {
 
 impl Narrow<'_> {
     /// Updates some pairs; returns those that are not as they were, in their order.
-    pub fn update(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
+    pub fn update(&self, chunk: PairChunk) -> Vec<Updated> {
+        SCRATCH.with_borrow_mut(|scratch| self.update_with(chunk, scratch))
+    }
+
+    fn update_with(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
         let PairChunk { first, pairs, tracks } = chunk;
         let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids } = scratch;
         let set = InstructionSet::default();

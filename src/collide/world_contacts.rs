@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
 use super::manifold::NO_SLOT;
-use super::narrow::{Narrow, Scratch, Updated};
+use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
 use super::report::{Activity, Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
@@ -226,9 +226,7 @@ impl WorldContacts {
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
         let narrow =
             Narrow { colliders: &self.colliders, cuboids: &self.cuboids, moving: input.moving, margins: input.margins };
-        let chunks = self.pairs.par_chunks_mut();
-        let updates = chunks.map_init(Scratch::default, |scratch, chunk| narrow.update(chunk, scratch));
-        let updates: Vec<Updated> = updates.flatten_iter().collect();
+        let updates: Vec<Updated> = self.pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
         let mut stats = DetectStats { pairs: self.pairs.len(), ..DetectStats::default() };
         for Updated { pair, computed, reshaped } in updates {
             stats.computed += usize::from(computed);

@@ -136,9 +136,12 @@ impl ContactRows {
             }
             hardest
         };
-        let of_tasks: Vec<_> = all.par_chunks_mut(SLOTS_A_TASK).enumerate().filter_map(follow).collect();
         // Of equal ones the first.
-        let hardest = of_tasks.into_iter().reduce(|one, other| if other.1 > one.1 { other } else { one });
+        let harder = |one: Option<(usize, f32)>, other: Option<(usize, f32)>| match (one, other) {
+            (Some(one), Some(other)) if other.1 > one.1 => Some(other),
+            (one, other) => one.or(other),
+        };
+        let hardest = all.par_chunks_mut(SLOTS_A_TASK).enumerate().map(follow).reduce(|| None, harder);
         let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
         hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }

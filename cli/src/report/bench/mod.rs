@@ -17,7 +17,7 @@ mod worlds;
 pub use baseline::{Change, compare_with};
 pub use falling::{FALLING, FALLING_QUICK, FallingRow, falling, turns};
 pub use growth::{GROWTH, GrowthRow, growth};
-pub use limits::{LIMITS, LIMITS_QUICK, LimitRow, limits};
+pub use limits::{LIMITS, LIMITS_QUICK, LimitRow, OPERATIONS, limits};
 pub use machine::Machine;
 pub use worlds::{COUNTS, WORLDS, WorldsRow, worlds};
 

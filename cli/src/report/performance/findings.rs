@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Rows;
 use super::engines::{OWN, distinct};
-use crate::report::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
+use crate::report::bench::{FallingRow, GrowthRow, LimitRow, OPERATIONS, WorldsRow};
 use crate::report::comparison::WindowRow;
 use crate::report::number::number;
 
@@ -115,9 +115,9 @@ fn growth(rows: &[GrowthRow]) -> String {
 }
 
 fn limits(rows: &[LimitRow]) -> String {
-    let mut text = String::from(
-        "A sweep over one point with friction takes 299.5 operations on single numbers, counted by running the kernel over a number type \
-         that counts. Bytes are those that the lanes read and write, and in brackets those of the kernels over plain rows, each body as often \
+    let mut text = format!(
+        "A sweep over one point with friction of two cubes takes {OPERATIONS} operations on single numbers, counted by running the kernel \
+         over a number type that counts. Bytes are those that the lanes read and write, and in brackets those of the kernels over plain rows, each body as often \
          as a contact names it; bodies that come from a cache take the rate beyond 100 % of the triad. The triad is a = b + s c over as \
          many bytes as the lanes hold; the peak is that of multiplications and additions on registers alone:\n\n",
     );
