@@ -46,6 +46,7 @@ mod effort;
 mod error;
 mod graph;
 mod kernels;
+mod lanes;
 pub mod load;
 mod math;
 mod memory;

@@ -42,7 +42,7 @@ pub mod math {
 pub mod backend {
     pub use crate::backend::calibrate::crossover;
     pub use crate::backend::checked::CheckedStep;
-    pub use crate::backend::cpu::simd::{InstructionSet, Lanes, WIDTH, Work};
+    pub use crate::lanes::{InstructionSet, Lanes, WIDTH, Work};
 
     /// The compute shaders: texts, buffers, layouts.
     #[cfg(feature = "gpu")]

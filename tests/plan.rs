@@ -172,14 +172,14 @@ fn joints_are_swept_before_contacts() {
     let expected = "\
 integrate_velocities
 warm_start_joints over colors 1
-warm_start(disc friction) over colors 0
+warm_start(disc friction, isotropic) over colors 0
 solve_joints(biased) over colors 1
-solve_contacts(biased) over colors 0
+solve_contacts(biased, isotropic) over colors 0
 solve_joints(biased) over colors 1
-solve_contacts(biased) over colors 0
+solve_contacts(biased, isotropic) over colors 0
 integrate_positions
 solve_joints() over colors 1
-solve_contacts(disc friction) over colors 0
+solve_contacts(disc friction, isotropic) over colors 0
 ";
     assert_eq!(solved_by(JointSolver::Sweeps), expected);
     // At once, they stand at the same places.
@@ -208,7 +208,7 @@ fn relax_sweep(config: SolverConfig) -> String {
 fn every_setting_of_a_sweep_is_in_the_plan() {
     use drystone::config::{Clamping, Friction, FrictionAt, FrictionOrder, Stabilization};
     let default = SolverConfig::default;
-    assert_eq!(relax_sweep(default()), "solve_contacts(disc friction) over colors 0");
+    assert_eq!(relax_sweep(default()), "solve_contacts(disc friction, isotropic) over colors 0");
     for (config, expected) in [
         (default().with(|c| c.rules.manifold_passes = 2), "disc friction, repeated"),
         (default().with(|c| c.rules.friction_order = FrictionOrder::FrictionFirst), "disc friction, first"),
@@ -217,7 +217,7 @@ fn every_setting_of_a_sweep_is_in_the_plan() {
         (default().with(|c| c.rules.slip_friction = true), "slip friction"),
         (default().with(|c| c.friction = Friction::Box), "box friction"),
     ] {
-        assert_eq!(relax_sweep(config), format!("solve_contacts({expected}) over colors 0"));
+        assert_eq!(relax_sweep(config), format!("solve_contacts({expected}, isotropic) over colors 0"));
     }
     // Impulses that begin at zero are cleared, not carried over.
     let config = default().with(|c| {
@@ -230,7 +230,7 @@ fn every_setting_of_a_sweep_is_in_the_plan() {
     let substep = "\
 integrate_velocities
 clear_impulses over colors 0
-solve_contacts(biased, disc friction, clamped per correction) over colors 0
+solve_contacts(biased, disc friction, clamped per correction, isotropic) over colors 0
 integrate_positions
 ";
     assert_eq!(plan.to_string(), substep.repeat(2));
@@ -248,9 +248,11 @@ fn momentum_begins_with_the_third_sweep_and_ends_before_the_last_is_measured() {
         });
         planned(row(&cube(), 0.5, 0.0), config).0.to_string()
     };
-    let sweep = "solve_contacts(biased, disc friction) over colors 0\n";
+    let sweep = "solve_contacts(biased, disc friction, isotropic) over colors 0\n";
     let around = |sweeps: &str| {
-        format!("integrate_velocities\nwarm_start(disc friction) over colors 0\n{sweeps}integrate_positions\n")
+        format!(
+            "integrate_velocities\nwarm_start(disc friction, isotropic) over colors 0\n{sweeps}integrate_positions\n"
+        )
     };
     let twice = sweep.replace("colors 0", "colors 0, 0");
     assert_eq!(of(2), around(&twice));
@@ -265,9 +267,9 @@ fn bytes_moved_are_those_of_the_rows_that_a_pass_names() {
     let contact = 64 + 2 * (64 + 48 + 32);
     // Eight cubes of four points: an impulse is read, or read and written; friction goes over the points again.
     for (name, expected) in [
-        ("warm_start(disc friction)", 8 * (contact + 4 * (48 + 16))),
-        ("solve_contacts(biased)", 8 * (contact + 4 * (48 + 2 * 16))),
-        ("solve_contacts(disc friction)", 8 * (contact + 2 * 4 * (48 + 2 * 16))),
+        ("warm_start(disc friction, isotropic)", 8 * (contact + 4 * (48 + 16))),
+        ("solve_contacts(biased, isotropic)", 8 * (contact + 4 * (48 + 2 * 16))),
+        ("solve_contacts(disc friction, isotropic)", 8 * (contact + 2 * 4 * (48 + 2 * 16))),
         ("integrate_positions", 9 * (64 + 32)),
     ] {
         let mut simulation = planned(row(&cube(), 0.5, 0.0), SolverConfig::default().without_sleep()).2;

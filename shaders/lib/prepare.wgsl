@@ -1,4 +1,4 @@
-// Effective masses of contact points. Doubles: src/kernels/prepare.rs.
+// Effective masses of contact points. Doubles: src/problem/arithmetic.rs.
 
 const LEAST_JAMMING: f32 = 0.53;
 

@@ -1,6 +1,6 @@
 //! Vectors and rotations of sixteen pairs side by side, in the order of operations in which glam does them with one: the bits are the same.
 
-use crate::backend::cpu::simd::Lanes;
+use crate::lanes::Lanes;
 use crate::math::{Quat, Vec3, dot3, vec3};
 
 /// A pose of each pair.

@@ -9,7 +9,7 @@ use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
-use crate::backend::cpu::simd::{InstructionSet, WIDTH, Wide};
+use crate::lanes::{InstructionSet, WIDTH, Wide};
 
 /// What an update reads.
 pub(super) struct Narrow<'a> {

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use super::collider::{BodyState, Margins, POSE, VELOCITY};
 use super::lane_pose::{Pose, Turn, backwards, choose, length, negative, product};
 use super::pairs::Track;
-use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns};
+use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, dot3, vec3};
 
 /// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
@@ -131,8 +131,8 @@ mod tests {
     use glam::{Quat, Vec3};
 
     use super::*;
-    use crate::backend::cpu::simd::InstructionSet;
     use crate::collide::pairs::{NEVER, Placed};
+    use crate::lanes::InstructionSet;
     use crate::random::mixed;
 
     struct Random(u64);

@@ -13,7 +13,6 @@ pub mod joint_system;
 mod kernel_rows;
 pub mod momentum;
 pub mod pair;
-pub mod prepare;
 mod rows;
 
 pub use kernel_rows::KernelRows;

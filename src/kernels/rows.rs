@@ -1,9 +1,10 @@
 //! The rows of a problem as the kernels see them: over a lane, without padding.
 
-use crate::math::{Lane, Quat, Scalar, Vec3, dot3, vec3};
+use crate::math::{Lane, Quat, Scalar, Vec3};
 use crate::problem::{
     BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness, Substep,
 };
+pub use crate::problem::{Mass, Sym3};
 
 /// Double of the WGSL struct `Body`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,35 +27,6 @@ pub struct Free<L> {
     pub v: Vec3<L>,
     /// Angular velocity.
     pub w: Vec3<L>,
-}
-
-/// A symmetric 3x3 matrix: the upper triangle, row by row.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sym3<L> {
-    /// xx xy xz.
-    pub x: Vec3<L>,
-    /// yy yz zz.
-    pub yz: Vec3<L>,
-}
-
-impl<L: Lane> Sym3<L> {
-    /// Double of `inv_inertia_times`.
-    #[inline(always)]
-    pub fn times(self, u: Vec3<L>) -> Vec3<L> {
-        let (p, q) = (self.x, self.yz);
-        vec3(dot3(p, u), p.y * u.x + q.x * u.y + q.y * u.z, p.z * u.x + q.y * u.y + q.z * u.z)
-    }
-}
-
-/// Double of the WGSL struct `Mass`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mass<L> {
-    /// Inverse inertia, world axes.
-    pub inv_inertia: Sym3<L>,
-    /// Inverse mass.
-    pub inv_mass: L,
-    /// Gravity plus force over mass.
-    pub acceleration: Vec3<L>,
 }
 
 /// Double of the WGSL struct `Inertia`.

@@ -1,14 +1,14 @@
 //! How hard a constraint is to move: entries of S = G M⁻¹ Gᵀ at one contact point, from rows. The arithmetic is that of
-//! `src/kernels/prepare.rs`. Derivation: docs/derivation.md.
+//! `src/problem/arithmetic.rs`. Derivation: docs/derivation.md.
 
 use glam::{Mat3, Vec3};
 
+use super::arithmetic::{self as prepare, inverse_or_zero, tangent_mass, twist_mass};
+use super::arithmetic::{Mass, Sym3};
 use super::rows::{ContactRow, MassRow};
-use crate::kernels::prepare::{self, inverse_or_zero, tangent_mass, twist_mass};
-use crate::kernels::{Mass, Sym3};
 use crate::math;
 
-pub use crate::kernels::prepare::LEAST_JAMMING;
+pub use super::arithmetic::LEAST_JAMMING;
 
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,6 @@
 //! One step as a value: plain rows, whose names are the names of the WGSL bindings.
 
+pub(crate) mod arithmetic;
 mod blocks;
 mod bodies;
 pub mod carry;
@@ -19,6 +20,7 @@ pub mod softness;
 mod summary;
 mod write;
 
+pub use arithmetic::{Mass, Sym3};
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;

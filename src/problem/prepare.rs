@@ -9,13 +9,13 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::arithmetic::{Frame, Pose, movement_since, point_masses};
+use super::arithmetic::{Mass, Sym3};
 use super::carry::{Preload, preloaded};
 use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
-use crate::backend::cpu::shared::Shared;
-use crate::backend::cpu::simd::{Lanes, Row8, WIDTH, Wide, Work};
 use crate::collide::{MAX_POINTS, Manifold, Placed};
-use crate::kernels::prepare::{Frame, Pose, movement_since, point_masses};
-use crate::kernels::{Mass, Sym3};
+use crate::lanes::Shared;
+use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work};
 use crate::math::{Quat, reciprocal, vec3};
 
 /// Where a body is, 32 B.
@@ -287,7 +287,7 @@ fn places(rows: &[u32; WIDTH], stride: u32, offset: u32) -> [u32; WIDTH] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::cpu::simd::InstructionSet;
+    use crate::lanes::InstructionSet;
     use crate::math::{self, NormalMovement};
     use crate::random::SplitMix64;
 

@@ -6,8 +6,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::arithmetic::tangent_of;
 use crate::collide::MAX_POINTS;
-use crate::kernels::prepare::tangent_of;
 use crate::math;
 
 /// State of one body that a step changes, 64 B.

@@ -7,6 +7,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::arithmetic::{inverse_or_zero, square_root};
 use super::carry::Carry;
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
@@ -14,12 +15,11 @@ use super::prepare::{ComputedRow, Over, PoseRow, Prepare, What};
 use super::rescale::{change_compliance, change_share};
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
-use crate::backend::cpu::shared::Shared;
-use crate::backend::cpu::simd::{InstructionSet, WIDTH};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
-use crate::kernels::prepare::{inverse_or_zero, square_root};
+use crate::lanes::Shared;
+use crate::lanes::{InstructionSet, WIDTH};
 use crate::math::{self, dot3, reciprocal};
 use crate::world::World;
 

@@ -5,9 +5,9 @@ use glam::{DMat3, DVec3};
 use super::{Order, Sequence};
 use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
 use crate::error::{Result, input};
-use crate::kernels::prepare::tangent_mass;
 use crate::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use crate::math::{Vec3, vec3};
+use crate::problem::arithmetic::tangent_mass;
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem, Substep};
 
 /// A contact problem as a step without time.

@@ -4,14 +4,14 @@
 
 use std::ops::Range;
 
-use super::shared::Shared;
-use super::simd::{Lanes, Row8, WIDTH, Work, lanes};
 use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_velocities, start_of,
 };
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
+use crate::lanes::Shared;
+use crate::lanes::{Lanes, Row8, WIDTH, Work, lanes};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, Params, StepProblem, Substep};

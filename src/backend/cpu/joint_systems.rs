@@ -7,12 +7,12 @@ use std::ops::Range;
 use super::bodies::State;
 use super::lane_layout::{ImpulsePlace, LaneLayout};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
-use super::shared::Shared;
-use super::simd::{Lanes, WIDTH, Wide, Work};
 use crate::kernels::joint_system::{
     Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
 };
 use crate::kernels::{Joint, Mass, Pair, Sym3};
+use crate::lanes::Shared;
+use crate::lanes::{Lanes, WIDTH, Wide, Work};
 use crate::math::{Vec3, vec3};
 use crate::problem::{JointRow, JointSystems, StepProblem};
 

@@ -7,12 +7,12 @@ use std::ops::Range;
 
 use super::constraint::Constraint;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
-use super::shared::Shared;
-use super::simd::{InstructionSet, Lanes, Portable, WIDTH, Wide};
 use super::threads::Threads;
 use super::transfer::{BodyPlace, Load, Store};
 use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
+use crate::lanes::Shared;
+use crate::lanes::{InstructionSet, Lanes, Portable, WIDTH, Wide};
 use crate::math::{Lane, Vec3, vec3};
 use crate::problem::StepProblem;
 

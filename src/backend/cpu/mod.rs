@@ -11,9 +11,7 @@ mod joint_systems;
 mod lane_layout;
 mod partition;
 mod reference;
-pub(crate) mod shared;
 mod shared_step;
-pub(crate) mod simd;
 mod sweep;
 #[cfg(test)]
 mod tests;
@@ -32,15 +30,14 @@ use crate::kernels::convergence::begin_sweep;
 use crate::kernels::joint_system::JointFactors;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
+use crate::lanes::{InstructionSet, Row8, Shared, WIDTH, Wide};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
 use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
 use joint_systems::{SharedFactors, SystemLayout};
 use lane_layout::LaneLayout;
 use partition::Partition;
-use shared::Shared;
 use shared_step::{SharedStep, Spread};
-use simd::{InstructionSet, Row8, WIDTH, Wide};
 use threads::Threads;
 use transfer::BodyPlace;
 

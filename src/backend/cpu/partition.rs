@@ -8,8 +8,8 @@
 
 use std::ops::Range;
 
-use super::simd::WIDTH;
 use crate::graph::Islands;
+use crate::lanes::WIDTH;
 use crate::problem::{Block, BodyRow, MassRow, StepProblem};
 
 /// Bodies and constraints that a part holds: about a megabyte.

@@ -8,10 +8,10 @@ use super::constraint::Constraint;
 use super::joint_systems::{SharedFactors, SystemLayout, SystemWork};
 use super::lane_layout::LaneLayout;
 use super::partition::Partition;
-use super::shared::Shared;
-use super::simd::{InstructionSet, Row8, WIDTH, Wide};
 use super::sweep::{Sweep, clear_impulses};
 use crate::kernels::Inertia;
+use crate::lanes::Shared;
+use crate::lanes::{InstructionSet, Row8, WIDTH, Wide};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
 

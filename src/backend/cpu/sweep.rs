@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_layout::{BodyLanes, LaneGroup, LaneLayout};
-use super::shared::Shared;
-use super::simd::{Lanes, Row8, WIDTH, Wide, Work, row_at};
 use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
+use crate::lanes::Shared;
+use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
 

@@ -168,8 +168,8 @@ impl<F: FnMut()> Drop for OnDrop<F> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shared::Shared;
     use super::*;
+    use crate::lanes::Shared;
 
     fn with_threads(threads: usize, test: impl FnOnce() + Send) {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(test);

@@ -3,7 +3,7 @@
 use super::Cpu;
 use super::bodies::State;
 use super::lane_layout::LaneGroup;
-use super::simd::{Row8, WIDTH, Wide};
+use crate::lanes::{Row8, WIDTH, Wide};
 use crate::plan::Kernel;
 
 impl Cpu {

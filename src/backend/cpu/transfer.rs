@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use super::constraint::Constraint;
 use super::lane_layout::{LaneGroup, NO_ROW};
-use super::shared::Shared;
-use super::simd::{Lanes, Row8, WIDTH, Wide, Work, lanes};
+use crate::lanes::Shared;
+use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work, lanes};
 use crate::problem::StepProblem;
 
 /// Where a body's state is, and whether the body can move.

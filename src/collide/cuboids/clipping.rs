@@ -10,7 +10,7 @@ use parry3d::shape::{Cuboid, PolygonalFeature};
 use super::super::lane_pose::{Pose, Turn, backwards, magnitude, negative};
 use super::super::solid::ParryManifold;
 use super::Near;
-use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns};
+use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Vec3, cross3, dot3, vec3};
 
 /// Places where two faces can touch: four corners of the first, four of the second, and sixteen crossings of their sides.

@@ -18,7 +18,7 @@ use self::clipping::{Clipped, Clipping};
 use self::separation::Separation;
 use super::collider::{BodyState, CuboidPlace};
 use super::solid::ParryManifold;
-use crate::backend::cpu::simd::{InstructionSet, Row8, WIDTH};
+use crate::lanes::{InstructionSet, Row8, WIDTH};
 
 /// Two cuboids to be compared.
 #[derive(Clone, Copy)]

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use super::super::collider::{BodyState, CuboidPlace, POSE, POSITION};
 use super::super::lane_pose::{Pose, Turn, backwards, choose, corner, length, negative};
 use super::{CuboidPair, Near};
-use crate::backend::cpu::simd::{Lanes, WIDTH, Wide, Work, columns};
+use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, Vec3, dot3, vec3};
 
 /// The stage over all pairs; adds those that are near to `near`.

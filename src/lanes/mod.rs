@@ -12,11 +12,13 @@ mod avx2;
 mod avx512;
 mod instructions;
 mod portable;
+mod shared;
 #[cfg(test)]
 mod tests;
 
 pub use instructions::{InstructionSet, Work};
 pub use portable::Portable;
+pub use shared::Shared;
 
 use crate::math::Lane;
 
@@ -70,7 +72,7 @@ pub trait Lanes: Lane {
 /// # Safety
 /// `place` is where a row of the allocation of `rows` begins.
 #[inline(always)]
-pub(super) unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
+pub unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
     // SAFETY: the caller's promise. Indices of the processor count in eights.
     unsafe { rows.cast::<u64>().add(place as usize).cast() }
 }
@@ -106,7 +108,7 @@ macro_rules! lanes {
         }),*]
     };
 }
-pub(super) use lanes;
+pub(crate) use lanes;
 
 /// Arithmetic of a type of lanes: what each function does to the registers `a` and `b` of its arguments, and for a mask `m`.
 macro_rules! lane {

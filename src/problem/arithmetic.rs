@@ -1,8 +1,36 @@
 //! How the rows of a contact follow from its manifold and from the masses and poses of its bodies. The functions of effective masses are the
 //! doubles of `shaders/lib/prepare.wgsl`; separations are computed by the processor alone.
 
-use super::rows::Mass;
 use crate::math::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
+
+/// A symmetric 3x3 matrix: the upper triangle, row by row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sym3<L> {
+    /// xx xy xz.
+    pub x: Vec3<L>,
+    /// yy yz zz.
+    pub yz: Vec3<L>,
+}
+
+impl<L: Lane> Sym3<L> {
+    /// Double of `inv_inertia_times`.
+    #[inline(always)]
+    pub fn times(self, u: Vec3<L>) -> Vec3<L> {
+        let (p, q) = (self.x, self.yz);
+        vec3(dot3(p, u), p.y * u.x + q.x * u.y + q.y * u.z, p.z * u.x + q.y * u.y + q.z * u.z)
+    }
+}
+
+/// Double of the WGSL struct `Mass`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mass<L> {
+    /// Inverse inertia, world axes.
+    pub inv_inertia: Sym3<L>,
+    /// Inverse mass.
+    pub inv_mass: L,
+    /// Gravity plus force over mass.
+    pub acceleration: Vec3<L>,
+}
 
 /// Friction up to which no solid of even density jams. A point at the lever r from the center of such a solid has m r²/I <= 15, and friction
 /// below 2/√14 jams no point with that (docs/derivation.md, section 6).
