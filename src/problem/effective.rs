@@ -68,7 +68,7 @@ impl EffectiveMass<'_> {
         twist_mass(n, &self.inverse[0].lane(), &self.inverse[1].lane())
     }
 
-    /// How far friction jams a point: [`prepare::jamming`].
+    /// How far friction jams a point: `jamming` in `src/problem/arithmetic.rs`.
     pub fn jamming(&self, r_a: Vec3, r_b: Vec3) -> f32 {
         let n = Vec3::from_array(self.row.normal);
         let (t_1, t_2) = self.row.tangents();

@@ -423,7 +423,7 @@ mod tests {
     fn every_instruction_set_prepares_slots_with_the_bits_of_plain_numbers() {
         // The last group has free lanes, and some slots are left out.
         let slots: Vec<u32> = (0..SLOTS as u32).filter(|i| i % 7 != 2).collect();
-        assert!(slots.len() % WIDTH != 0);
+        assert!(!slots.len().is_multiple_of(WIDTH));
         let before = random_tables();
         let mut expected = before.clone();
         one_by_one(&mut expected, &slots);

@@ -73,15 +73,15 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
 /// Time of a step over the run, one frame a scene, on the least number of threads.
 pub(super) fn picture(rows: &[WindowRow]) -> String {
     let threads = rows.iter().map(|r| r.threads).min().unwrap_or(1);
-    let engines = distinct(rows.iter().map(|r| &*r.engine));
+    let known = distinct(rows.iter().map(|r| &*r.setting));
     let frame_of = |scene: &str| {
         let settings = distinct(rows.iter().filter(|r| r.scene == scene).map(|r| &*r.setting));
         let series = settings.iter().filter_map(|setting| {
             let own = thirds(rows, scene, threads, setting);
-            let engine = &*own.first()?.engine;
+            own.first()?;
             let line: Vec<_> = own.iter().map(|r| ((r.from - 1 + r.to) as f64 / 2.0, r.ms)).collect();
             let points = line.iter().map(|&(x, y)| (x, y, String::new())).collect();
-            let look = engines.iter().position(|&known| known == engine).unwrap_or(0);
+            let look = known.iter().position(|known| known == setting).unwrap_or(0);
             Some(Series { name: (*setting).to_owned(), look, points, line })
         });
         let title = format!("{scene}, threads: {threads}");
