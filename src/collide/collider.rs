@@ -5,8 +5,18 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use super::report::Activity;
 use crate::world::{Body, BodyKind, Collider};
+
+/// How a body takes part in the detection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activity {
+    /// Does not move, and nothing is solved for it.
+    Still,
+    /// Moves by itself: cannot be pushed, but may wake what it touches.
+    Moving,
+    /// Can be pushed.
+    Awake,
+}
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]

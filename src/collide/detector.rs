@@ -6,10 +6,11 @@ use std::ops::Range;
 use parry3d::math::Pose;
 use rayon::prelude::*;
 
+use super::collider::Activity;
 use super::collider::{BodyState, ColliderInfo, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
-use super::report::{Activity, Change, DetectStats};
+use super::report::{Change, DetectStats};
 use super::world_contacts::{DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
 use crate::error::{Result, input};

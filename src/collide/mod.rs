@@ -22,9 +22,10 @@ mod solid;
 mod tree;
 mod world_contacts;
 
+pub use collider::Activity;
 pub use detector::Detector;
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 pub use pair::Pair;
 pub use pairs::Placed;
 pub(crate) use report::Change;
-pub use report::{Activity, DetectStats};
+pub use report::DetectStats;

@@ -1,17 +1,6 @@
-//! The state of bodies that a detection takes, and its report about pairs.
+//! The report of a detection about pairs.
 
 use super::pair::Pair;
-
-/// How a body takes part in the detection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Activity {
-    /// Does not move, and nothing is solved for it.
-    Still,
-    /// Moves by itself: cannot be pushed, but may wake what it touches.
-    Moving,
-    /// Can be pushed.
-    Awake,
-}
 
 /// One thing that a detection changed.
 pub(crate) enum Change<'a> {

@@ -6,11 +6,12 @@ use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use rayon::prelude::*;
 
+use super::collider::Activity;
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
 use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
-use super::report::{Activity, Change, DetectStats};
+use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
 use crate::world::BodyKind;
 

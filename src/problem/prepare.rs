@@ -14,8 +14,7 @@ use super::arithmetic::{Mass, Sym3};
 use super::carry::{Preload, preloaded};
 use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{MAX_POINTS, Manifold, Placed};
-use crate::lanes::Shared;
-use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work};
+use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work};
 use crate::math::{Quat, reciprocal, vec3};
 
 /// Where a body is, 32 B.

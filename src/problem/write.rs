@@ -18,8 +18,7 @@ use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
-use crate::lanes::Shared;
-use crate::lanes::{InstructionSet, WIDTH};
+use crate::lanes::{InstructionSet, Shared, WIDTH};
 use crate::math::{self, dot3, reciprocal};
 use crate::world::World;
 

@@ -10,8 +10,7 @@ use crate::kernels::integrate::{
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
-use crate::lanes::Shared;
-use crate::lanes::{Lanes, Row8, WIDTH, Work, lanes};
+use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, Params, StepProblem, Substep};

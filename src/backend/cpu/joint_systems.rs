@@ -11,8 +11,7 @@ use crate::kernels::joint_system::{
     Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
 };
 use crate::kernels::{Joint, Mass, Pair, Sym3};
-use crate::lanes::Shared;
-use crate::lanes::{Lanes, WIDTH, Wide, Work};
+use crate::lanes::{Lanes, Shared, WIDTH, Wide, Work};
 use crate::math::{Vec3, vec3};
 use crate::problem::{JointRow, JointSystems, StepProblem};
 

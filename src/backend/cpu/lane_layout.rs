@@ -6,29 +6,15 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::constraint::Constraint;
+use super::lane_group::{LaneGroup, NO_ROW};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::threads::Threads;
 use super::transfer::{BodyPlace, Load, Store};
 use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
-use crate::lanes::Shared;
-use crate::lanes::{InstructionSet, Lanes, Portable, WIDTH, Wide};
+use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH, Wide};
 use crate::math::{Lane, Vec3, vec3};
 use crate::problem::StepProblem;
-
-/// Sixteen constraints of one color with as many impulses each.
-#[derive(Clone, Copy, Default)]
-pub(super) struct LaneGroup {
-    pub a: BodyLanes,
-    pub b: BodyLanes,
-    /// Rows of the problem, one a lane; `NO_ROW` for a lane without a constraint.
-    pub rows: [u32; WIDTH],
-    pub header: [Wide; 11],
-    /// The first of its impulses, and of its points.
-    first: u32,
-    /// Impulses; one of them is the patch, if there are patches.
-    count: u32,
-}
 
 /// The place of the impulse of a joint among the lanes.
 #[derive(Clone, Copy, Default)]
@@ -37,18 +23,6 @@ pub(super) struct ImpulsePlace {
     pub row: u32,
     /// Its number among them.
     pub lane: u32,
-}
-
-/// The row of a lane without a constraint.
-pub(super) const NO_ROW: u32 = u32::MAX;
-
-/// Sixteen bodies.
-#[derive(Clone, Copy, Default)]
-pub(super) struct BodyLanes {
-    /// Where their states are.
-    pub places: [u32; WIDTH],
-    /// Which of them can move, a bit a lane.
-    pub movable: u16,
 }
 
 /// The contacts, or the joints, of a problem, part by part and color by color.
@@ -220,20 +194,6 @@ impl<C: Constraint> LaneLayout<C> {
     pub fn impulses_of(&self, groups: Range<usize>) -> Range<usize> {
         let groups = &self.groups[groups];
         groups.first().map_or(0..0, |first| first.impulses().start..groups[groups.len() - 1].impulses().end)
-    }
-}
-
-impl LaneGroup {
-    /// Where its impulses are.
-    #[inline(always)]
-    pub fn impulses(&self) -> Range<usize> {
-        self.first as usize..(self.first + self.count) as usize
-    }
-
-    /// Whether every lane has a constraint; lanes are filled from the first.
-    #[inline(always)]
-    pub fn is_full(&self) -> bool {
-        self.rows[WIDTH - 1] != NO_ROW
     }
 }
 

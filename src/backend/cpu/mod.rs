@@ -8,6 +8,7 @@
 mod bodies;
 mod constraint;
 mod joint_systems;
+mod lane_group;
 mod lane_layout;
 mod partition;
 mod reference;

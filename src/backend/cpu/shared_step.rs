@@ -10,8 +10,7 @@ use super::lane_layout::LaneLayout;
 use super::partition::Partition;
 use super::sweep::{Sweep, clear_impulses};
 use crate::kernels::Inertia;
-use crate::lanes::Shared;
-use crate::lanes::{InstructionSet, Row8, WIDTH, Wide};
+use crate::lanes::{InstructionSet, Row8, Shared, WIDTH, Wide};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
 

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
-use super::lane_layout::{BodyLanes, LaneGroup, LaneLayout};
+use super::lane_group::{BodyLanes, LaneGroup};
+use super::lane_layout::LaneLayout;
 use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
-use crate::lanes::Shared;
-use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work, row_at};
+use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
 

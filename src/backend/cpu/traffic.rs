@@ -2,7 +2,7 @@
 
 use super::Cpu;
 use super::bodies::State;
-use super::lane_layout::LaneGroup;
+use super::lane_group::LaneGroup;
 use crate::lanes::{Row8, WIDTH, Wide};
 use crate::plan::Kernel;
 

@@ -6,9 +6,8 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::constraint::Constraint;
-use super::lane_layout::{LaneGroup, NO_ROW};
-use crate::lanes::Shared;
-use crate::lanes::{Lanes, Row8, WIDTH, Wide, Work, lanes};
+use super::lane_group::{LaneGroup, NO_ROW};
+use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, lanes};
 use crate::problem::StepProblem;
 
 /// Where a body's state is, and whether the body can move.

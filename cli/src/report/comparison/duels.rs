@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::measure::Row;
 use super::pareto::{Fault, fastest};
+use super::row::Row;
 use crate::report::number::number;
 use drystone::Result;
 

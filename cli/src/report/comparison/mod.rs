@@ -9,17 +9,18 @@ mod page;
 mod pareto;
 mod points;
 mod problems;
+mod row;
 mod solves;
 mod survey;
 mod windows;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
-pub use measure::{Row, blocks, measure};
+pub use measure::{blocks, measure};
 pub use origin::Origin;
 pub use points::{drystone, scene, scenes, substeps};
+pub use row::{Row, WindowRow};
 pub use solves::SolveRow;
 pub use survey::{Report, Survey};
-pub use windows::WindowRow;
 
 #[cfg(test)]
 mod tests {

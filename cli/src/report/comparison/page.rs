@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 
 use super::duels::OWN;
 use super::html::{cell, escape, inline, profile_picture, table};
-use super::measure::Row;
 use super::pareto::{Duel, FLOOR, Fault, fastest, front, least};
 use super::problems::problems;
+use super::row::Row;
 use super::solves::SolveRow;
 use crate::report::number::number;
 use crate::report::plot::Scale::Decades;

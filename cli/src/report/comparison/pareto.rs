@@ -1,6 +1,6 @@
 //! Fronts, comparisons and profiles of time and error over the rows of a run.
 
-use super::measure::Row;
+use super::row::Row;
 use drystone::Result;
 
 /// Smallest error (m), (m/s): the resolution of f32 poses some ten meters from the origin.

@@ -7,9 +7,10 @@ use serde::de::DeserializeOwned;
 
 use super::contender::{Extent, Setting, Team};
 use super::duels;
-use super::measure::{Row, blocks, measure};
+use super::measure::{blocks, measure};
 use super::origin::Origin;
 use super::page;
+use super::row::Row;
 use super::solves::{self, SolveRow, solves};
 use crate::files;
 use crate::report::scene_hash::content_hash;

@@ -2,42 +2,8 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
-
-use super::measure::{BLOCK, Lane, Row};
+use super::row::{BLOCK, Lane, Row, WindowRow};
 use drystone::stats::{largest, median};
-
-/// Times of one contender in one third of a run, and errors at its end. CSV has no nested fields, so that each row names its run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct WindowRow {
-    pub scene: String,
-    /// As in [`Row`].
-    pub hash: String,
-    pub run: String,
-    pub commit: String,
-    pub machine: String,
-    pub threads: usize,
-    pub bodies: usize,
-    pub engine: String,
-    pub setting: String,
-    pub clock: String,
-    /// The first and the last step of the third, counted from 1.
-    pub from: usize,
-    pub to: usize,
-    /// Time of a step, without the first of the run: median and largest (ms).
-    pub ms: f64,
-    pub ms_worst: f64,
-    /// Time of the first step of the run (ms).
-    pub ms_first: f64,
-    /// Time relative to the fastest contender of another engine, as the median over the blocks of the third; none without another engine.
-    pub to_best: Option<f64>,
-    /// Overlaps (m), speed (m/s), distance from the first positions (m) and bodies in place, as in [`Row`], at the end of the third.
-    pub penetration_max: f64,
-    pub penetration_mean: f64,
-    pub speed_rms: f64,
-    pub drift: f64,
-    pub in_place: Option<usize>,
-}
 
 /// The windows of each contender, in the order of `thirds`, which are ranges of blocks. A contender has those that it finished.
 pub(super) fn windows(rows: &[Row], lanes: &[Lane], thirds: &[Range<usize>]) -> Vec<Vec<WindowRow>> {
@@ -85,7 +51,8 @@ fn time_ratio(own: &Lane, other: &Lane, third: &Range<usize>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::measure::{Errors, measure};
+    use super::super::measure::measure;
+    use super::super::row::Errors;
     use super::super::{Contender, Drystone, Origin};
     use super::*;
     use crate::report::rounds::thirds;
