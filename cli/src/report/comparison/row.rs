@@ -16,7 +16,7 @@ pub struct Row {
     pub hash: String,
     /// Start of the run; only rows of one run have time ratios.
     pub run: String,
-    /// As in [`Origin`].
+    /// As in [`Origin`](super::Origin).
     pub build: String,
     pub commit: String,
     pub machine: String,
@@ -31,7 +31,7 @@ pub struct Row {
     pub method: String,
     pub friction: String,
     pub more: String,
-    /// `processor` or `wall` time, as in [`Clock`].
+    /// `processor` or `wall` time, as in [`Clock`](crate::report::rounds::Clock).
     pub clock: String,
     /// Time of a step: median and quartiles over the blocks (ms).
     pub ms: f64,
