@@ -59,18 +59,28 @@ pub struct StepPlan {
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
+    /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
+    isotropic: Vec<bool>,
 }
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
-        self.blocks == problem.blocks && self.colors == problem.colors
+        self.blocks == problem.blocks
+            && self.colors == problem.colors
+            && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone() }
+        let isotropic = isotropic(problem).collect();
+        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic }
     }
+}
+
+/// Whether the bodies of each block have equal moments of inertia.
+fn isotropic(problem: &StepProblem) -> impl Iterator<Item = bool> {
+    problem.blocks.iter().map(|block| problem.is_isotropic(problem.rows_of(&(block.bodies..block.bodies + 1))))
 }
 
 /// Substeps shorter than this (s) find changes of velocities since the step began. Sums of velocities have a squared error of 3e-6 m²/s² in
@@ -102,17 +112,17 @@ impl StepPlan {
         };
         let bounces = contacts.restitution;
         let mut plan = Self::default();
-        for block in 0..problem.blocks.len() as u32 {
+        for (block, isotropic) in (0..).zip(isotropic(problem)) {
             let own = &problem.blocks[block as usize];
             let [contact_colors, _, bodies, ..] = own.colors();
             let from_start = own.substep.length < LONGEST_FROM_START && !problem.rows_of(&bodies).is_empty();
-            let rules = Rules { from_start, isotropic: problem.is_isotropic(problem.rows_of(&bodies)), ..rules };
+            let rules = Rules { from_start, isotropic, ..rules };
             if from_start {
                 plan.over_colors(Kernel::BeginChanges, block, std::slice::from_ref(&bodies));
             }
             plan.substeps(config, problem, block, rules);
             if bounces {
-                let rules = Rules { patch: rules.patch, from_start, isotropic: rules.isotropic, ..Rules::default() };
+                let rules = Rules { patch: rules.patch, from_start, isotropic, ..Rules::default() };
                 let groups = color_groups(&problem.colors, contact_colors, config.fuse_colors_below);
                 plan.over_colors(Kernel::ApplyRestitution(rules), block, &groups);
             }
