@@ -4,7 +4,7 @@
 //! One step is a straight line, [`Simulation::step`]:
 //!
 //! ```text
-//! detect   parry: tree over boxes -> persistent manifolds, at most 4 points   world  -> manifolds   collide
+//! detect   tree over boxes -> persistent manifolds by parry, at most 4 points  world  -> manifolds   collide
 //! color    greedy, deterministic; only bodies that can move count             slots  -> order       graph
 //! prepare  arms, masses, separations; impulses stay in their rows             ...    -> StepProblem problem
 //! plan     substeps x (velocities, warm start, sweep, positions, relax)       config -> StepPlan    plan

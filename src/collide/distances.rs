@@ -8,25 +8,7 @@ use parry3d::shape::{SharedShape, SupportMap, Triangle};
 use super::facet::{half_space_contact, triangle_contact};
 use super::query::convex_contact;
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold, Solid};
-use crate::random::mixed;
-
-struct Random(u64);
-
-impl Random {
-    /// From -1 to 1.
-    fn next(&mut self) -> f32 {
-        self.0 += 1;
-        (mixed(self.0) >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-
-    fn rotation(&mut self) -> Quat {
-        Quat::from_xyzw(self.next(), self.next(), self.next(), self.next()).normalize()
-    }
-}
+use super::testing::Random;
 
 /// Shapes of about 0.1 m with flat faces, edges, rims and tips.
 fn solids() -> Vec<(&'static str, SharedShape)> {

@@ -1,8 +1,9 @@
 //! Collision detection: a tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
 //!
 //! The tree holds fattened boxes, and only a collider that left its fattened box gets another. Two colliders are a pair while their
-//! fattened boxes overlap; the pairs of a step begin in the order of their colliders, so that every later stage is deterministic for any number of threads. Each of several worlds
-//! beside each other has its own tree and pairs, so that the pairs of a world do not depend on the other worlds.
+//! fattened boxes overlap. The pairs of a step begin in the order of their colliders, so that every later stage is deterministic for any
+//! number of threads. Each of several worlds beside each other has its own tree and pairs, so that the pairs of a world do not depend on
+//! the other worlds.
 
 mod collider;
 mod cuboids;
@@ -19,6 +20,8 @@ mod query;
 mod report;
 mod reuse;
 mod solid;
+#[cfg(test)]
+mod testing;
 mod tree;
 mod world_contacts;
 

@@ -128,28 +128,16 @@ fn turn_since<L: Lanes>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Quat, Vec3};
+    use glam::Quat;
 
     use super::*;
     use crate::collide::pairs::{NEVER, Placed};
+    use crate::collide::testing::Random;
     use crate::lanes::InstructionSet;
-    use crate::random::mixed;
-
-    struct Random(u64);
 
     impl Random {
-        /// From -1 to 1.
-        fn next(&mut self) -> f32 {
-            self.0 += 1;
-            (mixed(self.0) >> 40) as f32 / (1 << 23) as f32 - 1.0
-        }
-
-        fn vector(&mut self) -> Vec3 {
-            Vec3::new(self.next(), self.next(), self.next())
-        }
-
         fn body(&mut self) -> BodyState {
-            let rotation = Quat::from_xyzw(self.next(), self.next(), self.next(), self.next()).normalize();
+            let rotation = self.rotation();
             let at = 3.0 * self.vector();
             let [v, w] = [self.vector(), self.vector() * 10.0_f32.powf(3.0 * self.next())];
             let activity = (1.49 * (self.next() + 1.0)) as u32 as f32;

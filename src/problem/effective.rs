@@ -3,7 +3,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::arithmetic::{self as prepare, inverse_or_zero, tangent_mass, twist_mass};
+use super::arithmetic::{self, inverse_or_zero, tangent_mass, twist_mass};
 use super::arithmetic::{Mass, Sym3};
 use super::rows::{ContactRow, MassRow};
 use crate::math;
@@ -73,12 +73,12 @@ impl EffectiveMass<'_> {
         let n = Vec3::from_array(self.row.normal);
         let (t_1, t_2) = self.row.tangents();
         let [parted, pressed_1, pressed_2] = [n, t_1, t_2].map(|d| self.entry(r_a, r_b, n, d));
-        prepare::jamming(self.row.friction, parted, pressed_1, pressed_2)
+        arithmetic::jamming(self.row.friction, parted, pressed_1, pressed_2)
     }
 
     /// The entry of the directions `d` and `e` at arms `r_a`, `r_b`.
     pub fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
         let [r_a, r_b, d, e] = [r_a, r_b, d, e].map(|v| math::Vec3::load(v.to_array()));
-        prepare::entry(&self.inverse[0].lane(), &self.inverse[1].lane(), r_a, r_b, d, e)
+        arithmetic::entry(&self.inverse[0].lane(), &self.inverse[1].lane(), r_a, r_b, d, e)
     }
 }

@@ -91,8 +91,7 @@ impl<C: Constraint> Load<'_, C> {
             }
             return;
         }
-        let last = impulses.len() - 2;
-        for k in (0..=last + 1).step_by(2).map(|k| k.min(last)) {
+        for k in pairs_of(impulses.len()) {
             let pairs: [&[f32]; WIDTH] = lanes!(lane => all[firsts[lane] + k..firsts[lane] + k + 2].as_flattened());
             let both = first_eight::<L>(&pairs);
             impulses[k].copy_from_slice(&both[..4]);
@@ -140,8 +139,7 @@ impl<C: Constraint> Work for Store<'_, C> {
                 continue;
             }
             let firsts: [usize; WIDTH] = lanes!(lane => first(group.rows[lane]));
-            let last = impulses.len() - 2;
-            for k in (0..=last + 1).step_by(2).map(|k| k.min(last)) {
+            for k in pairs_of(impulses.len()) {
                 let [[a, b, c, d], [e, f, g, h]] = [&impulses[k], &impulses[k + 1]];
                 let pairs = L::scattered([
                     L::load(a),
@@ -164,6 +162,12 @@ impl<C: Constraint> Work for Store<'_, C> {
             }
         }
     }
+}
+
+/// The first of two neighboring impulses, so that all of `count`, two or more, occur; the last two may overlap those before.
+#[inline(always)]
+fn pairs_of(count: usize) -> impl Iterator<Item = usize> {
+    (0..count).step_by(2).map(move |k| k.min(count - 2))
 }
 
 /// The first eight numbers of sixteen rows, number by number.

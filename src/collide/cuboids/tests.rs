@@ -7,25 +7,9 @@ use parry3d::query::details::contact_manifold_cuboid_cuboid;
 use parry3d::shape::Cuboid;
 
 use super::*;
-use crate::random::mixed;
-
-struct Random(u64);
+use crate::collide::testing::Random;
 
 impl Random {
-    /// From -1 to 1.
-    fn next(&mut self) -> f32 {
-        self.0 += 1;
-        (mixed(self.0) >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-
-    fn rotation(&mut self) -> Quat {
-        Quat::from_xyzw(self.next(), self.next(), self.next(), self.next()).normalize()
-    }
-
     /// One of a few angles, and a tiny one.
     fn nearly_right(&mut self) -> Quat {
         let quarter = |x: f32| (3.0 * x) as i32 as f32 * std::f32::consts::FRAC_PI_2;
@@ -35,7 +19,7 @@ impl Random {
         (Quat::from_scaled_axis(tiny) * turned).normalize()
     }
 
-    fn body(&mut self, position: Vec3, rotation: Quat) -> BodyState {
+    fn body_at(&mut self, position: Vec3, rotation: Quat) -> BodyState {
         BodyState { position, rotation, ..BodyState::default() }
     }
 }
@@ -62,7 +46,7 @@ fn two(random: &mut Random, nearly_parallel: bool) -> ([BodyState; 2], [CuboidPl
         between = (between * 8.0).round() * 0.125;
     }
     let at = 5.0 * random.vector();
-    let bodies = [random.body(at, base), random.body(at + base * between, (base * rotation).normalize())];
+    let bodies = [random.body_at(at, base), random.body_at(at + base * between, (base * rotation).normalize())];
     let local =
         if random.next() > 0.8 { (0.1 * random.vector(), random.rotation()) } else { (Vec3::ZERO, Quat::IDENTITY) };
     let places = [CuboidPlace::new(half[0], local.0, local.1), CuboidPlace::new(half[1], Vec3::ZERO, Quat::IDENTITY)];
