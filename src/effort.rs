@@ -142,6 +142,24 @@ impl Effort {
         changed
     }
 
+    /// Takes over bodies that came, went, or changed kind or shape.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        if self.classes.is_empty() {
+            return;
+        }
+        let bodies = world.bodies.len();
+        self.restless.retain(|&body| changed.binary_search(&(body as usize)).is_err());
+        self.classes.resize(bodies, 0);
+        self.calm_for.resize(bodies, 0);
+        self.heaps.resize(bodies, false);
+        self.heaps_before.resize(bodies, false);
+        for &i in changed.iter().filter(|&&i| i < bodies) {
+            (self.classes[i], self.calm_for[i]) = (0, 0);
+            (self.heaps[i], self.heaps_before[i]) = (false, false);
+        }
+        self.movable = world.dynamic_count() as u32;
+    }
+
     /// Notes bodies that begin on others, unbalanced by any forces.
     pub fn note_restless(&mut self, bodies: Vec<u32>) {
         self.restless.extend(bodies);

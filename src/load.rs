@@ -189,17 +189,19 @@ fn aabb(low: DVec3, high: DVec3) -> Aabb {
 /// The boxes of all bodies that have shapes, to be asked for those under a body of the same world.
 struct Ground<'a> {
     boxes: &'a [Box3],
-    /// The end of the bodies of each world, and a tree over their boxes.
-    trees: Vec<(usize, Bvh)>,
+    /// The world of each body, and a tree over the boxes of each world.
+    worlds: &'a [u32],
+    trees: Vec<Bvh>,
 }
 
 impl<'a> Ground<'a> {
-    fn new(boxes: &'a [Box3], world: &World) -> Self {
-        let tree = |own: std::ops::Range<usize>| {
-            let leaves = own.clone().filter(|&i| !boxes[i].is_empty()).map(|i| (i, aabb(boxes[i].low, boxes[i].high)));
-            (own.end, Bvh::from_iter(BvhBuildStrategy::Binned, leaves))
+    fn new(boxes: &'a [Box3], world: &'a World) -> Self {
+        let tree = |own: &Vec<usize>| {
+            let has_box = own.iter().copied().filter(|&i| !boxes[i].is_empty());
+            let leaves = has_box.map(|i| (i, aabb(boxes[i].low, boxes[i].high)));
+            Bvh::from_iter(BvhBuildStrategy::Binned, leaves)
         };
-        Self { boxes, trees: world.worlds().map(tree).collect() }
+        Self { boxes, worlds: world.bodies.worlds(), trees: world.worlds().iter().map(tree).collect() }
     }
 
     /// The bodies that bear `upper`, with the areas by which they overlap it from above.
@@ -233,7 +235,7 @@ impl<'a> Ground<'a> {
         };
         let column = aabb(above.low.with_y(floor), above.high.with_y(middle));
         let lower = |i: &usize| *i != upper && self.boxes[*i].high.y < middle;
-        let (_, tree) = &self.trees[self.trees.partition_point(|tree| tree.0 <= upper)];
+        let tree = &self.trees[self.worlds[upper] as usize];
         let near = tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
         let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
         below.sort_unstable_by_key(|s| s.0);

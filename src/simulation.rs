@@ -34,8 +34,9 @@ pub use manifolds::{SolvedManifold, SolvedPoint};
 /// ```
 pub struct Simulation {
     /// The bodies, with their moments of inertia raised where they are too small ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)).
-    /// Between steps may change: gravity; poses, velocities, forces, masses and materials of bodies; joints, which are
-    /// told apart by their bodies and anchors. Number, kinds and shapes of bodies may not: the next step then is an error.
+    /// Between steps, all of it may change: bodies and joints may come and go, and gravity, poses, velocities, forces, masses, materials, kinds and
+    /// shapes may become others. The next step finds the changes. Contacts of bodies that stay keep their impulses, but for those of a
+    /// body that changed its kind or shapes.
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
@@ -60,8 +61,8 @@ impl Simulation {
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
     ///
     /// # Errors
-    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); bodies came, went, or changed kind or shape; a joint or a mass is not
-    /// fit to be simulated; the backend cannot run the step. The world is then as it was.
+    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); a body that came or changed, a
+    /// joint or a mass is not fit to be simulated; the backend cannot run the step. The world is then as it was.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
         if self.begin_step(dt, &mut stats)? {
@@ -116,7 +117,7 @@ impl Simulation {
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.leave_device();
         }
-        self.stages.follow(&self.world, &self.config, dt, changes);
+        self.stages.follow(&self.world, &self.config, dt, &changes);
         if self.stages.is_everything_still(&self.world, stats) {
             return Ok(false);
         }
@@ -160,7 +161,7 @@ impl Simulation {
         self.fetch();
         let changes = self.changes(dt)?;
         let mut next = self.stages.clone();
-        next.follow(&self.world, &self.config, dt, changes);
+        next.follow(&self.world, &self.config, dt, &changes);
         next.is_everything_still(&self.world, &mut StepStats::default());
         next.find(&self.world, &self.config, dt, &mut StepStats::default());
         next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());

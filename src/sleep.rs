@@ -68,8 +68,6 @@ impl Sleep {
         if config.sleep_after == 0.0 {
             return Self::default();
         }
-        let reach =
-            |b: &Body| b.colliders.iter().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max);
         let bodies = world.bodies.len();
         Self {
             after: config.sleep_after,
@@ -78,7 +76,7 @@ impl Sleep {
             asleep: vec![false; bodies],
             activity: vec![Activity::Awake; bodies],
             slow_for: vec![0.0; bodies],
-            reach: world.bodies.iter().map(reach).collect(),
+            reach: world.bodies.iter().map(Body::reach).collect(),
             left: world.bodies.iter().map(Snapshot::of).collect(),
             islands: Islands::default(),
             next: (0..bodies as u32).collect(),
@@ -98,6 +96,29 @@ impl Sleep {
         (self.after, self.speed) = (sleep_after, sleep_speed);
         if (SolverConfig { sleep_after, sleep_speed, ..before.clone() }) != *now {
             (0..self.asleep.len()).for_each(|body| self.wake(body));
+        }
+    }
+
+    /// Takes over bodies that came, went, or changed kind or shape. They are awake, and wake what touches them.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        if self.after == 0.0 {
+            return;
+        }
+        let (before, bodies) = (self.asleep.len(), world.bodies.len());
+        changed.iter().filter(|&&i| i < before).for_each(|&i| self.wake(i));
+        self.asleep.resize(bodies, false);
+        self.activity.resize(bodies, Activity::Awake);
+        self.slow_for.resize(bodies, 0.0);
+        self.reach.resize(bodies, 0.0);
+        self.next.truncate(bodies);
+        self.next.extend(self.next.len() as u32..bodies as u32);
+        let new = world.bodies[before.min(bodies)..].iter();
+        self.left.truncate(bodies);
+        self.left.extend(new.map(Snapshot::of));
+        for &i in changed.iter().filter(|&&i| i < bodies) {
+            self.slow_for[i] = 0.0;
+            self.reach[i] = world.bodies[i].reach();
+            self.disturb(i);
         }
     }
 

@@ -348,7 +348,7 @@ fn every_shape_comes_to_rest_on_a_half_space(open: Open) {
     }
     let rested = run(world, backend, 5.0, 60);
     for body in &rested.bodies[1..] {
-        let speed = rms_speed(&World { bodies: vec![body.clone()], ..World::new() });
+        let speed = rms_speed(&World { bodies: [body.clone()].into_iter().collect(), ..World::new() });
         below(&format!("{name}, {} [m/s]", body.name), speed, 1e-3);
         assert!((0.2..0.6).contains(&body.position.y), "{name}: {} is at {}", body.name, body.position);
     }

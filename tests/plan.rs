@@ -120,7 +120,7 @@ fn only_round_surfaces_are_solved_as_round() {
 #[test]
 fn a_world_that_touches_nothing_is_only_integrated() {
     let mut world = row(&cube(), 0.5, 0.5);
-    world.bodies.remove(0);
+    world.remove(world.bodies.handle(0).expect("the ground"));
     let (plan, ..) = planned(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 2));
     assert_eq!(
         plan.to_string(),

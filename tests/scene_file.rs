@@ -46,7 +46,7 @@ fn refused_shape(shape: Value) -> String {
 }
 
 fn one_body(body: Value) -> drystone::Body {
-    read(&with_body(&body)).expect("a good scene").world.bodies.remove(0)
+    read(&with_body(&body)).expect("a good scene").world.bodies[0].clone()
 }
 
 fn every_shape() -> Vec<Value> {

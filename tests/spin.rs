@@ -188,7 +188,7 @@ fn assert_turns_as_the_reference(open: Open) {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
         for (_, inertia) in INERTIAS {
             for speed in SPEEDS {
-                world.bodies.extend(spinning(inertia, speed).bodies);
+                world.add(spinning(inertia, speed).bodies[0].clone());
             }
         }
         let mut simulation = simulate(world, open);

@@ -82,8 +82,13 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": shapes[0]: half-spaces", |w| {
             w.add(Body::kinematic().shape(Shape::half_space(Vec3::Y)));
         }),
-        ("joint 0: names", |w| w.joints.push(BallJoint::new(1, Vec3::ZERO, 7, Vec3::ZERO))),
-        ("joint 0: ties", |w| w.joints.push(BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO))),
+        ("joint 0: names", |w| {
+            w.join(BallJoint::new(1, Vec3::ZERO, 0, Vec3::ZERO));
+            w.joints[0].body_b = Some(7);
+        }),
+        ("joint 0: ties", |w| {
+            w.join(BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
+        }),
     ];
     for (start, change) in cases {
         let line = refusal(change).unwrap_or_else(|| panic!("{start}: was taken"));

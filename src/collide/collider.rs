@@ -35,7 +35,33 @@ pub(super) struct ColliderInfo {
     pub unbounded: bool,
 }
 
+/// The body of a collider that is gone.
+const NO_BODY: u32 = u32::MAX;
+
 impl ColliderInfo {
+    /// The collider of a body.
+    pub fn new(body: u32, c: &Collider) -> Self {
+        Self {
+            body,
+            shape: c.shape.0.clone(),
+            local: Pose::from_parts(c.position, c.rotation),
+            cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
+            size: c.shape.smallest_half_extent(),
+            reach: c.position.length() + c.shape.bounding_radius(),
+            unbounded: c.shape.is_half_space(),
+        }
+    }
+
+    /// Marks a collider that is gone.
+    pub fn leave(&mut self) {
+        self.body = NO_BODY;
+    }
+
+    /// Whether the collider is gone.
+    pub fn is_gone(&self) -> bool {
+        self.body == NO_BODY
+    }
+
     /// The box around it when its body is at `pose`. That of a cuboid needs nothing from elsewhere in memory.
     pub fn aabb(&self, pose: Pose) -> Aabb {
         let pose = pose * self.local;

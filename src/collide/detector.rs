@@ -1,35 +1,38 @@
 //! The contacts of all worlds, kept from step to step.
 
 use std::collections::HashSet;
-use std::ops::Range;
 
-use parry3d::math::Pose;
 use rayon::prelude::*;
 
 use super::collider::Activity;
-use super::collider::{BodyState, ColliderInfo, Margins};
+use super::collider::{BodyState, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::report::{Change, DetectStats};
-use super::world_contacts::{DetectionInput, WorldContacts, key};
+use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
-use crate::error::{Result, input};
-use crate::world::{Body, BodyKind, Collider, World};
+use crate::world::{Body, BodyKind, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
 #[derive(Clone)]
 pub struct Detector {
     worlds: Vec<WorldContacts>,
+    /// The bodies that it knows, by their indices.
+    known: Vec<KnownBody>,
     kinds: Vec<BodyKind>,
     moving: Vec<BodyState>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
-    /// First body of each world but the first.
-    begins: Vec<usize>,
 }
 
-/// The advice for bodies that came, went or changed.
-const ANEW: &str = "bodies cannot come, go or change kind or shape yet; make a new simulation of this world";
+/// A body as the detector knows it.
+#[derive(Clone, Copy, Default)]
+struct KnownBody {
+    generation: u32,
+    world: u32,
+    /// Its colliders, among those of its world.
+    colliders: ColliderRange,
+}
 
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
@@ -38,70 +41,56 @@ fn jointed(world: &World) -> HashSet<(u32, u32)> {
 }
 
 impl Detector {
-    /// A detector for the bodies of `world`, whose number, shapes and kinds stay as they are.
+    /// A detector for the bodies of `world` as they are now.
     pub fn new(world: &World) -> Self {
-        let collider = |(body, c): (usize, &Collider)| {
-            let bounding = c.shape.bounding_radius();
-            ColliderInfo {
-                body: body as u32,
-                shape: c.shape.0.clone(),
-                local: Pose::from_parts(c.position, c.rotation),
-                cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
-                size: c.shape.smallest_half_extent(),
-                reach: c.position.length() + bounding,
-                unbounded: c.shape.0.as_halfspace().is_some(),
-            }
-        };
-        let contacts = |bodies: Range<usize>| {
-            let on_body = |i: usize| world.bodies[i].colliders.iter().map(move |c| (i, c));
-            WorldContacts::new(bodies.flat_map(on_body).map(collider).collect())
-        };
-        Self {
-            worlds: world.worlds().map(contacts).collect(),
-            kinds: world.bodies.iter().map(|b| b.kind).collect(),
+        let mut detector = Self {
+            worlds: Vec::new(),
+            known: Vec::new(),
+            kinds: Vec::new(),
             moving: Vec::new(),
             jointed: jointed(world),
-            begins: world.begins.clone(),
-        }
+        };
+        detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
+        detector
     }
 
-    /// Refuses a world whose bodies are not those that this detector was made for.
-    ///
-    /// # Errors
-    /// One line that names the first body that came, went, or changed kind or shape.
-    pub fn check_bodies(&self, world: &World) -> Result<()> {
-        let (had, has) = (self.kinds.len(), world.bodies.len());
-        if had != has || world.begins != self.begins {
-            return Err(input!(
-                "there are {has} bodies in {} worlds, and there were {had} in {} when its simulation began: {ANEW}",
-                world.begins.len() + 1,
-                self.begins.len() + 1
-            ));
-        }
-        let begin = |k: usize| if k == 0 { 0 } else { self.begins[k - 1] };
-        let end = |k: usize| self.begins.get(k).copied().unwrap_or(has);
-        let worlds = self.worlds.par_iter().enumerate();
-        let changed = worlds.find_map_first(|(k, part)| self.first_changed(world, part, begin(k)..end(k)));
-        let Some(i) = changed else { return Ok(()) };
-        let name = &world.bodies[i].name;
-        Err(input!("body {i} {name:?} changed its kind or shapes: {ANEW}"))
+    /// The bodies that came, went, or changed kind or shape since the last call of [`Self::follow_bodies`], ascending.
+    pub fn changed_bodies(&self, world: &World) -> Vec<usize> {
+        let (generations, worlds) = (world.bodies.generations(), world.bodies.worlds());
+        let is_other = |i: usize| {
+            let (Some(known), Some(body)) = (self.known.get(i), world.bodies.get(i)) else { return true };
+            let same_place = known.generation == generations[i] && known.world == worlds[i];
+            !same_place || self.kinds[i] != body.kind || !self.has_shapes_of(i, *known, body)
+        };
+        let all = (0..world.bodies.len().max(self.known.len())).into_par_iter().with_min_len(1024);
+        // Most steps change none, and then nothing is allocated.
+        if all.clone().any(is_other) { all.filter(|&i| is_other(i)).collect() } else { Vec::new() }
     }
 
-    /// The first body of a part of the world that changed its kind or shapes.
-    fn first_changed(&self, world: &World, part: &WorldContacts, bodies: Range<usize>) -> Option<usize> {
-        const CHUNK: usize = 512;
-        let chunks = world.bodies[bodies.clone()].par_chunks(CHUNK).zip(self.kinds[bodies.clone()].par_chunks(CHUNK));
-        chunks.enumerate().find_map_first(|(chunk, (all, kinds))| {
-            let first = bodies.start + CHUNK * chunk;
-            let from = part.colliders().partition_point(|known| (known.body as usize) < first);
-            let mut colliders = part.colliders()[from..].iter().peekable();
-            let changed = |(i, (body, kind)): (usize, (&Body, &BodyKind))| {
-                let same = |c: &Collider| colliders.next().is_some_and(|known| known.is(i, c));
-                let all = body.kind == *kind && body.colliders.iter().all(same);
-                (!all || colliders.peek().is_some_and(|next| next.body as usize == i)).then_some(i)
-            };
-            (first..).zip(all.iter().zip(kinds)).find_map(changed)
-        })
+    fn has_shapes_of(&self, i: usize, known: KnownBody, body: &Body) -> bool {
+        let colliders = self.worlds[known.world as usize].colliders(known.colliders);
+        colliders.len() == body.colliders.len() && colliders.iter().zip(&body.colliders).all(|(c, now)| c.is(i, now))
+    }
+
+    /// Takes over the bodies that [`Self::changed_bodies`] found. The contacts of such a body end.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        let count = world.bodies.len().max(self.known.len());
+        self.known.resize(count, KnownBody::default());
+        self.kinds.resize(count, BodyKind::Fixed);
+        self.worlds.resize(self.worlds.len().max(world.world_count()), WorldContacts::default());
+        // All leave before any comes, so that the order of indices does not decide which places are free.
+        for &i in changed {
+            let KnownBody { world, colliders, .. } = self.known[i];
+            self.worlds[world as usize].remove(colliders);
+        }
+        for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
+            let (body, part) = (&world.bodies[i], world.bodies.worlds()[i]);
+            let colliders = self.worlds[part as usize].insert(i as u32, &body.colliders);
+            self.known[i] = KnownBody { generation: world.bodies.generations()[i], world: part, colliders };
+            self.kinds[i] = body.kind;
+        }
+        self.known.truncate(world.bodies.len());
+        self.kinds.truncate(world.bodies.len());
     }
 
     /// Takes over which bodies joints keep from colliding.

@@ -81,7 +81,7 @@ impl Node {
     fn stretch(&self) -> f32 {
         let sides = |axis: usize| (self.maxs[axis] - self.mins[axis]).max(Vec4::ZERO);
         let boxes = (sides(0) + sides(1) + sides(2)).element_sum();
-        (length(&self.around()) / boxes).min(MOST_STRETCH)
+        if boxes == 0.0 { 1.0 } else { (length(&self.around()) / boxes).min(MOST_STRETCH) }
     }
 }
 
@@ -90,12 +90,11 @@ fn length(aabb: &Aabb) -> f32 {
 }
 
 impl Tree {
-    /// Takes over the boxes, of which some changed from what they were `before`.
+    /// Takes over the boxes, of which some changed from what they were `before`. New boxes stand behind the others.
     pub fn follow(&mut self, boxes: &[Aabb], before: &[Aabb], changed: &[bool]) {
-        let is_new = self.order.len() != boxes.len();
-        if is_new {
-            self.order = (0..boxes.len() as u32).collect();
-        } else {
+        let is_new = self.order.is_empty();
+        self.order.extend(self.order.len() as u32..boxes.len() as u32);
+        if !is_new {
             self.fit(boxes, changed);
         }
         if is_new || self.stretch() > STRETCH * self.arranged {

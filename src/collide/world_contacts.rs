@@ -1,6 +1,6 @@
 //! The colliders of one world: which of them are near each other, and what they touch with.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
@@ -13,7 +13,7 @@ use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
-use crate::world::BodyKind;
+use crate::world::{BodyKind, Collider};
 
 /// The input of one detection, for all worlds; body indices count over all worlds.
 pub(super) struct DetectionInput<'a> {
@@ -25,10 +25,27 @@ pub(super) struct DetectionInput<'a> {
     pub jointed: &'a HashSet<(u32, u32)>,
 }
 
+/// The colliders of one body, which stand side by side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct ColliderRange {
+    pub first: u32,
+    pub count: u32,
+}
+
+impl ColliderRange {
+    fn places(self) -> std::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
 /// The colliders of one world, which meet no others.
 #[derive(Clone, Default)]
 pub(super) struct WorldContacts {
     colliders: Vec<ColliderInfo>,
+    /// Those that left since the last detection; their pairs have not ended yet.
+    leaving: Vec<ColliderRange>,
+    /// The first of as many places side by side as a number says, without colliders; the last is taken first.
+    vacant: BTreeMap<u32, Vec<u32>>,
     /// The same, of those that are cuboids.
     cuboids: Vec<CuboidPlace>,
     /// Fattened box of each collider.
@@ -71,17 +88,45 @@ struct Plane {
 const FAT: f32 = 0.1;
 
 impl WorldContacts {
-    pub fn new(colliders: Vec<ColliderInfo>) -> Self {
-        let unbounded = (0..colliders.len() as u32).filter(|&c| colliders[c as usize].unbounded);
-        let planes = unbounded.map(|collider| Plane { collider, then: None }).collect();
-        let cuboids = colliders.iter().map(CuboidPlace::of).collect();
-        let (fat, moved) = (vec![NOWHERE; colliders.len()], vec![false; colliders.len()]);
-        Self { colliders, cuboids, planes, before: fat.clone(), fat, moved, ..Self::default() }
+    /// Adds the colliders of a body.
+    pub fn insert(&mut self, body: u32, colliders: &[Collider]) -> ColliderRange {
+        let count = colliders.len() as u32;
+        if count == 0 {
+            return ColliderRange::default();
+        }
+        let vacant = self.vacant.get_mut(&count).and_then(Vec::pop);
+        let range = ColliderRange { first: vacant.unwrap_or(self.colliders.len() as u32), count };
+        for (place, collider) in range.places().zip(colliders) {
+            let info = ColliderInfo::new(body, collider);
+            if info.unbounded {
+                self.planes.push(Plane { collider: place as u32, then: None });
+            }
+            let cuboid = CuboidPlace::of(&info);
+            if place < self.colliders.len() {
+                (self.colliders[place], self.cuboids[place]) = (info, cuboid);
+            } else {
+                self.colliders.push(info);
+                self.cuboids.push(cuboid);
+                self.fat.push(NOWHERE);
+                self.before.push(NOWHERE);
+                self.moved.push(false);
+            }
+        }
+        range
     }
 
-    /// The colliders, in the order of the bodies.
-    pub fn colliders(&self) -> &[ColliderInfo] {
-        &self.colliders
+    /// Takes the colliders of a body out. Their pairs end with the next detection, and their places are free then.
+    pub fn remove(&mut self, range: ColliderRange) {
+        if range.count > 0 {
+            self.colliders[range.places()].iter_mut().for_each(ColliderInfo::leave);
+            self.planes.retain(|plane| !range.places().contains(&(plane.collider as usize)));
+            self.leaving.push(range);
+        }
+    }
+
+    /// The colliders of a body.
+    pub fn colliders(&self, range: ColliderRange) -> &[ColliderInfo] {
+        &self.colliders[range.places()]
     }
 
     /// Looks for all pairs in the next detection, because other bodies are jointed.
@@ -124,6 +169,9 @@ impl WorldContacts {
         }
         let parted = self.drop_parted(input, look_again);
         self.add_found();
+        for range in self.leaving.drain(..) {
+            self.vacant.entry(range.count).or_default().push(range.first);
+        }
         parted
     }
 
@@ -131,6 +179,9 @@ impl WorldContacts {
     fn fatten(&mut self, input: &DetectionInput) -> bool {
         let fatten = |((c, fat), (moved, before)): ((&ColliderInfo, &mut Aabb), (&mut bool, &mut Aabb))| {
             *moved = false;
+            if c.is_gone() {
+                return false;
+            }
             let still = input.activity.get(c.body as usize) == Some(&Activity::Still);
             let stays = still || input.kinds[c.body as usize] == BodyKind::Fixed;
             if c.unbounded || stays && *fat != NOWHERE {
@@ -152,7 +203,11 @@ impl WorldContacts {
             self.moved[plane.collider as usize] = moved;
             any |= moved;
         }
-        any
+        for place in self.leaving.iter().flat_map(|range| range.places()) {
+            self.moved[place] = true;
+            self.before[place] = std::mem::replace(&mut self.fat[place], NOWHERE);
+        }
+        any | !self.leaving.is_empty()
     }
 
     /// Finds the pairs whose boxes overlap, and did not before: those that both overlapped have a pair. In the order of the bodies in
@@ -188,6 +243,9 @@ impl WorldContacts {
     /// Whether the fattened boxes of two colliders overlap.
     fn touches(&self, input: &DetectionInput, a: u32, b: u32) -> bool {
         let (ca, cb) = (&self.colliders[a as usize], &self.colliders[b as usize]);
+        if ca.is_gone() || cb.is_gone() {
+            return false;
+        }
         match (ca.unbounded, cb.unbounded) {
             (false, false) => self.fat[a as usize].intersects(&self.fat[b as usize]),
             (true, true) => false,

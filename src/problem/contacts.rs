@@ -78,6 +78,17 @@ impl ContactRows {
         self.materials = None;
     }
 
+    /// Takes over bodies that came, went, or changed kind or shape.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        if self.materials.is_some() {
+            self.materials = Some(Materials::of(world));
+        }
+        if !self.classes.is_empty() {
+            self.classes.resize(world.bodies.len(), 0);
+            changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.classes[i] = 0);
+        }
+    }
+
     /// Gives every manifold that takes part a color; one that has a color keeps it.
     pub fn color(&mut self, world: &World, max_colors: u32) {
         let members: Vec<u32> = self.slots.taking_part().collect();

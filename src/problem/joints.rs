@@ -1,6 +1,6 @@
 //! The rows of joints: one for each joint of the world, in its order. An impulse stays in its row.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
 
 use glam::Vec3;
@@ -12,12 +12,13 @@ use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{BallJoint, BodyKind, World};
+use crate::world::{BallJoint, BodyKind, JointHandle, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Clone, Debug, Default)]
 pub struct JointRows {
     joints: Vec<BallJoint>,
+    handles: Vec<JointHandle>,
     /// The joints as edges of their graph.
     edges: Vec<Edge>,
     graph: ConstraintGraph,
@@ -49,9 +50,9 @@ const SWING: f32 = 8.0;
 const SWEPT: u32 = u32::MAX;
 
 impl JointRows {
-    /// The joints that have rows.
-    pub fn joints(&self) -> &[BallJoint] {
-        &self.joints
+    /// Whether the rows are those of the joints of the world.
+    pub fn are_of(&self, world: &World) -> bool {
+        self.joints == *world.joints && self.handles == world.joints.handles()
     }
 
     /// Lets all joints choose their colors anew.
@@ -138,11 +139,17 @@ impl JointRows {
 
     /// Takes over the joints of the world; returns those that began, ended or changed.
     ///
-    /// A joint keeps impulse and color wherever it stands in the list: it is the one with the same bodies and anchors, else one
-    /// with the same bodies, whose anchors moved.
+    /// A joint keeps impulse and color wherever it stands in the list, and if its anchors move, but not if it ties other bodies.
     pub fn follow(&mut self, world: &World, problem: &mut StepProblem) -> Vec<BallJoint> {
         let (before, now) = (std::mem::take(&mut self.joints), &world.joints);
-        let from = matched(&before, now);
+        let place_of: HashMap<JointHandle, usize> = self.handles.drain(..).zip(0..).collect();
+        self.handles.extend_from_slice(now.handles());
+        let same_bodies =
+            |joint: &BallJoint, i: usize| (before[i].body_a, before[i].body_b) == (joint.body_a, joint.body_b);
+        let from = |(joint, handle): (&BallJoint, &JointHandle)| {
+            place_of.get(handle).copied().filter(|&i| same_bodies(joint, i))
+        };
+        let from: Vec<Option<usize>> = now.iter().zip(now.handles()).map(from).collect();
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
         let edge = |(joint, from): (&BallJoint, &Option<usize>)| Edge {
             a: movable(joint.body_a),
@@ -163,7 +170,7 @@ impl JointRows {
         let changed = now.iter().zip(&from).filter(|(joint, from)| from.is_none_or(|i| before[i] != **joint));
         let ended = before.iter().zip(&ended).filter(|(_, ended)| **ended);
         let all = changed.map(|(joint, _)| *joint).chain(ended.map(|(joint, _)| *joint)).collect();
-        self.joints.clone_from(now);
+        self.joints.extend_from_slice(now);
         all
     }
 
@@ -250,52 +257,4 @@ pub(super) fn takes_part(world: &World, asleep: &[bool], joint: u32) -> bool {
     let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
     (moves(joint.body_a) || joint.body_b.is_some_and(moves))
         && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
-}
-
-/// Which of the joints before each joint is now.
-fn matched(before: &[BallJoint], now: &[BallJoint]) -> Vec<Option<usize>> {
-    let in_place = |i: usize| before.get(i).zip(now.get(i)).is_some_and(|(before, now)| before == now);
-    let mut from: Vec<Option<usize>> = (0..now.len()).map(|i| in_place(i).then_some(i)).collect();
-    let mut free: Vec<usize> = (0..before.len()).filter(|&i| !in_place(i)).collect();
-    for with_anchors in [true, false] {
-        let key = |joint: &BallJoint| {
-            let anchors = [joint.anchor_a, joint.anchor_b].map(|p| p.to_array().map(f32::to_bits));
-            (joint.body_a, joint.body_b, with_anchors.then_some(anchors))
-        };
-        let mut open: HashMap<_, VecDeque<usize>> = HashMap::new();
-        free.iter().for_each(|&i| open.entry(key(&before[i])).or_default().push_back(i));
-        for (joint, from) in now.iter().zip(&mut from).filter(|(_, from)| from.is_none()) {
-            *from = open.get_mut(&key(joint)).and_then(VecDeque::pop_front);
-        }
-        free = open.into_values().flatten().collect();
-        free.sort_unstable();
-    }
-    from
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn joint(body: usize, anchor: f32) -> BallJoint {
-        BallJoint::to_world(body, Vec3::X * anchor, Vec3::ZERO)
-    }
-
-    #[test]
-    fn a_joint_is_known_by_its_bodies_and_anchors_wherever_it_stands() {
-        let before = [joint(0, 0.0), joint(1, 0.0), joint(1, 1.0), joint(2, 0.0)];
-        let [a, b, c, d] = before;
-        assert_eq!(matched(&before, &before), [Some(0), Some(1), Some(2), Some(3)]);
-        assert_eq!(matched(&before, &[b, c, d]), [Some(1), Some(2), Some(3)]);
-        assert_eq!(matched(&before, &[d, c, b, a]), [Some(3), Some(2), Some(1), Some(0)]);
-        // One of two between the same bodies moved its anchor.
-        assert_eq!(matched(&before, &[a, joint(1, 2.0), c, d]), [Some(0), Some(1), Some(2), Some(3)]);
-        assert_eq!(matched(&before, &[joint(1, 2.0), b, c]), [None, Some(1), Some(2)]);
-        // Equal ones are taken in order, each once.
-        assert_eq!(matched(&[a, a], &[d, a, a, a]), [None, Some(1), Some(0), None]);
-        assert_eq!(matched(&[], &[a]), [None]);
-        // Of many whose anchors all moved, each is the one in its place.
-        let many = |from: f32| (0..40).map(|i| joint(1, from + i as f32)).collect::<Vec<_>>();
-        assert_eq!(matched(&many(0.0), &many(100.0)), (0..40).map(Some).collect::<Vec<_>>());
-    }
 }

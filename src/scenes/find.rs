@@ -28,7 +28,7 @@ impl Scene {
     ///
     /// ```
     /// let towers = drystone::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;
-    /// let bodies: Vec<_> = towers.world.worlds().map(|bodies| bodies.len()).collect();
+    /// let bodies: Vec<_> = towers.world.worlds().iter().map(Vec::len).collect();
     /// assert_eq!(bodies, [5, 6, 7]);
     /// # Ok::<(), drystone::Error>(())
     /// ```

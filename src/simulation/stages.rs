@@ -43,8 +43,10 @@ struct Key {
 }
 
 /// The changes of the caller since the last step that concern state between steps.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
+    /// Bodies that came, went, or changed kind or shape, ascending.
+    bodies: Vec<usize>,
     settings: bool,
     /// Masses or materials.
     surfaces: bool,
@@ -54,14 +56,14 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// Whether masses or materials changed.
-    pub fn surfaces(self) -> bool {
-        self.surfaces
+    /// Whether masses, materials or bodies changed.
+    pub fn surfaces(&self) -> bool {
+        self.surfaces || !self.bodies.is_empty()
     }
 
-    /// Whether all rows of contacts change with it, so that a device cannot go on from those that it has.
-    pub fn all_rows(self) -> bool {
-        self.settings || self.surfaces || self.step
+    /// Whether the number of bodies or all rows of contacts change with it, so that a device cannot go on from those that it has.
+    pub fn all_rows(&self) -> bool {
+        self.settings || self.step || self.surfaces()
     }
 }
 
@@ -87,11 +89,14 @@ impl Stages {
     /// The changes of the caller since the last step.
     ///
     /// # Errors
-    /// Bodies came, went, or changed kind or shape; a joint or a mass is not fit to be simulated.
+    /// A body, a joint or a mass is not fit to be simulated.
     pub fn changes(&self, world: &World, config: &SolverConfig, dt: f32) -> Result<Changes> {
-        self.detector.check_bodies(world)?;
-        let surfaces = world.bodies.iter().zip(&self.key.surfaces).any(|(b, known)| (b.mass, b.material) != *known);
-        let joints = self.joints.joints() != world.joints;
+        let bodies = self.detector.changed_bodies(world);
+        bodies.iter().try_for_each(|&i| world.check_body(i))?;
+        let is_new = |i: usize| bodies.binary_search(&i).is_ok();
+        let mut known = world.bodies.iter().zip(&self.key.surfaces).enumerate();
+        let surfaces = known.any(|(i, (b, known))| (b.mass, b.material) != *known && !is_new(i));
+        let joints = !self.joints.are_of(world) || !bodies.is_empty() && !world.joints.is_empty();
         world.check_gravity()?;
         if surfaces {
             world.check_surfaces()?;
@@ -100,7 +105,7 @@ impl Stages {
             world.check_joints()?;
         }
         let step = self.key.scale.is_some_and(|scale| scale != StepScale::new(config, dt));
-        Ok(Changes { settings: self.key.config != *config, surfaces, joints, step })
+        Ok(Changes { bodies, settings: self.key.config != *config, surfaces, joints, step })
     }
 
     /// Substeps of class 0 in the last step.
@@ -109,7 +114,10 @@ impl Stages {
     }
 
     /// Brings all that lasts to what the caller changed.
-    pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: Changes) {
+    pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: &Changes) {
+        if !changes.bodies.is_empty() {
+            self.follow_bodies(world, &changes.bodies);
+        }
         if changes.settings {
             self.joints.forget_colors();
             self.sleep.change_settings(world, &self.key.config, config);
@@ -139,6 +147,19 @@ impl Stages {
             self.contacts.write_again();
             self.plan_key = None;
         }
+    }
+
+    /// Takes over bodies that came, went, or changed kind or shape.
+    fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        self.sleep.follow_bodies(world, changed);
+        self.detector.follow_bodies(world, changed);
+        self.effort.follow_bodies(world, changed);
+        self.contacts.follow_bodies(world, changed);
+        self.key.surfaces.resize(world.bodies.len(), (MassProperties::IMMOVABLE, Material::default()));
+        for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
+            self.key.surfaces[i] = (world.bodies[i].mass, world.bodies[i].material);
+        }
+        self.plan_key = None;
     }
 
     /// Wakes what was changed; whether there is nothing to do in this step.

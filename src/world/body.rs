@@ -207,6 +207,11 @@ impl Body {
         self.kind == BodyKind::Kinematic && (self.linear_velocity != Vec3::ZERO || self.angular_velocity != Vec3::ZERO)
     }
 
+    /// Radius around its origin that holds its shapes (m); 0 without shapes.
+    pub(crate) fn reach(&self) -> f32 {
+        self.colliders.iter().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max)
+    }
+
     /// Half of the smallest side of the thinnest of its shapes (m); infinite without shapes.
     pub fn smallest_half_extent(&self) -> f32 {
         self.colliders.iter().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)

@@ -28,6 +28,11 @@ impl BallJoint {
         Self { body_a, body_b: None, anchor_a, anchor_b: point, collide: false }
     }
 
+    /// Whether this is one of its bodies.
+    pub fn holds(&self, body: usize) -> bool {
+        self.body_a == body || self.body_b == Some(body)
+    }
+
     /// Lets the two bodies collide all the same.
     pub fn colliding(mut self) -> Self {
         self.collide = true;

@@ -1,39 +1,52 @@
 //! Bodies, shapes, joints and materials. SI units, right-handed, Y up in the catalogue.
 
+mod bodies;
 mod body;
 mod joint;
+mod joints;
 mod lever;
 mod limits;
 mod mass;
 mod shape;
 mod surface;
 
+pub use bodies::{Bodies, BodyHandle};
 pub use body::{Body, BodyKind, Collider, Material};
 pub use joint::BallJoint;
+pub use joints::{JointHandle, Joints};
 pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
 pub use mass::MassProperties;
 pub use shape::Shape;
 pub(crate) use shape::pose;
 pub use surface::Triangles;
 
-use std::ops::Range;
-
 use glam::Vec3;
 
-use crate::error::{Result, ensure, input};
+use crate::error::{Result, ensure};
 use limits::{is_place, is_within};
 
 /// A set of rigid bodies under one gravity.
+///
+/// Bodies and joints come and go at any time, also while a [`Simulation`](crate::Simulation) has the world:
+///
+/// ```
+/// use drystone::{Body, Shape, World};
+///
+/// let mut world = World::new();
+/// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)));
+/// world.body_mut(brick).expect("just put in").material.friction = 0.8;
+/// world.remove(brick);
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
+/// assert!(world.body(brick).is_none() && world.body(ball).is_some());
+/// ```
 #[derive(Clone, Debug)]
 pub struct World {
     /// Acceleration of every dynamic body (m/s²).
     pub gravity: Vec3,
-    /// The bodies. Everything else names a body by its index here.
-    pub bodies: Vec<Body>,
+    /// The bodies. Joints and contacts name a body by its index here, which stays as long as the body does.
+    pub bodies: Bodies,
     /// The ball joints.
-    pub joints: Vec<BallJoint>,
-    /// First body of each world that was set [beside](World::beside) the first; empty for one world.
-    pub begins: Vec<usize>,
+    pub joints: Joints,
 }
 
 impl Default for World {
@@ -45,31 +58,89 @@ impl Default for World {
 impl World {
     /// An empty world with gravity 9.81 m/s² along -Y.
     pub fn new() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Vec::new(), joints: Vec::new(), begins: Vec::new() }
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Bodies::default(), joints: Joints::default() }
     }
 
-    /// Adds a body and returns its index.
+    /// Adds a body to the last world and returns its index, as [`World::insert`] does its handle.
     pub fn add(&mut self, body: Body) -> usize {
-        self.bodies.push(body);
-        self.bodies.len() - 1
+        self.insert(body).index()
     }
 
-    /// Adds a joint and returns its index.
+    /// Adds a body to the last world.
+    pub fn insert(&mut self, body: Body) -> BodyHandle {
+        self.bodies.insert(self.world_count() - 1, body)
+    }
+
+    /// Adds a body to one of the worlds that stand [beside](World::beside) each other.
     ///
     /// # Panics
-    /// The joint names a body that the world does not have yet.
+    /// There is no world of this number.
+    pub fn insert_in(&mut self, world: usize, body: Body) -> BodyHandle {
+        let worlds = self.world_count();
+        assert!(world < worlds, "world {world} is none of {worlds}");
+        self.bodies.insert(world, body)
+    }
+
+    /// Takes a body out, with all joints that hold it; none if it is gone already.
+    pub fn remove(&mut self, body: BodyHandle) -> Option<Body> {
+        let removed = self.bodies.remove(body)?;
+        let index = body.index();
+        if self.joints.iter().any(|joint| joint.holds(index)) {
+            self.joints.retain(|joint| !joint.holds(index));
+        }
+        Some(removed)
+    }
+
+    /// A body; none if it is gone.
+    pub fn body(&self, body: BodyHandle) -> Option<&Body> {
+        self.bodies.contains(body).then(|| &self.bodies[body.index()])
+    }
+
+    /// A body, to be changed; none if it is gone.
+    pub fn body_mut(&mut self, body: BodyHandle) -> Option<&mut Body> {
+        self.bodies.contains(body).then(|| &mut self.bodies[body.index()])
+    }
+
+    /// Adds a joint and returns its index, as [`World::insert_joint`] does its handle.
+    ///
+    /// # Panics
+    /// The joint names a body that the world does not have.
     pub fn join(&mut self, joint: BallJoint) -> usize {
-        let bodies = self.bodies.len();
-        assert!(
-            joint.body_a < bodies && joint.body_b.is_none_or(|b| b < bodies),
-            "a joint names a body beyond {bodies}"
-        );
-        self.joints.push(joint);
+        self.insert_joint(joint);
         self.joints.len() - 1
     }
 
+    /// Adds a joint.
+    ///
+    /// # Panics
+    /// The joint names a body that the world does not have.
+    pub fn insert_joint(&mut self, joint: BallJoint) -> JointHandle {
+        let is_there = |body: usize| !self.bodies.is_vacant(body);
+        let bodies = self.bodies.len();
+        assert!(
+            is_there(joint.body_a) && joint.body_b.is_none_or(is_there),
+            "a joint names a body that is gone, or beyond the last of {bodies}"
+        );
+        self.joints.insert(joint)
+    }
+
+    /// Takes a joint out; none if it is gone already.
+    pub fn remove_joint(&mut self, joint: JointHandle) -> Option<BallJoint> {
+        self.joints.remove(joint)
+    }
+
+    /// A joint; none if it is gone.
+    pub fn joint(&self, joint: JointHandle) -> Option<&BallJoint> {
+        self.joints.index(joint).map(|index| &self.joints[index])
+    }
+
+    /// A joint, to be changed; none if it is gone.
+    pub fn joint_mut(&mut self, joint: JointHandle) -> Option<&mut BallJoint> {
+        self.joints.index(joint).map(|index| &mut self.joints[index])
+    }
+
     /// Sets another world beside this one: its bodies and joints follow those of this world, and bodies of different worlds never
-    /// meet, wherever they are. A body that is added later belongs to the last world.
+    /// meet, wherever they are.
     ///
     /// # Errors
     /// The gravity of the two is not the same.
@@ -77,21 +148,25 @@ impl World {
         let (here, there) = (self.gravity, other.gravity);
         ensure(here == there, || format!("worlds of gravity {here} and {there}: all must have the same"))?;
         let first = self.bodies.len();
-        self.begins.extend(other.worlds().map(|bodies| first + bodies.start));
-        self.bodies.extend_from_slice(&other.bodies);
-        self.joints.extend(other.joints.iter().map(|j| BallJoint {
-            body_a: first + j.body_a,
-            body_b: j.body_b.map(|b| first + b),
-            ..*j
-        }));
+        self.bodies.append(&other.bodies);
+        for joint in &other.joints {
+            let (body_a, body_b) = (first + joint.body_a, joint.body_b.map(|b| first + b));
+            self.joints.insert(BallJoint { body_a, body_b, ..*joint });
+        }
         Ok(())
     }
 
-    /// The bodies of each world.
-    pub fn worlds(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
-        let begin = |k: usize| if k == 0 { 0 } else { self.begins[k - 1] };
-        let end = move |k: usize| self.begins.get(k).copied().unwrap_or(self.bodies.len());
-        (0..self.begins.len() + 1).map(move |k| begin(k)..end(k))
+    /// The number of worlds beside each other, at least one.
+    pub fn world_count(&self) -> usize {
+        self.bodies.world_count()
+    }
+
+    /// The indices of the bodies of each world, ascending.
+    pub fn worlds(&self) -> Vec<Vec<usize>> {
+        let mut worlds = vec![Vec::new(); self.world_count()];
+        let own = |&(i, _): &(usize, &u32)| !self.bodies.is_vacant(i);
+        self.bodies.worlds().iter().enumerate().filter(own).for_each(|(i, &world)| worlds[world as usize].push(i));
+        worlds
     }
 
     /// Where the two anchors of a joint are in the world (m).
@@ -114,9 +189,6 @@ impl World {
     /// One line that names the body and its shape, or the joint.
     pub fn check(&self) -> Result<()> {
         self.check_gravity()?;
-        if let Some(k) = self.worlds().position(|range| range.start > range.end || range.end > self.bodies.len()) {
-            return Err(input!("world {k}: begins or ends beyond the last of {} bodies", self.bodies.len()));
-        }
         self.check_bodies(Body::check)?;
         self.check_joints()
     }
@@ -138,19 +210,22 @@ impl World {
         self.check_bodies(Body::check_surface)
     }
 
-    fn check_bodies(&self, check: impl Fn(&Body) -> Result<()>) -> Result<()> {
-        for (i, body) in self.bodies.iter().enumerate() {
-            check(body).map_err(|e| e.within(format_args!("body {i} {:?}", body.name)))?;
-        }
-        Ok(())
+    /// Refuses a body that cannot be simulated, by its index.
+    pub(crate) fn check_body(&self, i: usize) -> Result<()> {
+        self.bodies.get(i).map_or(Ok(()), |body| check_one(i, body, Body::check))
+    }
+
+    fn check_bodies(&self, check: fn(&Body) -> Result<()>) -> Result<()> {
+        self.bodies.iter().enumerate().try_for_each(|(i, body)| check_one(i, body, check))
     }
 
     /// Refuses joints to bodies that do not exist, and anchors out of range.
     pub(crate) fn check_joints(&self) -> Result<()> {
         let bodies = self.bodies.len();
         for (i, joint) in self.joints.iter().enumerate() {
-            let exist = joint.body_a < bodies && joint.body_b.is_none_or(|b| b < bodies);
-            ensure(exist, || format!("joint {i}: names a body beyond the last of {bodies}"))?;
+            let exists = |body: usize| !self.bodies.is_vacant(body);
+            let exist = exists(joint.body_a) && joint.body_b.is_none_or(exists);
+            ensure(exist, || format!("joint {i}: names a body that is gone, or beyond the last of {bodies}"))?;
             let differ = joint.body_b != Some(joint.body_a);
             ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
@@ -195,4 +270,9 @@ impl World {
     pub fn angular_momentum(&self) -> glam::DVec3 {
         self.dynamic().map(Body::angular_momentum).sum()
     }
+}
+
+/// Refuses a body for which `check` does, in a line that names it.
+fn check_one(i: usize, body: &Body, check: fn(&Body) -> Result<()>) -> Result<()> {
+    check(body).map_err(|e| e.within(format_args!("body {i} {:?}", body.name)))
 }

@@ -34,26 +34,22 @@ fn masses_and_materials_may_change() {
 
 type Change = fn(&mut World);
 
-/// Bodies cannot come, go or change kind or shape yet: the step says so and does nothing.
+/// The step says so and does nothing.
 #[test]
-fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
-    let cases: [(&str, Change); 10] = [
-        ("there are 25 bodies", |w| {
-            w.add(cube(0.0, 20.0, 0.0));
+fn a_wrong_body_that_came_or_changed_is_refused_in_one_line() {
+    let cases: [(&str, Change); 4] = [
+        ("body 24 \"light\": mass", |w| {
+            w.add(cube(0.0, 20.0, 0.0).total_mass(1e-30).named("light"));
         }),
-        ("there are 23 bodies", |w| {
-            w.bodies.pop();
+        ("body 3 \"\": shapes[0]: cuboid of half extent -1", |w| {
+            w.bodies[3].colliders[0].shape = Shape::cuboid(0.5, -1.0, 0.5);
         }),
-        ("there are 24 bodies in 2 worlds", |w| w.begins.push(5)),
-        ("body 3 \"\" changed", |w| w.bodies[3].kind = drystone::BodyKind::Fixed),
-        ("body 3 \"\" changed", |w| w.bodies[3] = cube(0.0, 2.5, 0.0).shape(Shape::ball(0.5))),
-        ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].shape = Shape::ball(0.5)),
-        ("body 3 \"\" changed", |w| w.bodies[3].colliders[0].position.x = 0.1),
-        ("body 3 \"\" changed", |w| w.bodies[3].colliders.clear()),
-        ("body 3 \"\" changed", |w| w.bodies.swap(3, 4)),
-        ("body 3 \"\" changed", |w| {
-            let shape = w.bodies[4].colliders.remove(0);
-            w.bodies[3].colliders.push(shape);
+        ("body 0 \"\": mass", |w| w.bodies[0].kind = drystone::BodyKind::Dynamic),
+        ("joint 5: names a body that is gone", |w| {
+            w.joints[0].body_a = 5;
+            w.remove(w.bodies.handle(5).expect("a body"));
+            w.join(BallJoint::to_world(4, Vec3::ZERO, Vec3::ZERO));
+            w.joints[5].body_a = 5;
         }),
     ];
     for (start, change) in cases {
@@ -63,7 +59,7 @@ fn bodies_that_come_go_or_change_shape_are_refused_in_one_line() {
         change(&mut simulation.world);
         let changed = simulation.world.clone();
         let line = simulation.step(DT).expect_err(start).to_string();
-        assert!(line.starts_with(start) && line.contains("make a new simulation") && !line.contains('\n'), "{line}");
+        assert!(line.starts_with(start) && !line.contains('\n'), "{line}");
         assert_eq!(Difference::between(&changed, &simulation.world), Difference::default());
         // Put right, it goes on.
         simulation.world = good;
@@ -94,7 +90,7 @@ fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
 fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
     let cases: [(&str, Change); 6] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
-        ("joint 6: names a body beyond", |w| w.joints.push(BallJoint::to_world(99, Vec3::ZERO, Vec3::ZERO))),
+        ("joint 0: names a body that is gone, or beyond", |w| w.joints[0].body_b = Some(99)),
         ("joint 0: ties body 1 to itself", |w| w.joints[0] = BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
         ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
         ("body 2 \"\": mass", |w| w.bodies[2].mass.mass = -1.0),

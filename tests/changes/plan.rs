@@ -84,7 +84,8 @@ fn a_plan_is_always_that_of_its_problem() {
     let (mut plans, mut steps) = (Vec::new(), 0);
     for step in 0..420 {
         if step == 200 {
-            simulation.world.joints.pop();
+            let last = *simulation.world.joints.handles().last().expect("a joint");
+            simulation.world.remove_joint(last);
         }
         if simulation.step(DT).expect("a step").dispatches == 0 {
             continue;

@@ -28,9 +28,9 @@ pub fn content_hash(scene: &Scene) -> String {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
         }
     }
-    let _ = write!(sink, "{:?}", scene.world.joints);
-    if !scene.world.begins.is_empty() {
-        let _ = write!(sink, "{:?}", scene.world.begins);
+    let _ = write!(sink, "{:?}", &*scene.world.joints);
+    if scene.world.world_count() > 1 {
+        let _ = write!(sink, "{:?}", scene.world.bodies.worlds());
     }
     format!("{:016x}", sink.0.finish())
 }
@@ -49,7 +49,7 @@ mod tests {
             |s| s.world.bodies[3].force.y = 1e-3,
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),
-            |s| s.world.begins.push(3),
+            |s| s.world.beside(&drystone::World::new()).expect("the same gravity"),
         ];
         for change in changes {
             let mut changed = scene.clone();

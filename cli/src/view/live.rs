@@ -9,7 +9,7 @@ use super::colors::ColorBy;
 use super::film::bounds;
 use super::overlay::Overlay;
 use drystone::backend::{BackendChoice, choose};
-use drystone::{Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{JointHandle, Result, Scene, Simulation, SolverConfig, StepStats};
 
 /// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
@@ -49,6 +49,7 @@ pub(super) struct Grabbed {
     /// Distance of the target from the eye (m).
     pub(super) distance: f32,
     pub(super) target: Vec3,
+    pub(super) joint: JointHandle,
 }
 
 impl Live {
@@ -107,12 +108,13 @@ impl Live {
 
     pub(super) fn step(&mut self) -> Result<()> {
         let dt = self.scene.dt;
-        if let (Some(grabbed), Some(joint)) = (&self.grabbed, self.simulation.world.joints.last_mut()) {
-            let body = &self.simulation.world.bodies[grabbed.body];
-            let at = body.position + body.rotation * grabbed.anchor;
-            joint.anchor_b = at + (grabbed.target - at) * (PULL * dt).min(1.0);
-        }
+        let world = &mut self.simulation.world;
         if let Some(grabbed) = &self.grabbed {
+            let body = &world.bodies[grabbed.body];
+            let at = body.position + body.rotation * grabbed.anchor;
+            if let Some(joint) = world.joint_mut(grabbed.joint) {
+                joint.anchor_b = at + (grabbed.target - at) * (PULL * dt).min(1.0);
+            }
             self.simulation.wake(grabbed.body);
         }
         self.stats = self.simulation.step(dt)?;

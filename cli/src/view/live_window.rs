@@ -108,8 +108,8 @@ impl Show for Live {
         let target = origin + distance * direction;
         let pulled = &world.bodies[body];
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
-        world.join(BallJoint::to_world(body, anchor, target));
-        self.grabbed = Some(Grabbed { body, anchor, distance, target });
+        let joint = world.insert_joint(BallJoint::to_world(body, anchor, target));
+        self.grabbed = Some(Grabbed { body, anchor, distance, target, joint });
         true
     }
 
@@ -120,8 +120,8 @@ impl Show for Live {
     }
 
     fn release(&mut self) {
-        if self.grabbed.take().is_some() {
-            self.simulation.world.joints.pop();
+        if let Some(grabbed) = self.grabbed.take() {
+            self.simulation.world.remove_joint(grabbed.joint);
         }
     }
 

@@ -1,0 +1,178 @@
+//! The bodies of a world, which come and go.
+
+use std::ops::{Deref, DerefMut, Index, IndexMut};
+use std::slice;
+
+use super::body::Body;
+
+/// Names one body for as long as the body is in its world. The handle of a body that was removed names nothing from then on: the next body
+/// at the same index has another handle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BodyHandle {
+    index: u32,
+    generation: u32,
+}
+
+impl BodyHandle {
+    /// The index of the body in [`World::bodies`](super::World::bodies).
+    pub fn index(self) -> usize {
+        self.index as usize
+    }
+}
+
+/// The bodies of a world, or of several beside each other: a slice in which a body keeps its index until the body is removed.
+///
+/// A removed body leaves a vacancy, a fixed body without shapes, which the next body of the same world fills. Indices depend on the
+/// order of the calls alone.
+#[derive(Clone, Debug, Default)]
+pub struct Bodies {
+    all: Vec<Body>,
+    /// Of each index; even while a body is there, odd while it is vacant.
+    generations: Vec<u32>,
+    /// The world of each index.
+    worlds: Vec<u32>,
+    /// Vacant indices, world by world; the last of them is filled first.
+    vacant: Vec<Vec<u32>>,
+}
+
+impl Bodies {
+    /// Puts a body into one of the worlds, or into the world after the last.
+    pub(super) fn insert(&mut self, world: usize, body: Body) -> BodyHandle {
+        if self.vacant.len() <= world {
+            self.vacant.resize(world + 1, Vec::new());
+        }
+        let Some(index) = self.vacant[world].pop() else {
+            self.all.push(body);
+            self.generations.push(0);
+            self.worlds.push(world as u32);
+            return BodyHandle { index: self.all.len() as u32 - 1, generation: 0 };
+        };
+        let generation = &mut self.generations[index as usize];
+        *generation = generation.wrapping_add(1);
+        self.all[index as usize] = body;
+        BodyHandle { index, generation: *generation }
+    }
+
+    /// Takes a body out; none if it is gone.
+    pub(super) fn remove(&mut self, handle: BodyHandle) -> Option<Body> {
+        if !self.contains(handle) {
+            return None;
+        }
+        let index = handle.index();
+        self.generations[index] = self.generations[index].wrapping_add(1);
+        self.vacant[self.worlds[index] as usize].push(handle.index);
+        Some(std::mem::replace(&mut self.all[index], Body::fixed()))
+    }
+
+    /// Sets other bodies beside these, in worlds of their own. Vacancies are set with them.
+    pub(super) fn append(&mut self, other: &Self) {
+        let (first, world) = (self.all.len() as u32, self.world_count() as u32);
+        self.vacant.resize(world as usize, Vec::new());
+        self.all.extend_from_slice(&other.all);
+        self.generations.extend_from_slice(&other.generations);
+        self.worlds.extend(other.worlds.iter().map(|of| world + of));
+        let vacant = (0..other.world_count()).map(|k| other.vacant.get(k).map_or(&[][..], Vec::as_slice));
+        self.vacant.extend(vacant.map(|own| own.iter().map(|index| first + index).collect::<Vec<_>>()));
+    }
+
+    /// Whether the body is there.
+    pub fn contains(&self, handle: BodyHandle) -> bool {
+        self.generations.get(handle.index()) == Some(&handle.generation)
+    }
+
+    /// The handle of the body at an index; none if there is none.
+    pub fn handle(&self, index: usize) -> Option<BodyHandle> {
+        let generation = self.generations.get(index).copied().filter(|generation| generation % 2 == 0)?;
+        Some(BodyHandle { index: index as u32, generation })
+    }
+
+    /// The handles of all bodies, ascending by index.
+    pub fn handles(&self) -> impl Iterator<Item = BodyHandle> {
+        (0..self.all.len()).filter_map(|index| self.handle(index))
+    }
+
+    /// Number of bodies, vacancies not counted.
+    pub fn count(&self) -> usize {
+        self.all.len() - self.vacant.iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Whether no body is at an index.
+    pub fn is_vacant(&self, index: usize) -> bool {
+        self.handle(index).is_none()
+    }
+
+    /// The number of worlds, at least one.
+    pub fn world_count(&self) -> usize {
+        self.vacant.len().max(1)
+    }
+
+    /// The world of each index.
+    pub fn worlds(&self) -> &[u32] {
+        &self.worlds
+    }
+
+    /// The generation of each index, which changes with every body that comes or goes there.
+    pub(crate) fn generations(&self) -> &[u32] {
+        &self.generations
+    }
+}
+
+impl Deref for Bodies {
+    type Target = [Body];
+    fn deref(&self) -> &[Body] {
+        &self.all
+    }
+}
+
+impl DerefMut for Bodies {
+    fn deref_mut(&mut self) -> &mut [Body] {
+        &mut self.all
+    }
+}
+
+impl<I: slice::SliceIndex<[Body]>> Index<I> for Bodies {
+    type Output = I::Output;
+    fn index(&self, index: I) -> &I::Output {
+        &self.all[index]
+    }
+}
+
+impl<I: slice::SliceIndex<[Body]>> IndexMut<I> for Bodies {
+    fn index_mut(&mut self, index: I) -> &mut I::Output {
+        &mut self.all[index]
+    }
+}
+
+impl<'a> IntoIterator for &'a Bodies {
+    type Item = &'a Body;
+    type IntoIter = slice::Iter<'a, Body>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.all.iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a mut Bodies {
+    type Item = &'a mut Body;
+    type IntoIter = slice::IterMut<'a, Body>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.all.iter_mut()
+    }
+}
+
+impl IntoIterator for Bodies {
+    type Item = Body;
+    type IntoIter = std::vec::IntoIter<Body>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.all.into_iter()
+    }
+}
+
+impl FromIterator<Body> for Bodies {
+    fn from_iter<B: IntoIterator<Item = Body>>(bodies: B) -> Self {
+        let mut all = Self::default();
+        bodies.into_iter().for_each(|body| {
+            all.insert(0, body);
+        });
+        all
+    }
+}

@@ -1,0 +1,108 @@
+//! The joints of a world, which come and go.
+
+use std::ops::{Deref, DerefMut};
+use std::slice;
+
+use super::joint::BallJoint;
+
+/// Names one joint for as long as the joint is in its world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct JointHandle {
+    number: u32,
+    generation: u32,
+}
+
+/// The joints of a world: a slice in the order in which they were inserted. The index of a joint falls by one with each joint before it that
+/// is removed; its handle stays.
+#[derive(Clone, Debug, Default)]
+pub struct Joints {
+    all: Vec<BallJoint>,
+    /// The handle of each.
+    handles: Vec<JointHandle>,
+    /// The generation of each number, and the index of its joint; none if the number is free.
+    numbers: Vec<(u32, Option<u32>)>,
+    /// Numbers without a joint; the last is given first.
+    free: Vec<u32>,
+}
+
+impl Joints {
+    /// Adds a joint behind the others.
+    pub(super) fn insert(&mut self, joint: BallJoint) -> JointHandle {
+        let number = self.free.pop().unwrap_or_else(|| {
+            self.numbers.push((0, None));
+            self.numbers.len() as u32 - 1
+        });
+        let (generation, index) = &mut self.numbers[number as usize];
+        *index = Some(self.all.len() as u32);
+        let handle = JointHandle { number, generation: *generation };
+        self.all.push(joint);
+        self.handles.push(handle);
+        handle
+    }
+
+    /// Takes a joint out; none if it is gone.
+    pub(super) fn remove(&mut self, handle: JointHandle) -> Option<BallJoint> {
+        let index = self.index(handle)?;
+        let joint = self.all[index];
+        let mut here = 0..;
+        self.retain(|_| here.next() != Some(index));
+        Some(joint)
+    }
+
+    /// Keeps the joints that `keep` takes.
+    pub fn retain(&mut self, mut keep: impl FnMut(&BallJoint) -> bool) {
+        let mut kept = 0;
+        for index in 0..self.all.len() {
+            let handle = self.handles[index];
+            let (generation, place) = &mut self.numbers[handle.number as usize];
+            if keep(&self.all[index]) {
+                *place = Some(kept as u32);
+                self.all[kept] = self.all[index];
+                self.handles[kept] = handle;
+                kept += 1;
+            } else {
+                (*generation, *place) = (generation.wrapping_add(1), None);
+                self.free.push(handle.number);
+            }
+        }
+        self.all.truncate(kept);
+        self.handles.truncate(kept);
+    }
+
+    /// Removes all.
+    pub fn clear(&mut self) {
+        self.retain(|_| false);
+    }
+
+    /// The index of a joint; none if it is gone.
+    pub fn index(&self, handle: JointHandle) -> Option<usize> {
+        let &(generation, index) = self.numbers.get(handle.number as usize)?;
+        index.filter(|_| generation == handle.generation).map(|index| index as usize)
+    }
+
+    /// The handle of each joint.
+    pub fn handles(&self) -> &[JointHandle] {
+        &self.handles
+    }
+}
+
+impl Deref for Joints {
+    type Target = [BallJoint];
+    fn deref(&self) -> &[BallJoint] {
+        &self.all
+    }
+}
+
+impl DerefMut for Joints {
+    fn deref_mut(&mut self) -> &mut [BallJoint] {
+        &mut self.all
+    }
+}
+
+impl<'a> IntoIterator for &'a Joints {
+    type Item = &'a BallJoint;
+    type IntoIter = slice::Iter<'a, BallJoint>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.all.iter()
+    }
+}

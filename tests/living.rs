@@ -1,0 +1,260 @@
+//! Worlds whose bodies come and go while they move.
+
+use drystone::glam::{Quat, Vec3};
+use drystone::{
+    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Reference, Shape, Simulation, SolverConfig, World,
+};
+
+const DT: f32 = 1.0 / 60.0;
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn cpu() -> Box<dyn Backend> {
+    Box::new(Cpu::new())
+}
+
+fn run(simulation: &mut Simulation, steps: u32) {
+    (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
+}
+
+fn ground() -> Body {
+    Body::fixed().shape(Shape::cuboid(50.0, 0.5, 50.0)).position(0.0, -0.5, 0.0)
+}
+
+fn cube(x: f32, y: f32) -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, y, 0.0)
+}
+
+/// Towers of five cubes, 3 m apart; the handles of their cubes from below.
+fn towers(count: usize) -> (World, Vec<Vec<BodyHandle>>) {
+    let mut world = World::new();
+    world.add(ground());
+    let tower = |k: usize| {
+        (0..5).map(move |level| cube(3.0 * k as f32, 0.5 + level as f32).velocity(1e-9 * Vec3::NEG_Y, Vec3::ZERO))
+    };
+    let towers = (0..count).map(|k| tower(k).map(|body| world.insert(body)).collect()).collect();
+    (world, towers)
+}
+
+fn simulation(world: &World, config: &SolverConfig, backend: fn() -> Box<dyn Backend>) -> Simulation {
+    Simulation::new(world.clone(), config.clone(), backend()).expect("a good world")
+}
+
+fn bits(body: &Body) -> [u32; 13] {
+    let ([px, py, pz], [vx, vy, vz]) = (body.position.to_array(), body.linear_velocity.to_array());
+    let ([wx, wy, wz], [qx, qy, qz, qw]) = (body.angular_velocity.to_array(), body.rotation.to_array());
+    [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
+}
+
+/// What lies on a body falls when the body goes, and what the body does not touch does not see it, to the last bit.
+#[test]
+fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else() {
+    for config in [SolverConfig::default(), SolverConfig::default().without_sleep()] {
+        for backend in [reference, cpu] {
+            let (world, towers) = towers(3);
+            let mut changed = simulation(&world, &config, backend);
+            let mut unchanged = simulation(&world, &config, backend);
+            run(&mut changed, 120);
+            run(&mut unchanged, 120);
+            assert_eq!(changed.is_asleep(towers[0][0].index()), config.sleep_after > 0.0);
+            let lowest = changed.world.remove(towers[1][0]).expect("a cube");
+            assert!((lowest.position.y - 0.5).abs() < 1e-3);
+            for step in 0..90 {
+                run(&mut changed, 1);
+                run(&mut unchanged, 1);
+                for cube in towers[0].iter().chain(&towers[2]).map(|cube| cube.index()) {
+                    assert_eq!(bits(&changed.world.bodies[cube]), bits(&unchanged.world.bodies[cube]), "step {step}");
+                }
+            }
+            for (level, cube) in towers[1].iter().skip(1).enumerate() {
+                let fell = changed.world.body(*cube).expect("a cube").position.y;
+                assert!((fell - (0.5 + level as f32)).abs() < 2e-3, "{level} is at {fell}");
+            }
+            assert!(changed.world.body(towers[1][0]).is_none() && changed.world.remove(towers[1][0]).is_none());
+        }
+    }
+}
+
+#[test]
+fn a_body_that_comes_lands_and_rests_on_what_sleeps() {
+    for backend in [reference, cpu] {
+        let (world, towers) = towers(2);
+        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
+        run(&mut simulation, 120);
+        assert!(simulation.is_asleep(towers[0][0].index()));
+        let new = simulation.world.insert(cube(0.0, 7.0));
+        run(&mut simulation, 240);
+        let landed = simulation.world.body(new).expect("the cube").position;
+        assert!((landed.y - 5.5).abs() < 2e-3 && landed.x.abs() < 0.02, "{landed}");
+        assert!(simulation.is_asleep(new.index()));
+        assert!(simulation.manifolds().any(|m| [m.body_a, m.body_b].contains(&new.index())));
+    }
+}
+
+/// The vacancy is filled at once: the new body begins without contacts and impulses of the one before.
+#[test]
+fn a_body_in_the_place_of_another_is_another_body() {
+    for backend in [reference, cpu] {
+        let (world, towers) = towers(2);
+        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
+        run(&mut simulation, 120);
+        let gone = towers[0][4];
+        simulation.world.remove(gone);
+        let new = simulation.world.insert(cube(20.0, 30.0));
+        assert_eq!(new.index(), gone.index());
+        assert!(new != gone && simulation.world.body(gone).is_none());
+        run(&mut simulation, 1);
+        let body = simulation.world.body(new).expect("the cube");
+        assert!((body.linear_velocity.y + 9.81 * DT).abs() < 1e-5, "{}", body.linear_velocity);
+        assert!(simulation.manifolds().all(|m| ![m.body_a, m.body_b].contains(&new.index())));
+        run(&mut simulation, 240);
+        assert!((simulation.world.body(new).expect("the cube").position.y - 0.5).abs() < 2e-3);
+        assert!((simulation.world.body(towers[0][3]).expect("a cube").position.y - 3.5).abs() < 2e-3);
+    }
+}
+
+#[test]
+fn kinds_and_shapes_change_between_steps() {
+    for backend in [reference, cpu] {
+        let (world, towers) = towers(3);
+        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
+        run(&mut simulation, 120);
+        let body =
+            |s: &Simulation, tower: usize, level: usize| s.world.body(towers[tower][level]).expect("a cube").clone();
+        // The second from below hangs in the air when the lowest goes.
+        simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Fixed;
+        simulation.world.remove(towers[0][0]);
+        // The lowest becomes half as high.
+        let low = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5));
+        let lowest = simulation.world.body_mut(towers[1][0]).expect("a cube");
+        (lowest.colliders, lowest.mass) = (low.colliders, low.mass);
+        // The ground is a belt.
+        run(&mut simulation, 120);
+        for level in 1..5 {
+            let y = body(&simulation, 0, level).position.y;
+            assert!((y - 0.5 - level as f32).abs() < 2e-3, "{level}: {y}");
+            let y = body(&simulation, 1, level).position.y;
+            assert!((y - level as f32).abs() < 3e-3, "{level}: {y}");
+        }
+        assert!((body(&simulation, 1, 0).position.y - 0.25).abs() < 2e-3);
+        simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Dynamic;
+        run(&mut simulation, 120);
+        assert!((body(&simulation, 0, 1).position.y - 0.5).abs() < 2e-3);
+        assert!((body(&simulation, 0, 4).position.y - 3.5).abs() < 2e-3);
+        assert!((body(&simulation, 2, 4).position.y - 4.5).abs() < 2e-3);
+    }
+}
+
+/// Each copy of a world goes the way of the world alone, whatever comes and goes in the others.
+#[test]
+fn bodies_come_and_go_in_one_of_several_worlds() {
+    let (alone, towers) = towers(1);
+    let mut all = alone.clone();
+    for _ in 0..2 {
+        all.beside(&alone).expect("the same gravity");
+    }
+    let each = alone.bodies.len();
+    let mut one = simulation(&alone, &SolverConfig::default(), cpu);
+    let mut three = simulation(&all, &SolverConfig::default(), cpu);
+    run(&mut one, 60);
+    run(&mut three, 60);
+    // World 0 loses a cube and gets two, world 2 gets one; world 1 stays as it is.
+    three.world.remove(three.world.bodies.handle(towers[0][4].index()).expect("a cube"));
+    let new: Vec<_> =
+        [(0, 9.0), (0, 11.0), (2, 7.0)].map(|(world, y)| three.world.insert_in(world, cube(0.1, y))).into();
+    assert_eq!(new.iter().map(|body| three.world.bodies.worlds()[body.index()]).collect::<Vec<_>>(), [0, 0, 2]);
+    for _ in 0..200 {
+        run(&mut one, 1);
+        run(&mut three, 1);
+        for i in 0..each {
+            assert_eq!(bits(&three.world.bodies[each + i]), bits(&one.world.bodies[i]));
+        }
+    }
+    let heights: Vec<f32> = new.iter().map(|body| three.world.body(*body).expect("a cube").position.y).collect();
+    assert!(heights.iter().zip([4.5, 5.5, 5.5]).all(|(y, at)| (y - at).abs() < 3e-3), "{heights:?}");
+}
+
+#[test]
+fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse() {
+    for backend in [reference, cpu] {
+        let mut world = World::new();
+        let link = |y: f32| Body::dynamic().shape(Shape::cuboid(0.1, 0.25, 0.1)).position(0.0, y, 0.0);
+        let end = 0.25 * Vec3::Y;
+        let links: Vec<_> = (0..4).map(|k| world.insert(link(-0.25 - 0.5 * k as f32))).collect();
+        world.join(BallJoint::to_world(links[0].index(), end, Vec3::ZERO));
+        let joints: Vec<_> = links
+            .windows(2)
+            .map(|w| world.insert_joint(BallJoint::new(w[0].index(), -end, w[1].index(), end)))
+            .collect();
+        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
+        run(&mut simulation, 120);
+        let weight = simulation.joint_impulses()[0].y;
+        simulation.world.remove(links[2]);
+        assert!(simulation.world.joint(joints[0]).is_some() && simulation.world.joint(joints[1]).is_none());
+        assert_eq!(simulation.world.joints.len(), 2);
+        run(&mut simulation, 60);
+        // Two links of four are left on the first joint.
+        assert!((simulation.joint_impulses()[0].y / weight - 0.5).abs() < 0.01);
+        let new = simulation.world.insert(link(-1.25));
+        simulation.world.join(BallJoint::new(links[1].index(), -end, new.index(), end));
+        run(&mut simulation, 120);
+        assert!((simulation.joint_impulses()[0].y / weight - 0.75).abs() < 0.01);
+        assert!(simulation.world.joint_gap() < 1e-3);
+    }
+}
+
+/// A brick is taken out and put back every tenth step: the pyramid stands, because all other contacts keep their impulses.
+#[test]
+fn a_pyramid_of_which_bricks_are_replaced_stands() {
+    let mut world = World::new();
+    world.add(ground());
+    let rows = 10;
+    let brick = |row: usize, k: usize| {
+        let x = k as f32 + 0.5 * row as f32;
+        Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.25)).position(x, 0.25 + 0.5 * row as f32, 0.0)
+    };
+    let places: Vec<Body> = (0..rows).flat_map(|row| (0..rows - row).map(move |k| brick(row, k))).collect();
+    let mut bricks: Vec<BodyHandle> = places.iter().map(|place| world.insert(place.clone())).collect();
+    let mut simulation = simulation(&world, &SolverConfig::default(), cpu);
+    for i in 0..40 {
+        run(&mut simulation, 10);
+        let k = i * 37 % places.len();
+        let taken = simulation.world.remove(bricks[k]).expect("a brick");
+        bricks[k] = simulation.world.insert(taken);
+    }
+    run(&mut simulation, 240);
+    for (i, (handle, place)) in bricks.iter().zip(&places).enumerate() {
+        let now = simulation.world.body(*handle).expect("a brick").position;
+        assert!(now.distance(place.position) < 5e-3, "brick {i}: {now} and not {}", place.position);
+    }
+    assert_eq!(simulation.world.bodies.len(), 1 + places.len());
+}
+
+/// Places are used again, so that nothing grows.
+#[test]
+fn a_world_in_which_bodies_come_and_go_for_long_does_not_grow() {
+    let mut world = World::new();
+    world.add(ground());
+    let mut simulation = simulation(&world, &SolverConfig::default(), cpu);
+    let mut rain = std::collections::VecDeque::new();
+    let mut most = [0; 2];
+    for step in 0..3000_u32 {
+        let place = |of: u32| (step * of % 17) as f32 * 0.25 - 2.0;
+        let turn = Quat::from_rotation_x(0.1 * (step % 7) as f32);
+        let body = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(place(5), 3.0, place(7)).rotation(turn);
+        rain.push_back(simulation.world.insert(body));
+        if rain.len() > 100 {
+            assert!(simulation.world.remove(rain.pop_front().expect("a body")).is_some());
+        }
+        run(&mut simulation, 1);
+        if step == 999 {
+            most = [simulation.world.bodies.len(), simulation.problem().contacts.len()];
+        }
+    }
+    assert_eq!(simulation.world.bodies.len(), most[0]);
+    let contacts = simulation.problem().contacts.len();
+    assert!(contacts < 2 * most[1], "{contacts} rows after {}", most[1]);
+    assert!(simulation.world.dynamic().all(|body| body.is_finite() && body.position.y > 0.0));
+}
