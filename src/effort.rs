@@ -142,7 +142,7 @@ impl Effort {
         changed
     }
 
-    /// Takes over bodies that came, went, or changed kind or shape.
+    /// Takes over bodies that came, went, or changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.classes.is_empty() {
             return;

@@ -80,7 +80,7 @@ pub use problem::StepProblem;
 pub use scenes::Scene;
 pub use simulation::{Simulation, SolvedManifold, SolvedPoint};
 pub use stats::StepStats;
-pub use world::{BallJoint, Body, BodyHandle, BodyKind, JointHandle, MassProperties, Material, Shape, World};
+pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
 
 /// The example of the README, compiled and run with the other documentation tests.
 #[cfg(doctest)]

@@ -99,7 +99,7 @@ impl Sleep {
         }
     }
 
-    /// Takes over bodies that came, went, or changed kind or shape. They are awake, and wake what touches them.
+    /// Takes over bodies that came, went, or changed kind, groups or shapes. They are awake, and wake what touches them.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.after == 0.0 {
             return;

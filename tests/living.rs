@@ -2,7 +2,7 @@
 
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Reference, Shape, Simulation, SolverConfig, World,
+    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Groups, Reference, Shape, Simulation, SolverConfig, World,
 };
 
 const DT: f32 = 1.0 / 60.0;
@@ -257,4 +257,24 @@ fn a_world_in_which_bodies_come_and_go_for_long_does_not_grow() {
     let contacts = simulation.problem().contacts.len();
     assert!(contacts < 2 * most[1], "{contacts} rows after {}", most[1]);
     assert!(simulation.world.dynamic().all(|body| body.is_finite() && body.position.y > 0.0));
+}
+
+/// The ghost falls through the tower and lands on the ground, and a cube that becomes a ghost falls through what it lay on.
+#[test]
+fn bodies_meet_only_those_of_their_groups() {
+    for backend in [reference, cpu] {
+        let (mut world, towers) = towers(1);
+        let (solid, ghost) = (Groups { membership: 1, filter: 1 }, Groups { membership: 2, filter: 2 });
+        world.bodies.iter_mut().skip(1).for_each(|body| body.groups = solid);
+        let falling = world.insert(cube(0.0, 8.0).groups(ghost));
+        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
+        run(&mut simulation, 180);
+        let height = |s: &Simulation, body: BodyHandle| s.world.body(body).expect("a cube").position.y;
+        assert!((height(&simulation, falling) - 0.5).abs() < 2e-3);
+        assert!((height(&simulation, towers[0][4]) - 4.5).abs() < 2e-3);
+        simulation.world.body_mut(towers[0][4]).expect("a cube").groups = ghost;
+        run(&mut simulation, 180);
+        assert!((height(&simulation, towers[0][4]) - 1.5).abs() < 2e-3, "{}", height(&simulation, towers[0][4]));
+        assert!((height(&simulation, towers[0][3]) - 3.5).abs() < 2e-3);
+    }
 }

@@ -11,7 +11,7 @@ use super::pairs::Placed;
 use super::report::{Change, DetectStats};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, BodyKind, Groups, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
 #[derive(Clone)]
@@ -20,6 +20,7 @@ pub struct Detector {
     /// The bodies that it knows, by their indices.
     known: Vec<KnownBody>,
     kinds: Vec<BodyKind>,
+    groups: Vec<Groups>,
     moving: Vec<BodyState>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
@@ -47,6 +48,7 @@ impl Detector {
             worlds: Vec::new(),
             known: Vec::new(),
             kinds: Vec::new(),
+            groups: Vec::new(),
             moving: Vec::new(),
             jointed: jointed(world),
         };
@@ -54,13 +56,14 @@ impl Detector {
         detector
     }
 
-    /// The bodies that came, went, or changed kind or shape since the last call of [`Self::follow_bodies`], ascending.
+    /// The bodies that came, went, or changed kind, groups or shapes since the last call of [`Self::follow_bodies`], ascending.
     pub fn changed_bodies(&self, world: &World) -> Vec<usize> {
         let (generations, worlds) = (world.bodies.generations(), world.bodies.worlds());
         let is_other = |i: usize| {
             let (Some(known), Some(body)) = (self.known.get(i), world.bodies.get(i)) else { return true };
             let same_place = known.generation == generations[i] && known.world == worlds[i];
-            !same_place || self.kinds[i] != body.kind || !self.has_shapes_of(i, *known, body)
+            let same = same_place && self.kinds[i] == body.kind && self.groups[i] == body.groups;
+            !same || !self.has_shapes_of(i, *known, body)
         };
         let all = (0..world.bodies.len().max(self.known.len())).into_par_iter().with_min_len(1024);
         // Most steps change none, and then nothing is allocated.
@@ -77,6 +80,7 @@ impl Detector {
         let count = world.bodies.len().max(self.known.len());
         self.known.resize(count, KnownBody::default());
         self.kinds.resize(count, BodyKind::Fixed);
+        self.groups.resize(count, Groups::ALL);
         self.worlds.resize(self.worlds.len().max(world.world_count()), WorldContacts::default());
         // All leave before any comes, so that the order of indices does not decide which places are free.
         for &i in changed {
@@ -87,10 +91,11 @@ impl Detector {
             let (body, part) = (&world.bodies[i], world.bodies.worlds()[i]);
             let colliders = self.worlds[part as usize].insert(i as u32, &body.colliders);
             self.known[i] = KnownBody { generation: world.bodies.generations()[i], world: part, colliders };
-            self.kinds[i] = body.kind;
+            (self.kinds[i], self.groups[i]) = (body.kind, body.groups);
         }
         self.known.truncate(world.bodies.len());
         self.kinds.truncate(world.bodies.len());
+        self.groups.truncate(world.bodies.len());
     }
 
     /// Takes over which bodies joints keep from colliding.
@@ -141,8 +146,14 @@ impl Detector {
             fall: world.gravity.length() * dt * dt,
             dt,
         };
-        let input =
-            DetectionInput { margins, kinds: &self.kinds, moving: &self.moving, activity, jointed: &self.jointed };
+        let input = DetectionInput {
+            margins,
+            kinds: &self.kinds,
+            groups: &self.groups,
+            moving: &self.moving,
+            activity,
+            jointed: &self.jointed,
+        };
         let detected = self.worlds.par_iter_mut().map(|world| world.detect(&input));
         detected.reduce(DetectStats::default, DetectStats::and)
     }

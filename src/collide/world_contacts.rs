@@ -13,12 +13,13 @@ use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
-use crate::world::{BodyKind, Collider};
+use crate::world::{BodyKind, Collider, Groups};
 
 /// The input of one detection, for all worlds; body indices count over all worlds.
 pub(super) struct DetectionInput<'a> {
     pub margins: Margins,
     pub kinds: &'a [BodyKind],
+    pub groups: &'a [Groups],
     pub moving: &'a [BodyState],
     pub activity: &'a [Activity],
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
@@ -215,11 +216,13 @@ impl WorldContacts {
     fn find(&mut self, input: &DetectionInput) {
         let Self { colliders, fat, moved, before, tree, planes, found, .. } = self;
         let (fat, moved) = (&*fat, &*moved);
-        // Different bodies of which one can be pushed.
+        // Different bodies that meet, of which one can be pushed.
         let may_touch = |i: u32, j: u32| {
             let bodies = key(colliders[i as usize].body, colliders[j as usize].body);
             let dynamic = |body: u32| input.kinds[body as usize] == BodyKind::Dynamic;
-            bodies.0 != bodies.1 && (dynamic(bodies.0) || dynamic(bodies.1)) && !input.jointed.contains(&bodies)
+            let meet = || input.groups[bodies.0 as usize].meets(input.groups[bodies.1 as usize]);
+            let one_moves = bodies.0 != bodies.1 && (dynamic(bodies.0) || dynamic(bodies.1));
+            one_moves && meet() && !input.jointed.contains(&bodies)
         };
         tree.follow(fat, before, moved);
         *found = tree.overlaps(&may_touch);

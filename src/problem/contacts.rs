@@ -78,7 +78,7 @@ impl ContactRows {
         self.materials = None;
     }
 
-    /// Takes over bodies that came, went, or changed kind or shape.
+    /// Takes over bodies that came, went, or changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.materials.is_some() {
             self.materials = Some(Materials::of(world));

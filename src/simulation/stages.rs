@@ -45,7 +45,7 @@ struct Key {
 /// The changes of the caller since the last step that concern state between steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
-    /// Bodies that came, went, or changed kind or shape, ascending.
+    /// Bodies that came, went, or changed kind, groups or shapes, ascending.
     bodies: Vec<usize>,
     settings: bool,
     /// Masses or materials.
@@ -149,7 +149,7 @@ impl Stages {
         }
     }
 
-    /// Takes over bodies that came, went, or changed kind or shape.
+    /// Takes over bodies that came, went, or changed kind, groups or shapes.
     fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.sleep.follow_bodies(world, changed);
         self.detector.follow_bodies(world, changed);

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 
+use super::groups::Groups;
 use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::{Shape, pose};
@@ -83,6 +84,8 @@ pub struct Body {
     pub mass: MassProperties,
     /// Surface.
     pub material: Material,
+    /// Which bodies it meets.
+    pub groups: Groups,
     /// Shapes on the body; several make a compound.
     pub colliders: Vec<Collider>,
     density: f32,
@@ -101,6 +104,7 @@ impl Body {
             force: Vec3::ZERO,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
+            groups: Groups::ALL,
             colliders: Vec::new(),
             density: 1000.0,
         }
@@ -182,6 +186,12 @@ impl Body {
     /// Ratio of separation to approach velocity.
     pub fn restitution(mut self, restitution: f32) -> Self {
         self.material.restitution = restitution;
+        self
+    }
+
+    /// Which bodies it meets.
+    pub fn groups(mut self, groups: Groups) -> Self {
+        self.groups = groups;
         self
     }
 

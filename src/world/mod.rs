@@ -2,6 +2,7 @@
 
 mod bodies;
 mod body;
+mod groups;
 mod joint;
 mod joints;
 mod lever;
@@ -12,6 +13,7 @@ mod surface;
 
 pub use bodies::{Bodies, BodyHandle};
 pub use body::{Body, BodyKind, Collider, Material};
+pub use groups::Groups;
 pub use joint::BallJoint;
 pub use joints::{JointHandle, Joints};
 pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
