@@ -9,6 +9,7 @@ use super::collider::{BodyState, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::report::{Change, DetectStats};
+use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, Groups, World};
@@ -22,6 +23,8 @@ pub struct Detector {
     kinds: Vec<BodyKind>,
     groups: Vec<Groups>,
     moving: Vec<BodyState>,
+    /// Where the last step left each body.
+    left: Vec<Left>,
     /// How far gravity moves a body in one step, in each world (m).
     falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
@@ -52,6 +55,7 @@ impl Detector {
             kinds: Vec::new(),
             groups: Vec::new(),
             moving: Vec::new(),
+            left: Vec::new(),
             falls: Vec::new(),
             jointed: jointed(world),
         };
@@ -99,6 +103,20 @@ impl Detector {
         self.known.truncate(world.bodies.len());
         self.kinds.truncate(world.bodies.len());
         self.groups.truncate(world.bodies.len());
+        self.left.resize(world.bodies.len(), Left::default());
+        changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.left[i] = Left::of(&world.bodies[i]));
+    }
+
+    /// Ends the contacts of bodies that the caller put elsewhere since [`Self::note_left`].
+    pub fn end_teleported(&mut self, world: &World) {
+        if let Some(teleports) = Teleports::find(&self.left, &world.bodies) {
+            self.worlds.iter_mut().for_each(|part| teleports.end_contacts(&self.kinds, &mut part.pairs));
+        }
+    }
+
+    /// Notes where a step left the bodies.
+    pub fn note_left(&mut self, world: &World) {
+        world.bodies.par_iter().with_min_len(1024).map(Left::of).collect_into_vec(&mut self.left);
     }
 
     /// Takes over which bodies joints keep from colliding.
