@@ -136,8 +136,10 @@ impl Effort {
             && self.follow_islands(world, asleep, interfaces(), looks);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
-            let restless = config.sleep_speed..FALL * world.gravity.length();
-            self.restless.retain(|&body| restless.contains(&of_root[islands.root(body) as usize].fastest));
+            self.restless.retain(|&body| {
+                let restless = config.sleep_speed..FALL * world.gravity_on(body as usize).length();
+                restless.contains(&of_root[islands.root(body) as usize].fastest)
+            });
         }
         changed
     }

@@ -86,9 +86,14 @@ impl Simulation {
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
-        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateVelocities};
-        let forces =
-            |p: &&Pass| matches!(p.kernel, BeginChanges | IntegrateVelocities { .. } | IntegrateGyroscopic { .. });
+        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities};
+        let forces = |p: &&Pass| {
+            let Pass { kernel, .. } = p;
+            matches!(
+                kernel,
+                BeginChanges | IntegrateVelocities { .. } | IntegrateTorques { .. } | IntegrateGyroscopic { .. }
+            )
+        };
         let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);
         let first: Vec<_> = blocks
             .flat_map(|own| own.iter().take_while(forces).chain(own.iter().filter(|p| p.kernel == EndChanges)))

@@ -9,6 +9,7 @@ use super::collider::{BodyState, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::report::{Change, DetectStats};
+use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, Groups, World};
@@ -22,6 +23,10 @@ pub struct Detector {
     kinds: Vec<BodyKind>,
     groups: Vec<Groups>,
     moving: Vec<BodyState>,
+    /// Where the last step left each body.
+    left: Vec<Left>,
+    /// How far gravity moves a body in one step, in each world (m).
+    falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
 }
@@ -50,6 +55,8 @@ impl Detector {
             kinds: Vec::new(),
             groups: Vec::new(),
             moving: Vec::new(),
+            left: Vec::new(),
+            falls: Vec::new(),
             jointed: jointed(world),
         };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
@@ -96,6 +103,20 @@ impl Detector {
         self.known.truncate(world.bodies.len());
         self.kinds.truncate(world.bodies.len());
         self.groups.truncate(world.bodies.len());
+        self.left.resize(world.bodies.len(), Left::default());
+        changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.left[i] = Left::of(&world.bodies[i]));
+    }
+
+    /// Ends the contacts of bodies that the caller put elsewhere since [`Self::note_left`].
+    pub fn end_teleported(&mut self, world: &World) {
+        if let Some(teleports) = Teleports::find(&self.left, &world.bodies) {
+            self.worlds.iter_mut().for_each(|part| teleports.end_contacts(&self.kinds, &mut part.pairs));
+        }
+    }
+
+    /// Notes where a step left the bodies.
+    pub fn note_left(&mut self, world: &World) {
+        world.bodies.par_iter().with_min_len(1024).map(Left::of).collect_into_vec(&mut self.left);
     }
 
     /// Takes over which bodies joints keep from colliding.
@@ -140,21 +161,24 @@ impl Detector {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        let margins = Margins {
-            speculative: config.speculative_margin,
-            recycle: config.recycle_distance,
-            fall: world.gravity.length() * dt * dt,
-            dt,
-        };
-        let input = DetectionInput {
-            margins,
+        self.falls.clear();
+        self.falls.resize(self.worlds.len(), 1.0);
+        for (state, &part) in self.moving.iter().zip(world.bodies.worlds()) {
+            let largest = &mut self.falls[part as usize];
+            *largest = largest.max(state.gravity_scale);
+        }
+        (0..).zip(&mut self.falls).for_each(|(part, fall)| *fall *= world.gravity_of(part).length() * dt * dt);
+        let margins =
+            |fall: f32| Margins { speculative: config.speculative_margin, recycle: config.recycle_distance, fall, dt };
+        let input = |fall: f32| DetectionInput {
+            margins: margins(fall),
             kinds: &self.kinds,
             groups: &self.groups,
             moving: &self.moving,
             activity,
             jointed: &self.jointed,
         };
-        let detected = self.worlds.par_iter_mut().map(|world| world.detect(&input));
+        let detected = self.worlds.par_iter_mut().zip(&self.falls).map(|(world, &fall)| world.detect(&input(fall)));
         detected.reduce(DetectStats::default, DetectStats::and)
     }
 }

@@ -20,6 +20,7 @@ mod query;
 mod report;
 mod reuse;
 mod solid;
+mod teleport;
 #[cfg(test)]
 mod testing;
 mod tree;

@@ -102,6 +102,17 @@ impl Pairs {
         self.all.swap_remove(place)
     }
 
+    /// Ends the contacts of a pair, which is computed anew.
+    pub fn end(&mut self, place: usize) {
+        self.all[place].end();
+        self.tracks[place].predicted = NEVER;
+    }
+
+    /// Radius around the origin of body b of a pair that holds its collider (m).
+    pub fn reach_b(&self, place: usize) -> f32 {
+        self.tracks[place].reach_b
+    }
+
     /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.
     pub fn computed_at(&self, place: usize) -> Option<&[Placed; 2]> {
         let track = &self.tracks[place];

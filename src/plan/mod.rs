@@ -2,7 +2,7 @@
 //!
 //! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm stands here
 //! and nowhere else. A plan has no pass for a feature that its scene lacks: without friction no kernel has friction, and without
-//! restitution, unequal moments of inertia or joints there are no passes for these.
+//! restitution, torques, unequal moments of inertia or joints there are no passes for these.
 
 mod bytes;
 mod kernel;
@@ -61,6 +61,7 @@ pub(crate) struct PlanKey {
     blocks: Vec<Block>,
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
+    has_torques: bool,
 }
 
 impl PlanKey {
@@ -68,13 +69,15 @@ impl PlanKey {
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         self.blocks == problem.blocks
             && self.colors == problem.colors
+            && self.has_torques != problem.torques.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic }
+        let has_torques = !problem.torques.is_empty();
+        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic, has_torques }
     }
 }
 
@@ -171,6 +174,9 @@ impl StepPlan {
         for substep in 0..substeps {
             let warm_start = carried && substep > 0;
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
+            if !problem.torques.is_empty() {
+                self.over_colors(Kernel::IntegrateTorques { from_start }, block, bodies);
+            }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints, block, &joints);
             self.over_colors(Kernel::WarmStartJoints, block, &direct);

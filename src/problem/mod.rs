@@ -30,7 +30,7 @@ pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TurningRow,
+    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
 };
 pub use summary::ContactSummary;
 
@@ -46,6 +46,8 @@ pub struct StepProblem {
     pub bodies: Vec<BodyRow>,
     /// Masses, one row a body.
     pub masses: Vec<MassRow>,
+    /// Angular accelerations by torques, one row a body; empty where no body has a torque.
+    pub torques: Vec<TorqueRow>,
     /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
     pub inertias: Vec<InertiaRow>,
     /// Manifolds, in slots that they keep as long as they last. Only those in `order` take part.

@@ -69,6 +69,21 @@ pub struct MassRow {
     pub pad_end: f32,
 }
 
+/// What the torque on one body does, 16 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct TorqueRow {
+    /// Inverse inertia when the step begins times torque, world axes (rad/s²).
+    pub angular_acceleration: [f32; 3],
+    #[doc(hidden)]
+    pub pad: f32,
+}
+
+impl TorqueRow {
+    /// The row of a body without torque: negative zero changes no bit of what it is added to, not even of a negative zero.
+    pub const NONE: Self = Self { angular_acceleration: [-0.0; 3], pad: 0.0 };
+}
+
 /// Principal inertia of one body whose moments differ, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -177,6 +177,7 @@ impl Stages {
         // Decided before the detection, by what a device that has the rows was asked to leave for.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         *found = timed(&mut times.detect, || {
+            detector.end_teleported(world);
             let mut found = detector.detect(world, config, dt, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step already.
@@ -243,6 +244,7 @@ impl Stages {
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
         problem::store(&self.problem, self.sleep.asleep(), world);
+        self.detector.note_left(world);
         self.sleep.after_step(world, &self.detector, dt);
     }
 }
