@@ -278,3 +278,24 @@ fn bodies_meet_only_those_of_their_groups() {
         assert!((height(&simulation, towers[0][3]) - 3.5).abs() < 2e-3);
     }
 }
+
+/// The first pair of the world has no contact, and the rows of a contact that ended are free: other settings write no free rows.
+#[test]
+fn settings_change_after_a_contact_ended() {
+    for backend in [reference, cpu] {
+        let ball = |x: f32, y: f32| Body::dynamic().shape(Shape::ball(0.5)).position(x, y, 0.0);
+        let mut world = World::new();
+        world.gravity = Vec3::ZERO;
+        let near = [world.insert(ball(0.0, 0.0)), world.insert(ball(0.9, 0.9))];
+        let touching = [world.insert(ball(10.0, 0.0)), world.insert(ball(10.99, 0.0))];
+        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
+        run(&mut simulation, 1);
+        assert_eq!(simulation.manifolds().count(), 1);
+        simulation.world.remove(touching[1]);
+        run(&mut simulation, 1);
+        simulation.set_config(SolverConfig::default().without_sleep().with(|c| c.substeps = 4)).expect("good settings");
+        run(&mut simulation, 1);
+        assert_eq!(simulation.manifolds().count(), 0);
+        assert!(near.iter().all(|&body| simulation.world.body(body).expect("a ball").linear_velocity == Vec3::ZERO));
+    }
+}
