@@ -299,3 +299,28 @@ fn settings_change_after_a_contact_ended() {
         assert!(near.iter().all(|&body| simulation.world.body(body).expect("a ball").linear_velocity == Vec3::ZERO));
     }
 }
+
+/// A body that moved and became fixed keeps the numbers of its velocity, and they mean nothing.
+#[test]
+fn a_fixed_body_with_a_velocity_is_as_one_without() {
+    for backend in [reference, cpu] {
+        let mut world = World::new();
+        world.add(ground());
+        // The cube passes by the corner of the fixed one.
+        let fixed = world.insert(cube(0.0, 1.2).rotation(Quat::from_rotation_z(0.6)));
+        let passing = world.insert(cube(-1.45, 3.0).velocity(Vec3::new(0.1, 0.0, 0.0), Vec3::splat(0.5)));
+        world.body_mut(fixed).expect("a cube").kind = BodyKind::Fixed;
+        let mut still = simulation(&world, &SolverConfig::default(), backend);
+        let body = world.body_mut(fixed).expect("a cube");
+        (body.linear_velocity, body.angular_velocity) = (Vec3::new(-3.0, 0.0, 20.0), Vec3::splat(8.0));
+        assert_eq!(world.kinetic_energy(), still.world.kinetic_energy());
+        let mut moving = simulation(&world, &SolverConfig::default(), backend);
+        for step in 0..90 {
+            run(&mut still, 1);
+            run(&mut moving, 1);
+            let body = |s: &Simulation| bits(s.world.body(passing).expect("a cube"));
+            assert_eq!(body(&still), body(&moving), "step {step}");
+            assert_eq!(still.manifolds().count(), moving.manifolds().count(), "step {step}");
+        }
+    }
+}
