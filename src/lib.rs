@@ -23,6 +23,7 @@
 //! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
+//! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
 //! | measure overlap, speed, drift | [`metrics`] |
 //! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
 //!
@@ -55,6 +56,7 @@ mod names;
 mod plan;
 pub mod preset;
 mod problem;
+pub mod queries;
 mod random;
 pub mod residuals;
 mod rest;

@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::metrics::Penetration;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
+use crate::queries::Queries;
 use crate::stats::{StepStats, timed};
 use crate::world::World;
 use stages::{Changes, Stages};
@@ -185,6 +186,27 @@ impl Simulation {
     fn leave_device(&mut self) {
         self.fetch();
         self.on_device = false;
+    }
+
+    /// The bodies as they are now, for questions: rays, shapes that move, points, boxes. In the tree of the last step, so that this costs
+    /// as much as a look at each body. Keep the answer for many questions.
+    ///
+    /// ```
+    /// use drystone::queries::Filter;
+    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// let hit = simulation.queries().ray(Vec3::new(-5.0, 0.5, 0.0), Vec3::X, 10.0, &Filter::default()).expect("the ball");
+    /// assert_eq!(hit.body, ball);
+    /// assert!((hit.distance - 4.5).abs() < 1e-3 && (hit.normal + Vec3::X).length() < 1e-3);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn queries(&self) -> Queries<'_> {
+        Queries::standing(&self.world, &self.stages.detector)
     }
 
     /// The world, without all that the next step would begin from.

@@ -141,7 +141,8 @@ impl CuboidPlace {
 impl BodyState {
     pub fn of(body: &Body, activity: Activity) -> Self {
         let (position, rotation) = (body.position, body.rotation);
-        let (v, w) = (body.linear_velocity, body.angular_velocity);
+        let moves = body.kind != BodyKind::Fixed;
+        let (v, w) = if moves { (body.linear_velocity, body.angular_velocity) } else { (Vec3::ZERO, Vec3::ZERO) };
         let is_near = position.abs().cmple(Vec3::splat(FARTHEST)).all();
         // parry squares lengths, and takes rotations for unit quaternions.
         let in_range = is_near && (rotation.length_squared() - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());

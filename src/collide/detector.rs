@@ -8,6 +8,7 @@ use super::collider::Activity;
 use super::collider::{BodyState, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
+use super::places::Places;
 use super::report::{Change, DetectStats};
 use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
@@ -137,6 +138,18 @@ impl Detector {
     /// Tells what changed since the last call. The listener gives slots to manifolds that have none, and removes manifolds that ended.
     pub(crate) fn take_changes(&mut self, tell: &mut dyn FnMut(Change)) {
         (0..).zip(&mut self.worlds).for_each(|(index, world)| world.take_changes(index, tell));
+    }
+
+    /// The colliders of `world` where they are now. The tree of the last detection says only which of them are near each other, so that
+    /// the world may have changed in any way.
+    pub(crate) fn places(&self, world: &World) -> Vec<Places> {
+        let count = |i: usize| {
+            let known = self.known.get(i).filter(|known| known.world == world.bodies.worlds()[i]);
+            known.map_or(0, |known| known.colliders.count as usize)
+        };
+        let standing =
+            |part: usize| self.worlds.get(part).map(|contacts| contacts.standing(|i| self.known[i].colliders));
+        Places::of(world, count, standing)
     }
 
     /// A pair by its world and its place there.

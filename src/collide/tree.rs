@@ -21,6 +21,10 @@ const ALONE: usize = 3;
 const STRETCH: f32 = 1.2;
 /// Most that one leaf counts, because a box that flew far away says nothing of the others.
 const MOST_STRETCH: f32 = 16.0;
+/// Nodes that wait in a search: three of each level above the leaves, of which there are 15 for 2^32 boxes, and one more.
+const WAITING: usize = 64;
+/// Share of boxes that are far from where they were arranged from which on they are arranged anew, as one in so many.
+const STRAYS: usize = 8;
 
 /// The tree, for as many boxes as it was last given.
 #[derive(Clone, Default)]
@@ -94,23 +98,40 @@ impl Tree {
     pub fn follow(&mut self, boxes: &[Aabb], before: &[Aabb], changed: &[bool]) {
         let is_new = self.order.is_empty();
         self.order.extend(self.order.len() as u32..boxes.len() as u32);
+        let changed = |i: usize| changed[i];
         if !is_new {
             self.fit(boxes, changed);
         }
         if is_new || self.stretch() > STRETCH * self.arranged {
-            let center = |&i: &u32| (boxes[i as usize].center(), i);
-            let mut places: Vec<_> = self.order.par_iter().map(center).collect();
-            arrange(&mut places);
-            self.order.iter_mut().zip(&places).for_each(|(i, place)| *i = place.1);
+            self.arrange(boxes);
             self.fit(boxes, changed);
             self.arranged = self.stretch();
         }
-        let then = |i: usize| if changed[i] { before[i] } else { boxes[i] };
+        let then = |i: usize| if changed(i) { before[i] } else { boxes[i] };
         leaves(&self.order, then, |_| false, &mut self.before);
     }
 
+    /// A tree for searches over other boxes, in the order of this one. `strays` of them are not near the box that they had here.
+    pub fn for_boxes(&self, boxes: &[Aabb], strays: usize) -> Self {
+        let mut tree = Self { order: self.order.clone(), ..Self::default() };
+        tree.order.extend(tree.order.len() as u32..boxes.len() as u32);
+        if STRAYS * strays > boxes.len() {
+            tree.arrange(boxes);
+        }
+        tree.fit(boxes, |_| false);
+        tree
+    }
+
+    /// Sorts the boxes so that those of a node are near each other.
+    fn arrange(&mut self, boxes: &[Aabb]) {
+        let center = |&i: &u32| (boxes[i as usize].center(), i);
+        let mut places: Vec<_> = self.order.par_iter().map(center).collect();
+        arrange(&mut places);
+        self.order.iter_mut().zip(&places).for_each(|(i, place)| *i = place.1);
+    }
+
     /// Makes the nodes, from the leaves to the root.
-    fn fit(&mut self, boxes: &[Aabb], changed: &[bool]) {
+    fn fit(&mut self, boxes: &[Aabb], changed: impl Fn(usize) -> bool + Sync) {
         let node = |four: &[Node]| {
             let (mut around, mut bits) = ([NOWHERE; WIDTH], 0);
             for (lane, node) in four.iter().enumerate() {
@@ -122,7 +143,7 @@ impl Tree {
         if self.levels.is_empty() {
             self.levels.push(Vec::new());
         }
-        leaves(&self.order, |i| boxes[i], |i| changed[i], &mut self.levels[0]);
+        leaves(&self.order, |i| boxes[i], changed, &mut self.levels[0]);
         for level in 1.. {
             if self.levels[level - 1].len() <= 1 {
                 break;
@@ -139,6 +160,46 @@ impl Tree {
     fn stretch(&self) -> f32 {
         let leaves = &self.levels[0];
         leaves.iter().map(Node::stretch).sum::<f32>() / leaves.len() as f32
+    }
+
+    /// Visits boxes, the nearer ones of a node first. `bound` gives for four boxes, by the lower and upper coordinates along each axis, what
+    /// `visit` finds at least in each. `visit` gets a box with its bound and returns the limit from then on: boxes of a larger bound are
+    /// left out.
+    pub fn nearest(
+        &self,
+        mut limit: f32,
+        bound: impl Fn(&[Vec4; 3], &[Vec4; 3]) -> Vec4,
+        mut visit: impl FnMut(u32, f32) -> f32,
+    ) {
+        if self.order.is_empty() {
+            return;
+        }
+        let (mut waiting, mut count) = ([(0.0, 0, 0); WAITING], 1);
+        waiting[0] = (0.0, self.levels.len() - 1, 0);
+        while count > 0 {
+            count -= 1;
+            let (least, level, node) = waiting[count];
+            if least > limit {
+                continue;
+            }
+            let node = (node, &self.levels[level][node]);
+            let bounds = bound(&node.1.mins, &node.1.maxs).to_array();
+            let mut lanes = [0, 1, 2, 3];
+            lanes.sort_unstable_by(|&a: &usize, &b| bounds[a].total_cmp(&bounds[b]).then(a.cmp(&b)));
+            if level == 0 {
+                for lane in lanes {
+                    if bounds[lane] <= limit {
+                        limit = visit(self.order[WIDTH * node.0 + lane], bounds[lane]);
+                    }
+                }
+                continue;
+            }
+            // The nearest is taken next.
+            for lane in lanes.into_iter().rev().filter(|&lane| bounds[lane] <= limit) {
+                waiting[count] = (bounds[lane], level - 1, WIDTH * node.0 + lane);
+                count += 1;
+            }
+        }
     }
 
     /// Finds all pairs of boxes that overlap, did not before, and that `accept` takes, in an order that depends on the number of threads.

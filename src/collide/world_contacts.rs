@@ -11,6 +11,7 @@ use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
 use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
+use super::places::{Place, Standing};
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
 use crate::world::{BodyKind, Collider, Groups};
@@ -128,6 +129,16 @@ impl WorldContacts {
     /// The colliders of a body.
     pub fn colliders(&self, range: ColliderRange) -> &[ColliderInfo] {
         &self.colliders[range.places()]
+    }
+
+    /// The colliders with their places in the tree, as of the last detection; `range_of` gives those of a body.
+    pub fn standing(&self, range_of: impl Fn(usize) -> ColliderRange) -> Standing<'_> {
+        let place = |(c, i): (&ColliderInfo, u32)| {
+            let first = if c.is_gone() { i } else { range_of(c.body as usize).first };
+            Place { body: c.body, collider: i - first }
+        };
+        let places = self.colliders.iter().zip(0..).map(place).collect();
+        Standing { tree: &self.tree, places, boxes: &self.fat }
     }
 
     /// Looks for all pairs in the next detection, because other bodies are jointed.
@@ -331,7 +342,7 @@ pub(super) fn key(i: u32, j: u32) -> (u32, u32) {
     (i.min(j), i.max(j))
 }
 
-fn is_in_range(aabb: &Aabb) -> bool {
+pub(super) fn is_in_range(aabb: &Aabb) -> bool {
     let farthest = glam::Vec3::splat(FARTHEST);
     aabb.mins.abs().cmple(farthest).all() && aabb.maxs.abs().cmple(farthest).all()
 }

@@ -40,7 +40,14 @@ pub(super) struct Slot {
 }
 
 const FREE: Slot =
-    Slot { world: 0, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
+    Slot { world: u32::MAX, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
+
+impl Slot {
+    /// Whether no manifold has it.
+    fn is_free(&self) -> bool {
+        self.world == FREE.world
+    }
+}
 
 /// All slots, those that are free included.
 #[derive(Clone, Debug, Default)]
@@ -118,7 +125,8 @@ impl Slots {
 
     /// Lets the next step write all rows again.
     pub fn write_again(&mut self) {
-        self.all.iter_mut().for_each(|slot| slot.write = slot.write.max(Write::Rows));
+        let taken = self.all.iter_mut().filter(|slot| !slot.is_free());
+        taken.for_each(|slot| slot.write = slot.write.max(Write::Rows));
     }
 
     /// Whether so many are new that it pays to sort all: more than half as many as there are.
@@ -128,9 +136,8 @@ impl Slots {
 
     /// Puts slots into an `order` that begins with those that take part; returns where each was. Free slots vanish.
     pub fn sort(&mut self, order: &[u32], detector: &mut Detector) -> Vec<u32> {
-        let mut is_free = vec![false; self.all.len()];
-        self.free.drain(..).for_each(|slot| is_free[slot as usize] = true);
-        let resting = (0..).zip(&self.all).filter(|&(i, slot)| !slot.takes_part && !is_free[i]).map(|(i, _)| i as u32);
+        self.free.clear();
+        let resting = (0..).zip(&self.all).filter(|(_, slot)| !slot.takes_part && !slot.is_free()).map(|(i, _)| i);
         let from: Vec<u32> = order.iter().copied().chain(resting).collect();
         self.all = from.iter().map(|&slot| self.all[slot as usize]).collect();
         self.edges = from.iter().map(|&slot| self.edges[slot as usize]).collect();

@@ -280,7 +280,7 @@ impl World {
 
     /// Sum of the kinetic energies of the dynamic bodies (J), in f64.
     pub fn kinetic_energy(&self) -> f64 {
-        self.bodies.iter().map(Body::kinetic_energy).sum()
+        self.dynamic().map(Body::kinetic_energy).sum()
     }
 
     /// Sum of the potential energies of the dynamic bodies (J), zero at the origin, in f64.

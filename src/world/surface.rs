@@ -1,10 +1,9 @@
-//! The surface of a shape as triangles, and its intersection with a ray: for pictures and for picking bodies.
+//! The surface of a shape as triangles, for pictures, and its extent.
 
 use glam::{Quat, Vec3};
-use parry3d::query::Ray;
 use parry3d::shape::TypedShape;
 
-use super::body::{Body, Collider};
+use super::body::Collider;
 use super::shape::{Shape, pose};
 
 /// Vertices (m) and triangles, counter-clockwise seen from outside.
@@ -63,18 +62,6 @@ impl Collider {
     }
 }
 
-impl Body {
-    /// Distance along a ray from `origin` in the unit direction `direction` to the first shape of the body (m).
-    pub fn meets_ray(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
-        let own = pose(self.position, self.rotation);
-        let cast = |c: &Collider| {
-            let place = own * pose(c.position, c.rotation);
-            c.shape.0.cast_ray(&place, &Ray::new(origin, direction), f32::MAX, true)
-        };
-        self.colliders.iter().filter_map(cast).min_by(f32::total_cmp)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,12 +96,5 @@ mod tests {
             let [a, b, c] = t.map(|i| vertices[i as usize]);
             assert!((b - a).cross(c - a).y > 0.0);
         }
-    }
-
-    #[test]
-    fn a_ray_meets_a_body_where_it_stands() {
-        let body = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.0, -3.0);
-        assert_eq!(body.meets_ray(Vec3::ZERO, Vec3::NEG_Z), Some(2.5));
-        assert_eq!(body.meets_ray(Vec3::ZERO, Vec3::Z), None);
     }
 }

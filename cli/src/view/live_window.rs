@@ -12,7 +12,8 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::{BallJoint, BodyKind, Result, World};
+use drystone::queries::Filter;
+use drystone::{BallJoint, Body, BodyKind, Result, World};
 
 /// Longest time of the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
@@ -100,12 +101,12 @@ impl Show for Live {
 
     fn grab(&mut self, pointer: &Pointer) -> bool {
         let Pointer { origin, direction, .. } = *pointer;
-        let world = &mut self.simulation.world;
-        let met = |(i, b): (usize, &drystone::world::Body)| Some((b.meets_ray(origin, direction)?, i));
         // The mouse pulls dynamic bodies only, through other bodies if need be.
-        let dynamic = world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic);
-        let Some((distance, body)) = dynamic.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
-        let target = origin + distance * direction;
+        let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
+        let filter = Filter::default().only(&is_dynamic);
+        let Some(hit) = self.simulation.queries().ray(origin, direction, f32::INFINITY, &filter) else { return false };
+        let (body, distance, target) = (hit.body.index(), hit.distance, hit.point);
+        let world = &mut self.simulation.world;
         let pulled = &world.bodies[body];
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
         let joint = world.insert_joint(BallJoint::to_world(body, anchor, target));

@@ -1,0 +1,58 @@
+//! Which bodies a query looks at.
+
+use crate::world::{Body, BodyHandle, Groups};
+
+/// Whether a query looks at a body.
+pub type Predicate<'a> = &'a dyn Fn(BodyHandle, &Body) -> bool;
+
+/// Which bodies a query looks at: all of the first world, unless told otherwise.
+///
+/// ```
+/// use drystone::queries::{Filter, Queries};
+/// use drystone::{Body, BodyKind, Shape, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::ball(2.0)));
+/// let small = world.insert(Body::dynamic().shape(Shape::ball(1.0)));
+/// let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
+/// let found = Queries::of(&world).point(Vec3::ZERO, &Filter::default().only(&is_dynamic));
+/// assert_eq!(found, [(small, 0)]);
+/// ```
+#[derive(Clone, Copy, Default)]
+pub struct Filter<'a> {
+    /// The groups of what asks: bodies that it would not meet are left out.
+    pub groups: Groups,
+    /// The number of the world, of several [beside](crate::World::beside) each other.
+    pub world: usize,
+    /// A body to leave out.
+    pub except: Option<BodyHandle>,
+    /// Leaves out the bodies for which it is false.
+    pub only: Option<Predicate<'a>>,
+}
+
+impl<'a> Filter<'a> {
+    /// Asks as a member of groups.
+    pub fn groups(self, groups: Groups) -> Self {
+        Self { groups, ..self }
+    }
+
+    /// Asks about one of several worlds [beside](crate::World::beside) each other.
+    pub fn world(self, world: usize) -> Self {
+        Self { world, ..self }
+    }
+
+    /// Leaves out a body, for instance the one that asks.
+    pub fn except(self, body: BodyHandle) -> Self {
+        Self { except: Some(body), ..self }
+    }
+
+    /// Leaves out the bodies for which `only` is false.
+    pub fn only(self, only: Predicate<'a>) -> Self {
+        Self { only: Some(only), ..self }
+    }
+
+    /// Whether the query looks at a body of its world.
+    pub(super) fn accepts(&self, handle: BodyHandle, body: &Body) -> bool {
+        self.except != Some(handle) && self.groups.meets(body.groups) && self.only.is_none_or(|only| only(handle, body))
+    }
+}

@@ -1,0 +1,303 @@
+//! Questions about where bodies are: rays, shapes that move, points and boxes.
+
+mod boxes;
+mod filter;
+mod shapes;
+
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+
+use crate::collide::{Detector, Place, Places};
+use crate::world::{BodyHandle, Collider, MOST_LENGTH, Shape, World, pose};
+use boxes::BoxRay;
+pub use filter::{Filter, Predicate};
+
+/// Where a ray, a moving shape or a point meets a collider.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The body.
+    pub body: BodyHandle,
+    /// The index of the collider in [`Body::colliders`](crate::Body::colliders).
+    pub collider: usize,
+    /// Distance along the ray or the motion, or from the point to the surface (m).
+    pub distance: f32,
+    /// The point on the surface of the collider (m).
+    pub point: Vec3,
+    /// Unit normal of the surface, out of the collider.
+    pub normal: Vec3,
+}
+
+/// A collider: its body, and its index in [`Body::colliders`](crate::Body::colliders).
+pub type Found = (BodyHandle, usize);
+
+/// The bodies of a world where they are now, sorted for questions. [`Simulation::queries`](crate::Simulation::queries) makes one from the
+/// tree of the last step, [`Queries::of`] from the world alone.
+///
+/// Over 20,000 boxes making one takes 1.4 ms on two threads, and a ray into them 1 µs: keep it for all questions about one state. All
+/// lengths are in meters. A ray or a shape without direction, a number that is none, or coordinates of more than
+/// [`MOST_LENGTH`] meet nothing. So do bodies farther away than that. Of colliders that are equally near, the one with the
+/// smaller index of its body and then the smaller index on the body is nearer. Meshes and height fields are surfaces: they contain
+/// nothing, and are met from both sides.
+///
+/// ```
+/// use drystone::queries::{Filter, Queries};
+/// use drystone::{Body, Shape, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+/// let queries = Queries::of(&world);
+///
+/// let from = Vec3::new(0.0, 10.0, 0.0);
+/// let hit = queries.ray(from, Vec3::NEG_Y, 100.0, &Filter::default()).expect("the ball");
+/// assert_eq!((hit.body, hit.distance, hit.normal), (ball, 7.5, Vec3::Y));
+/// let below = queries.ray(from, Vec3::NEG_Y, 100.0, &Filter::default().except(ball)).expect("the floor");
+/// assert_eq!(below.distance, 10.0);
+/// ```
+pub struct Queries<'a> {
+    world: &'a World,
+    parts: Vec<Places>,
+}
+
+/// Share of a distance by which the order of boxes and shapes may differ from rounding.
+const ROUNDING: f32 = 1e-5;
+
+impl<'a> Queries<'a> {
+    /// The bodies of a world as they are now.
+    pub fn of(world: &'a World) -> Self {
+        Self { world, parts: Places::of_world(world) }
+    }
+
+    /// The same, near each other as a detection found them.
+    pub(crate) fn standing(world: &'a World, detector: &Detector) -> Self {
+        Self { world, parts: detector.places(world) }
+    }
+
+    /// The first collider that a ray meets within `most`. A ray that begins inside of a collider meets it at distance 0, with a normal
+    /// against the ray. The direction has any length.
+    pub fn ray(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter) -> Option<Hit> {
+        let mut nearest = None;
+        self.along_ray(origin, direction, most, filter, |hit| keep_nearest(&mut nearest, hit));
+        nearest
+    }
+
+    /// All colliders that a ray meets within `most`, each where the ray enters it, the nearest first.
+    pub fn ray_all(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        self.along_ray(origin, direction, most, filter, |hit| {
+            hits.push(hit);
+            f32::INFINITY
+        });
+        hits.sort_unstable_by(|a, b| order(a).partial_cmp(&order(b)).expect("distances are numbers"));
+        hits
+    }
+
+    /// The colliders that contain a point, by their indices.
+    pub fn point(&self, point: Vec3, filter: &Filter) -> Vec<Found> {
+        let mut found = Vec::new();
+        if is_place(point) {
+            self.around(
+                filter,
+                (point, point),
+                |collider, pose| shapes::contains(&collider.shape, &pose, point),
+                &mut found,
+            );
+        }
+        found
+    }
+
+    /// The collider whose surface is nearest to a point, up to the distance `most`. Inside of a collider the distance is negative: there the
+    /// deepest is the nearest.
+    pub fn closest(&self, point: Vec3, most: f32, filter: &Filter) -> Option<Hit> {
+        let mut nearest = None;
+        let part = self.part(filter).filter(|_| is_place(point) && most >= 0.0)?;
+        let mut visit = |place: Place| {
+            let found = self.accepted(place, filter).and_then(|(body, collider, own)| {
+                let (distance, on, normal) = shapes::closest(&collider.shape, &own, point)?;
+                let hit = Hit { body, collider: place.collider as usize, distance, point: on, normal };
+                (distance <= most).then_some(hit)
+            });
+            found.map_or(f32::INFINITY, |hit| keep_nearest(&mut nearest, hit))
+        };
+        let mut limit = most.min(MOST_LENGTH * 8.0);
+        for &plane in &part.planes {
+            limit = limit.min(visit(plane));
+        }
+        part.nearest(
+            limit,
+            |mins, maxs| boxes::distance(mins, maxs, point),
+            |place, _| {
+                limit = limit.min(visit(place));
+                limit
+            },
+        );
+        nearest
+    }
+
+    /// The colliders whose boxes along the world's axes overlap the box from `lower` to `upper`, by their indices.
+    /// [`Queries::intersecting`] asks for their shapes.
+    pub fn overlapping(&self, lower: Vec3, upper: Vec3, filter: &Filter) -> Vec<Found> {
+        let mut found = Vec::new();
+        if lower.cmple(upper).all() {
+            self.around(filter, (lower, upper), |_, _| true, &mut found);
+        }
+        found
+    }
+
+    /// The colliders that a shape at a pose overlaps or touches, by their indices.
+    pub fn intersecting(&self, shape: &Shape, position: Vec3, rotation: Quat, filter: &Filter) -> Vec<Found> {
+        let mut found = Vec::new();
+        if let Some((own, bounds)) = placed(shape, position, rotation) {
+            self.around(
+                filter,
+                bounds,
+                |other, pose| shapes::intersect((&other.shape, &pose), (shape, &own)),
+                &mut found,
+            );
+        }
+        found
+    }
+
+    /// The first collider that a shape meets on its way from a pose along a direction, within the distance `most`. The shape does not
+    /// turn. A shape that overlaps a collider at the beginning meets it at distance 0.
+    pub fn cast(
+        &self,
+        shape: &Shape,
+        position: Vec3,
+        rotation: Quat,
+        direction: Vec3,
+        most: f32,
+        filter: &Filter,
+    ) -> Option<Hit> {
+        let (own, (lower, upper)) = placed(shape, position, rotation)?;
+        let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
+        let ray = BoxRay::new(middle, direction, half)?;
+        let mut nearest = None;
+        self.along(
+            &ray,
+            most,
+            filter,
+            |hit| keep_nearest(&mut nearest, hit),
+            |collider, pose, range| shapes::cast((&collider.shape, pose), (shape, &own), &ray, range),
+        );
+        nearest
+    }
+
+    /// Calls `found` for the colliders that a ray meets, with the limit from then on as its answer.
+    fn along_ray(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter, found: impl FnMut(Hit) -> f32) {
+        if let Some(ray) = BoxRay::new(origin, direction, Vec3::ZERO) {
+            let meets = |collider: &Collider, pose: &Pose, range| {
+                let (distance, normal) = shapes::ray(&collider.shape, pose, &ray, range)?;
+                Some((distance, ray.at(distance), normal))
+            };
+            self.along(&ray, most, filter, found, meets);
+        }
+    }
+
+    /// The same for anything that moves along a ray. `meets` gives distance, point and normal on a collider, which the ray may meet only
+    /// from the distance at which it enters the collider's box, up to `most`.
+    fn along(
+        &self,
+        ray: &BoxRay,
+        most: f32,
+        filter: &Filter,
+        mut found: impl FnMut(Hit) -> f32,
+        meets: impl Fn(&Collider, &Pose, [f32; 2]) -> Option<(f32, Vec3, Vec3)>,
+    ) {
+        let Some(part) = self.part(filter).filter(|_| most >= 0.0) else { return };
+        let most = most.min(MOST_LENGTH * 8.0);
+        let mut visit = |place: Place, enters: f32| {
+            let hit = self.accepted(place, filter).and_then(|(body, collider, pose)| {
+                let (distance, point, normal) = meets(collider, &pose, [enters, most])?;
+                let is_number = distance <= most && point.is_finite() && normal.is_finite();
+                is_number.then_some(Hit { body, collider: place.collider as usize, distance, point, normal })
+            });
+            hit.map_or(f32::INFINITY, &mut found)
+        };
+        let mut limit = most;
+        for &plane in &part.planes {
+            limit = limit.min(visit(plane, 0.0));
+        }
+        part.nearest(
+            limit,
+            |mins, maxs| ray.enters(mins, maxs),
+            |place, enters| {
+                limit = limit.min(visit(place, enters));
+                limit
+            },
+        );
+    }
+
+    /// The colliders whose boxes overlap a box, and that `meets` takes, by their indices.
+    fn around(
+        &self,
+        filter: &Filter,
+        (lower, upper): (Vec3, Vec3),
+        meets: impl Fn(&Collider, Pose) -> bool,
+        found: &mut Vec<Found>,
+    ) {
+        let Some(part) = self.part(filter) else { return };
+        let (lower, upper) = (lower.max(Vec3::splat(-8.0 * MOST_LENGTH)), upper.min(Vec3::splat(8.0 * MOST_LENGTH)));
+        let mut visit = |place: Place| {
+            let accepted = self.accepted(place, filter).filter(|(_, collider, pose)| meets(collider, *pose));
+            found.extend(accepted.map(|(body, ..)| (body, place.collider as usize)));
+        };
+        for &plane in &part.planes {
+            let reaches = plane.find(self.world).is_some_and(|(c, pose)| boxes::reaches(&c.shape, &pose, lower, upper));
+            if reaches {
+                visit(plane);
+            }
+        }
+        part.nearest(
+            0.0,
+            |mins, maxs| boxes::overlap(mins, maxs, lower, upper),
+            |place, _| {
+                visit(place);
+                0.0
+            },
+        );
+        found.sort_unstable();
+    }
+
+    fn part(&self, filter: &Filter) -> Option<&Places> {
+        self.parts.get(filter.world)
+    }
+
+    /// The collider at a place with its pose, if the filter lets its body through.
+    fn accepted(&self, place: Place, filter: &Filter) -> Option<(BodyHandle, &'a Collider, Pose)> {
+        let body = self.world.bodies.handle(place.body as usize)?;
+        if !filter.accepts(body, &self.world.bodies[body.index()]) {
+            return None;
+        }
+        let (collider, pose) = place.find(self.world)?;
+        Some((body, collider, pose))
+    }
+}
+
+/// Keeps the nearer of two; returns the limit up to which something nearer may be.
+fn keep_nearest(nearest: &mut Option<Hit>, hit: Hit) -> f32 {
+    if nearest.as_ref().is_none_or(|best| order(&hit) < order(best)) {
+        *nearest = Some(hit);
+    }
+    nearest.as_ref().map_or(f32::INFINITY, |best| best.distance.max(0.0) * (1.0 + ROUNDING))
+}
+
+/// The nearer first, then by index.
+fn order(hit: &Hit) -> (f32, usize, usize) {
+    (hit.distance, hit.body.index(), hit.collider)
+}
+
+fn is_place(point: Vec3) -> bool {
+    point.abs().cmple(Vec3::splat(MOST_LENGTH)).all()
+}
+
+/// The pose of a shape that is asked about, with its box; none if it is no pose.
+fn placed(shape: &Shape, position: Vec3, rotation: Quat) -> Option<(Pose, (Vec3, Vec3))> {
+    let is_pose = is_place(position) && (rotation.length_squared() - 1.0).abs() < 0.01 && shape.check().is_ok();
+    is_pose.then(|| {
+        let own = pose(position, rotation);
+        let aabb = shape.0.compute_aabb(&own);
+        let most = Vec3::splat(8.0 * MOST_LENGTH);
+        (own, (aabb.mins.max(-most), aabb.maxs.min(most)))
+    })
+}
