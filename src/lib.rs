@@ -58,6 +58,7 @@ mod problem;
 mod random;
 pub mod residuals;
 mod rest;
+mod saved;
 pub mod scenes;
 mod simulation;
 mod sleep;
@@ -78,7 +79,7 @@ pub use glam;
 pub use plan::StepPlan;
 pub use problem::StepProblem;
 pub use scenes::Scene;
-pub use simulation::{Simulation, SolvedManifold, SolvedPoint};
+pub use simulation::{Simulation, Snapshot, SolvedManifold, SolvedPoint};
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
 

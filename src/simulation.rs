@@ -1,6 +1,8 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod hash;
 mod manifolds;
+mod saved;
 mod stages;
 
 use crate::backend::cpu::Reference;
@@ -16,6 +18,7 @@ use crate::world::World;
 use stages::{Changes, Stages};
 
 pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use saved::Snapshot;
 
 /// A world that moves.
 ///

@@ -14,7 +14,7 @@ use crate::graph::Islands;
 use crate::world::{Body, BodyKind, World};
 
 /// The state of a body that a caller may change between two steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Snapshot {
     position: Vec3,
     rotation: Quat,
@@ -22,6 +22,8 @@ struct Snapshot {
     angular_velocity: Vec3,
     force: Vec3,
 }
+
+crate::saved::fields!(Snapshot { position, rotation, linear_velocity, angular_velocity, force });
 
 impl Snapshot {
     fn of(body: &Body) -> Self {
@@ -36,7 +38,7 @@ impl Snapshot {
 }
 
 /// Which bodies sleep, and since when the others are slow.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Sleep {
     /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
     after: f32,
@@ -58,6 +60,20 @@ pub struct Sleep {
     count: usize,
     steps: u32,
 }
+
+crate::saved::state!(Sleep {
+    after,
+    speed,
+    gravity,
+    asleep,
+    activity,
+    slow_for,
+    reach,
+    left,
+    next,
+    count,
+    steps,
+} scratch { islands });
 
 /// Islands are looked for in every so many steps.
 const EVERY: u32 = 8;

@@ -23,7 +23,7 @@ const STRETCH: f32 = 1.2;
 const MOST_STRETCH: f32 = 16.0;
 
 /// The tree, for as many boxes as it was last given.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Tree {
     /// The boxes by their indices, in the order of the leaves.
     order: Vec<u32>,
@@ -34,6 +34,8 @@ pub(super) struct Tree {
     /// How long leaves were, relative to their boxes, when those were arranged.
     arranged: f32,
 }
+
+crate::saved::cloned!(Tree { order, levels, arranged } scratch { before });
 
 /// Four boxes, side by side.
 #[derive(Clone, Copy)]
