@@ -2,6 +2,7 @@
 
 mod hash;
 mod manifolds;
+mod rollback;
 mod saved;
 mod stages;
 
@@ -18,6 +19,7 @@ use crate::world::World;
 use stages::{Changes, Stages};
 
 pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use rollback::Rollback;
 pub use saved::Snapshot;
 
 /// A world that moves.
