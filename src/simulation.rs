@@ -1,6 +1,9 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod hash;
 mod manifolds;
+mod rollback;
+mod saved;
 mod stages;
 
 use crate::backend::cpu::Reference;
@@ -17,6 +20,8 @@ use crate::world::World;
 use stages::{Changes, Stages};
 
 pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use rollback::Rollback;
+pub use saved::Snapshot;
 
 /// A world that moves.
 ///

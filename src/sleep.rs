@@ -14,7 +14,7 @@ use crate::graph::Islands;
 use crate::world::{Body, BodyKind, World};
 
 /// The state of a body that a caller may change between two steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Snapshot {
     position: Vec3,
     rotation: Quat,
@@ -25,6 +25,8 @@ struct Snapshot {
     /// The gravity that it feels.
     gravity: Vec3,
 }
+
+crate::saved::fields!(Snapshot { position, rotation, linear_velocity, angular_velocity, force });
 
 impl Snapshot {
     fn of(world: &World, i: usize) -> Self {
@@ -42,7 +44,7 @@ impl Snapshot {
 }
 
 /// Which bodies sleep, and since when the others are slow.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Sleep {
     /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
     after: f32,
@@ -63,6 +65,20 @@ pub struct Sleep {
     count: usize,
     steps: u32,
 }
+
+crate::saved::state!(Sleep {
+    after,
+    speed,
+    gravity,
+    asleep,
+    activity,
+    slow_for,
+    reach,
+    left,
+    next,
+    count,
+    steps,
+} scratch { islands });
 
 /// Islands are looked for in every so many steps.
 const EVERY: u32 = 8;

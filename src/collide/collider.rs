@@ -5,7 +5,7 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use crate::world::{Body, BodyKind, Collider};
+use crate::world::{Body, BodyKind, Collider, Shape};
 
 /// How a body takes part in the detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub enum Activity {
     /// Can be pushed.
     Awake,
 }
+
+crate::saved::kinds!(Activity { Still, Moving, Awake });
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -50,6 +52,12 @@ impl ColliderInfo {
             reach: c.position.length() + c.shape.bounding_radius(),
             unbounded: c.shape.is_half_space(),
         }
+    }
+
+    /// A collider that is gone.
+    pub fn gone() -> Self {
+        let collider = Collider { shape: Shape::ball(1.0), position: Vec3::ZERO, rotation: Quat::IDENTITY };
+        Self::new(NO_BODY, &collider)
     }
 
     /// Marks a collider that is gone.

@@ -13,10 +13,11 @@ use super::report::{Change, DetectStats};
 use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
+use crate::error::{Result, ensure, input};
+use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, Groups, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
-#[derive(Clone)]
 pub struct Detector {
     worlds: Vec<WorldContacts>,
     /// The bodies that it knows, by their indices.
@@ -32,6 +33,8 @@ pub struct Detector {
     jointed: HashSet<(u32, u32)>,
 }
 
+crate::saved::cloned!(Detector { worlds, known, kinds, groups, jointed } scratch { moving });
+
 /// A body as the detector knows it.
 #[derive(Clone, Copy, Default)]
 struct KnownBody {
@@ -41,6 +44,8 @@ struct KnownBody {
     colliders: ColliderRange,
 }
 
+crate::saved::fields!(KnownBody { generation, world, colliders });
+
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
     let apart = world.joints.iter().filter(|joint| !joint.collide);
@@ -48,6 +53,36 @@ fn jointed(world: &World) -> HashSet<(u32, u32)> {
 }
 
 impl Detector {
+    /// Writes all that lasts, or reads it: for the bodies of `world`.
+    pub(crate) fn walk<A: Archive>(&mut self, world: &World, archive: &mut A) -> Result<()> {
+        let mut are_of_world: Vec<bool> = Vec::new();
+        if !A::READS {
+            let is_of_world = |(i, known): (usize, &KnownBody)| {
+                world.bodies.get(i).is_some_and(|body| self.has_shapes_of(i, *known, body))
+            };
+            are_of_world.extend(self.known.iter().enumerate().map(is_of_world));
+        }
+        let Self { worlds, known, kinds, groups, moving: _, jointed } = self;
+        known.walk(archive)?;
+        are_of_world.walk(archive)?;
+        kinds.walk(archive)?;
+        groups.walk(archive)?;
+        jointed.walk(archive)?;
+        worlds.walk(archive)?;
+        if A::READS {
+            let count = known.len();
+            ensure(are_of_world.len() == count && kinds.len() == count && groups.len() == count, || {
+                format!("not all is there of {count} bodies")
+            })?;
+            for (i, (known, is_of_world)) in known.iter().zip(are_of_world).enumerate() {
+                let own = world.bodies.get(i).filter(|_| is_of_world).map(|body| &body.colliders[..]);
+                let part = worlds.get_mut(known.world as usize);
+                part.ok_or_else(|| input!("body {i} is of no world"))?.place(i as u32, known.colliders, own)?;
+            }
+        }
+        Ok(())
+    }
+
     /// A detector for the bodies of `world` as they are now.
     pub fn new(world: &World) -> Self {
         let mut detector = Self {

@@ -48,14 +48,16 @@ struct Sweeps<'a> {
 const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct StepPlan {
     /// In order.
     pub passes: Vec<Pass>,
 }
 
+crate::saved::cloned!(StepPlan { passes });
+
 /// The properties of a problem that its plan depends on, besides the settings and the rows of contacts.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
@@ -63,6 +65,8 @@ pub(crate) struct PlanKey {
     isotropic: Vec<bool>,
     has_torques: bool,
 }
+
+crate::saved::cloned!(PlanKey { colors, blocks, isotropic });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.

@@ -15,7 +15,7 @@ use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
 use crate::world::{BallJoint, BodyKind, JointHandle, World};
 
 /// The joints that have rows, and their colors.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct JointRows {
     joints: Vec<BallJoint>,
     handles: Vec<JointHandle>,
@@ -39,6 +39,19 @@ pub struct JointRows {
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
 }
+
+crate::saved::state!(JointRows {
+    joints,
+    handles,
+    edges,
+    coloring,
+    is_colored,
+    shares,
+    systems,
+    chosen_for,
+    swept_gap,
+    needs,
+} scratch { graph, lent });
 
 /// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.

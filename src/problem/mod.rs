@@ -36,9 +36,12 @@ pub use summary::ContactSummary;
 
 use std::ops::Range;
 
+use crate::error::Result;
+use crate::saved::{Archive, Saved};
+
 /// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
 /// `joint_impulses`, `convergence`, `momentum`).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct StepProblem {
     /// The same for all.
     pub params: Params,
@@ -77,6 +80,62 @@ pub struct StepProblem {
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
     pub momentum: MomentumRow,
+}
+
+crate::saved::cloned!(StepProblem {
+    params,
+    bodies,
+    masses,
+    inertias,
+    contacts,
+    points,
+    impulses,
+    sags,
+    joints,
+    joint_impulses,
+    order,
+    colors,
+    blocks,
+    systems,
+    turning,
+    convergence,
+    momentum,
+});
+
+/// What the next step goes on from; it writes all else anew.
+impl Saved for StepProblem {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self {
+            params,
+            bodies: _,
+            masses: _,
+            inertias: _,
+            contacts,
+            points,
+            impulses,
+            sags,
+            joints: _,
+            joint_impulses,
+            order: _,
+            colors: _,
+            blocks: _,
+            systems,
+            turning: _,
+            convergence: _,
+            momentum: _,
+        } = self;
+        params.patches.walk(archive)?;
+        contacts.walk(archive)?;
+        points.walk(archive)?;
+        impulses.walk(archive)?;
+        sags.walk(archive)?;
+        joint_impulses.walk(archive)?;
+        systems.walk(archive)
+    }
 }
 
 impl StepProblem {

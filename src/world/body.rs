@@ -21,6 +21,8 @@ pub enum BodyKind {
     Dynamic,
 }
 
+crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
+
 /// Friction and restitution of a surface.
 ///
 /// Two materials combine: friction by the geometric mean, sqrt(a b); restitution by the larger.
@@ -31,6 +33,8 @@ pub struct Material {
     /// Ratio of separation to approach velocity, 0 to 1.
     pub restitution: f32,
 }
+
+crate::saved::fields!(Material { friction, restitution });
 
 impl Default for Material {
     fn default() -> Self {
@@ -56,6 +60,8 @@ pub struct Collider {
     pub rotation: Quat,
 }
 
+crate::saved::fields!(Collider { shape, position, rotation });
+
 /// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
 ///
 /// ```
@@ -63,7 +69,7 @@ pub struct Collider {
 /// let brick = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.25)).density(2000.0).position(0.0, 1.0, 0.0);
 /// assert_eq!(brick.mass.mass, 500.0);
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Body {
     /// Name for people; empty if none was given.
     pub name: String,
@@ -97,6 +103,21 @@ pub struct Body {
     applied_force: Vec3,
     applied_torque: Vec3,
 }
+
+crate::saved::state!(Body {
+    name,
+    kind,
+    position,
+    rotation,
+    linear_velocity,
+    angular_velocity,
+    force,
+    mass,
+    material,
+    groups,
+    colliders,
+    density,
+});
 
 impl Body {
     /// A body of this kind, without shapes.

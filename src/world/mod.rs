@@ -41,7 +41,7 @@ use limits::{is_place, is_within};
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// assert!(world.body(brick).is_none() && world.body(ball).is_some());
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct World {
     /// Acceleration of gravity (m/s²) in every world without one of its own. A body feels its [`Body::gravity_scale`] of it.
     pub gravity: Vec3,
@@ -52,6 +52,8 @@ pub struct World {
     /// The ball joints.
     pub joints: Joints,
 }
+
+crate::saved::state!(World { gravity, bodies, joints });
 
 impl Default for World {
     fn default() -> Self {
