@@ -26,7 +26,7 @@ struct Snapshot {
     gravity: Vec3,
 }
 
-crate::saved::fields!(Snapshot { position, rotation, linear_velocity, angular_velocity, force });
+crate::saved::fields!(Snapshot { position, rotation, linear_velocity, angular_velocity, force, torque, gravity });
 
 impl Snapshot {
     fn of(world: &World, i: usize) -> Self {
@@ -69,7 +69,6 @@ pub struct Sleep {
 crate::saved::state!(Sleep {
     after,
     speed,
-    gravity,
     asleep,
     activity,
     slow_for,

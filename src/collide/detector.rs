@@ -33,7 +33,7 @@ pub struct Detector {
     jointed: HashSet<(u32, u32)>,
 }
 
-crate::saved::cloned!(Detector { worlds, known, kinds, groups, jointed } scratch { moving });
+crate::saved::cloned!(Detector { worlds, known, kinds, groups, left, jointed } scratch { moving, falls });
 
 /// A body as the detector knows it.
 #[derive(Clone, Copy, Default)]
@@ -62,11 +62,12 @@ impl Detector {
             };
             are_of_world.extend(self.known.iter().enumerate().map(is_of_world));
         }
-        let Self { worlds, known, kinds, groups, moving: _, jointed } = self;
+        let Self { worlds, known, kinds, groups, moving: _, left, falls: _, jointed } = self;
         known.walk(archive)?;
         are_of_world.walk(archive)?;
         kinds.walk(archive)?;
         groups.walk(archive)?;
+        left.walk(archive)?;
         jointed.walk(archive)?;
         worlds.walk(archive)?;
         if A::READS {

@@ -18,6 +18,8 @@ pub(super) struct Left {
     position: Vec3,
 }
 
+crate::saved::fields!(Left { rotation, position });
+
 impl Left {
     pub fn of(body: &Body) -> Self {
         Self { rotation: body.rotation, position: body.position }

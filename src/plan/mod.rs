@@ -66,7 +66,7 @@ pub(crate) struct PlanKey {
     has_torques: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, isotropic });
+crate::saved::cloned!(PlanKey { colors, blocks, isotropic, has_torques });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.

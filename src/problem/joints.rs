@@ -49,6 +49,7 @@ crate::saved::state!(JointRows {
     shares,
     systems,
     chosen_for,
+    gravity,
     swept_gap,
     needs,
 } scratch { graph, lent });

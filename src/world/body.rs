@@ -112,11 +112,15 @@ crate::saved::state!(Body {
     linear_velocity,
     angular_velocity,
     force,
+    torque,
+    gravity_scale,
     mass,
     material,
     groups,
     colliders,
     density,
+    applied_force,
+    applied_torque,
 });
 
 impl Body {

@@ -53,7 +53,7 @@ pub struct World {
     pub joints: Joints,
 }
 
-crate::saved::state!(World { gravity, bodies, joints });
+crate::saved::state!(World { gravity, own_gravity, bodies, joints });
 
 impl Default for World {
     fn default() -> Self {
