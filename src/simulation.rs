@@ -50,6 +50,8 @@ pub struct Simulation {
     stages: Stages,
     /// Whether the backend keeps the rows of the last step on a device.
     on_device: bool,
+    /// How often the simulation went back to a snapshot.
+    restored: u64,
 }
 
 impl Simulation {
@@ -61,7 +63,7 @@ impl Simulation {
         config.check()?;
         world.check()?;
         world.raise_inertias();
-        Ok(Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false })
+        Ok(Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false, restored: 0 })
     }
 
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
@@ -222,6 +224,16 @@ impl Simulation {
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
     pub fn is_asleep(&self, body: usize) -> bool {
         self.stages.sleep.asleep().get(body) == Some(&true)
+    }
+
+    /// How often the simulation went back to a snapshot.
+    pub(crate) fn restored(&self) -> u64 {
+        self.restored
+    }
+
+    /// Whether each body sleeps; empty if none ever does.
+    pub(crate) fn asleep(&self) -> &[bool] {
+        self.stages.sleep.asleep()
     }
 
     /// The substeps that a body takes in a step; see [`SolverConfig::max_substeps`].

@@ -32,8 +32,8 @@ pub(crate) trait Archive: Sized {
 #[derive(Default)]
 pub(crate) struct Writer {
     pub bytes: Vec<u8>,
-    /// The numbers of the shapes that are written, by their addresses.
-    shapes: HashMap<usize, u64>,
+    /// The shapes that are written, with their numbers, by their addresses: a shape that is kept keeps its address.
+    shapes: HashMap<usize, (u64, Shape)>,
 }
 
 impl Archive for Writer {
@@ -61,7 +61,8 @@ impl Archive for Writer {
 
     fn shape(&mut self, shape: &mut Shape) -> Result<()> {
         let next = self.shapes.len() as u64;
-        let mut number = *self.shapes.entry(Arc::as_ptr(&shape.0.0).addr()).or_insert(next);
+        let known = self.shapes.entry(Arc::as_ptr(&shape.0.0).addr()).or_insert_with(|| (next, shape.clone()));
+        let mut number = known.0;
         self.number(&mut number)?;
         if number == next { content(shape, self) } else { Ok(()) }
     }
@@ -77,6 +78,16 @@ impl<'a> Reader<'a> {
     /// Reads these bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes, shapes: Vec::new() }
+    }
+
+    /// Reads these bytes, behind others in which shapes stood.
+    pub fn with_shapes(bytes: &'a [u8], shapes: Vec<Shape>) -> Self {
+        Self { rest: bytes, shapes }
+    }
+
+    /// All shapes that stood in them.
+    pub fn into_shapes(self) -> Vec<Shape> {
+        self.shapes
     }
 
     /// Whether all is read.

@@ -95,3 +95,12 @@ macro_rules! kinds {
     };
 }
 pub(crate) use kinds;
+
+/// A hash of bytes: by words of eight, so that it takes less time than writing them.
+pub(crate) fn hash_of(bytes: &[u8]) -> u64 {
+    let (words, rest) = bytes.as_chunks::<8>();
+    let mut last = [0; 8];
+    last[..rest.len()].copy_from_slice(rest);
+    let words = words.iter().chain([&last]).map(|word| u64::from_le_bytes(*word));
+    words.fold(bytes.len() as u64, |hash, word| (hash.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}

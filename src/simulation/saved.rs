@@ -4,7 +4,7 @@ use super::{Simulation, Stages};
 use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result, ensure, input};
-use crate::saved::{Archive, Reader, Saved, Writer};
+use crate::saved::{Archive, Reader, Saved, Writer, hash_of};
 use crate::world::World;
 
 /// The state of a simulation between two steps, in memory: [`Simulation::snapshot`].
@@ -42,7 +42,7 @@ impl Simulation {
     /// ```
     pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
         let Snapshot { world, config, stages } = self.snapshot();
-        Self { world, config, backend, stages: *stages, on_device: false }
+        Self { world, config, backend, stages: *stages, on_device: false, restored: 0 }
     }
 
     /// The state between two steps, to go back to.
@@ -62,7 +62,7 @@ impl Simulation {
     /// ```
     pub fn snapshot(&mut self) -> Snapshot {
         self.fetch();
-        let Self { world, config, stages, backend: _, on_device: _ } = self;
+        let Self { world, config, stages, backend: _, on_device: _, restored: _ } = self;
         Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
     }
 
@@ -81,6 +81,7 @@ impl Simulation {
         self.config.clone_from(&snapshot.config);
         self.stages.clone_from(&*snapshot.stages);
         self.on_device = false;
+        self.restored += 1;
     }
 
     /// The state between two steps as bytes, for [`Simulation::load`]: the same on every machine. They begin with a version and a hash of
@@ -130,7 +131,8 @@ impl Simulation {
         let damaged = || refused("damaged or cut short: the hash of its content is another").to_string();
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
-        let mut simulation = Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false };
+        let mut simulation =
+            Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false, restored: 0 };
         let mut reader = Reader::new(content);
         simulation.walk(&mut reader).map_err(refused)?;
         ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
@@ -138,7 +140,7 @@ impl Simulation {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { world, config, backend: _, stages, on_device: _ } = self;
+        let Self { world, config, backend: _, stages, on_device: _, restored: _ } = self;
         world.walk(archive)?;
         config.walk(archive)?;
         stages.walk(world, archive)
@@ -147,13 +149,4 @@ impl Simulation {
 
 fn refused(why: impl std::fmt::Display) -> Error {
     input!("a saved run cannot be loaded: {why}")
-}
-
-/// A hash of bytes: by words of eight, so that it takes less time than writing them.
-fn hash_of(bytes: &[u8]) -> u64 {
-    let (words, rest) = bytes.as_chunks::<8>();
-    let mut last = [0; 8];
-    last[..rest.len()].copy_from_slice(rest);
-    let words = words.iter().chain([&last]).map(|word| u64::from_le_bytes(*word));
-    words.fold(bytes.len() as u64, |hash, word| (hash.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

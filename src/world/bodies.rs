@@ -32,7 +32,7 @@ pub struct Bodies {
     /// The world of each index.
     worlds: Vec<u32>,
     /// Vacant indices, world by world; the last of them is filled first.
-    vacant: Vec<Vec<u32>>,
+    pub(super) vacant: Vec<Vec<u32>>,
 }
 
 crate::saved::state!(Bodies { all, generations, worlds, vacant });
@@ -75,6 +75,18 @@ impl Bodies {
         self.worlds.extend(other.worlds.iter().map(|of| world + of));
         let vacant = (0..other.world_count()).map(|k| other.vacant.get(k).map_or(&[][..], Vec::as_slice));
         self.vacant.extend(vacant.map(|own| own.iter().map(|index| first + index).collect::<Vec<_>>()));
+    }
+
+    /// Makes room for so many indices, or fewer.
+    pub(super) fn resize(&mut self, count: usize) {
+        self.all.resize(count, Body::fixed());
+        self.generations.resize(count, 0);
+        self.worlds.resize(count, 0);
+    }
+
+    /// Says which generation of an index its body is, and of which world.
+    pub(super) fn set_place(&mut self, index: usize, generation: u32, world: u32) {
+        (self.generations[index], self.worlds[index]) = (generation, world);
     }
 
     /// Whether the body is there.

@@ -100,8 +100,8 @@ pub struct Body {
     pub colliders: Vec<Collider>,
     density: f32,
     /// Force and torque of the next step alone.
-    applied_force: Vec3,
-    applied_torque: Vec3,
+    pub(super) applied_force: Vec3,
+    pub(super) applied_torque: Vec3,
 }
 
 crate::saved::state!(Body {
@@ -252,6 +252,40 @@ impl Body {
             own.transform_by(&pose(c.position, c.rotation))
         });
         self.mass = MassProperties::of_solids(&solids.collect::<Vec<_>>(), self.density);
+    }
+
+    /// Whether another body differs from this one in nothing but pose, velocity, forces and torques.
+    pub(super) fn is_same_but_for_motion(&self, other: &Self) -> bool {
+        let Self {
+            name,
+            kind,
+            position: _,
+            rotation: _,
+            linear_velocity: _,
+            angular_velocity: _,
+            force: _,
+            torque: _,
+            gravity_scale,
+            mass,
+            material,
+            groups,
+            colliders: _,
+            density,
+            applied_force: _,
+            applied_torque: _,
+        } = self;
+        (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
+            && (material, groups, density) == (&other.material, &other.groups, &other.density)
+            && self.has_same_colliders(other)
+    }
+
+    /// Whether another body has the same shapes, not only equal ones, at the same places.
+    pub(super) fn has_same_colliders(&self, other: &Self) -> bool {
+        let same = |(a, b): (&Collider, &Collider)| {
+            let Collider { shape, position, rotation } = a;
+            shape.is(&b.shape) && (position, rotation) == (&b.position, &b.rotation)
+        };
+        self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
     }
 
     /// Whether it is kinematic and moves.

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod body;
+mod change;
 mod groups;
 mod joint;
 mod joints;
@@ -13,6 +14,7 @@ mod surface;
 
 pub use bodies::{Bodies, BodyHandle};
 pub use body::{Body, BodyKind, Collider, Material};
+pub(crate) use change::WorldChange;
 pub use groups::Groups;
 pub use joint::BallJoint;
 pub use joints::{JointHandle, Joints};

@@ -136,6 +136,11 @@ impl Shape {
         }
     }
 
+    /// Whether this is the same shape, and not only an equal one.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        std::sync::Arc::ptr_eq(&self.0.0, &other.0.0)
+    }
+
     /// Whether the shape has a finite volume, so that a body with it can have mass from density.
     pub fn has_volume(&self) -> bool {
         !self.is_half_space() && self.0.as_trimesh().is_none() && self.0.as_heightfield().is_none()

@@ -11,6 +11,7 @@ mod play;
 mod progress;
 #[cfg(feature = "view")]
 mod render;
+mod replay;
 mod report;
 mod run;
 mod scene;
@@ -58,6 +59,8 @@ enum Command {
     Hard(hard::HardArgs),
     /// Play a game.
     Play(play::PlayArgs),
+    /// Run a recording again and say where it differs.
+    Replay(replay::ReplayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
     #[cfg(feature = "view")]
     Render(render::RenderArgs),
@@ -140,6 +143,7 @@ pub fn main() -> std::process::ExitCode {
         Command::Export(args) => args.run(),
         Command::Hard(args) => args.run(),
         Command::Play(args) => args.run(),
+        Command::Replay(args) => args.run(),
         Command::Render(args) => args.run(),
         Command::Bench(args) => args.run(),
         Command::Report(args) => args.run(),

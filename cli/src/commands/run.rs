@@ -1,5 +1,7 @@
 //! `drystone run`.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -7,10 +9,10 @@ use clap::Args;
 use super::output::{plain_table, print, print_json, replacing, say};
 use super::progress::Progress;
 use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, check_touching};
-use crate::files;
+use crate::files::{self, Draft};
 use crate::report::{RunReport, Trajectory};
 use drystone::backend::choose;
-use drystone::{Error, Result, Scene, Simulation};
+use drystone::{Error, Recorder, RecordingIntervals, Result, Scene, Simulation};
 
 #[derive(Args)]
 pub struct RunArgs {
@@ -44,6 +46,17 @@ pub struct RunArgs {
     /// Step 1 is the first.
     #[arg(long, value_name = "STEP:FILE", help_heading = OUTPUT, value_parser = step_and_file)]
     save_problem: Option<(u32, PathBuf)>,
+    /// Record the run, for `drystone replay`, `view` and `render`.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT, conflicts_with = "save_problem")]
+    record: Option<PathBuf>,
+    /// Steps from each hash of all bodies to the next in the recording.
+    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 10, requires = "record")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    hash_every: u32,
+    /// Steps from each whole state to the next in the recording.
+    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 600, requires = "record")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    state_every: u32,
 }
 
 fn step_and_file(text: &str) -> std::result::Result<(u32, PathBuf), &'static str> {
@@ -64,6 +77,11 @@ fn check_save((step, file): &(u32, PathBuf), scene: &Scene) -> Result<()> {
 }
 
 impl RunArgs {
+    fn recorder(&self, title: &str, draft: &Draft, simulation: &mut Simulation) -> Result<Recorder<BufWriter<File>>> {
+        let intervals = RecordingIntervals { hash: self.hash_every, state: self.state_every };
+        Recorder::new(BufWriter::new(draft.create()?), title, simulation, intervals)
+    }
+
     pub fn run(&self) -> Result<()> {
         let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| check_save(save, &scene))?;
@@ -76,6 +94,9 @@ impl RunArgs {
         let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
         let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
+        let draft = self.record.as_deref().map(Draft::of).transpose()?;
+        let mut recorder =
+            draft.as_ref().map(|draft| self.recorder(&scene.name, draft, &mut simulation)).transpose()?;
         let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
@@ -87,7 +108,10 @@ impl RunArgs {
                         replacing(file, || files::write(file, problem.to_text().as_bytes()))?;
                         stats
                     }
-                    None => simulation.step(scene.dt)?,
+                    None => match &mut recorder {
+                        Some(recorder) => recorder.step(&mut simulation, scene.dt)?,
+                        None => simulation.step(scene.dt)?,
+                    },
                 };
                 report.add(&stats);
                 bar.inc();
@@ -100,6 +124,10 @@ impl RunArgs {
         if let (Some(trajectory), Some(path)) = (trajectory, &self.out) {
             replacing(path, || trajectory.finish())?;
         }
+        if let (Some(recorder), Some(draft), Some(path)) = (recorder, draft, &self.record) {
+            recorder.finish(&mut simulation).map_err(|e| e.within(path.display()))?;
+            replacing(path, || draft.keep())?;
+        }
         report.measure(&scene, simulation);
         if self.scene.json {
             print_json(&report)?;
@@ -108,7 +136,11 @@ impl RunArgs {
         }
         match &report.first_non_finite {
             Some(body) => {
-                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used")))
+                let kept = match &self.record {
+                    Some(file) => format!("`drystone replay {}` runs it again", file.display()),
+                    None => "the same command with --record FILE keeps the run, for a report".into(),
+                };
+                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used; {kept}")))
             }
             None => Ok(()),
         }

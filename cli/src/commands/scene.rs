@@ -140,13 +140,18 @@ impl SceneArgs {
         Ok((scene, config))
     }
 
-    /// Sets the number of threads of the process. The default is one per core, and one for the reference.
+    /// Sets the number of threads of the process.
     pub(super) fn set_threads(&self, backend: BackendChoice) {
-        let unless_told = usize::from(backend == BackendChoice::Reference);
-        let threads = if self.threads == 0 { unless_told } else { self.threads.into() };
-        // Fails only if the pool exists already. This thread is one of its threads: a separate pool costs 14 us per step.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+        set_threads(self.threads, backend);
     }
+}
+
+/// Sets the number of threads of the process; 0 means one per core, and one for the reference.
+pub(super) fn set_threads(threads: u16, backend: BackendChoice) {
+    let unless_told = usize::from(backend == BackendChoice::Reference);
+    let threads = if threads == 0 { unless_told } else { threads.into() };
+    // Fails only if the pool exists already. This thread is one of its threads: a separate pool costs 14 us per step.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
 }
 
 /// Refuses a contact problem without contacts.

@@ -1,0 +1,383 @@
+//! Runs that are kept with all that a caller did, and run again.
+//!
+//! A recording begins with the state of a simulation. Each step adds its length and what the caller changed since the step before, found by
+//! comparison, so that no change is lost by whatever way it was made. Now and then the recording notes a hash of all bodies and keeps a whole
+//! state, to which a replay can jump.
+
+use std::io::Write;
+
+use crate::backend::Backend;
+use crate::backend::cpu::Reference;
+use crate::config::SolverConfig;
+use crate::error::{Error, Result, ensure, input};
+use crate::saved::{Reader, Saved, Writer};
+use crate::simulation::Simulation;
+use crate::stats::StepStats;
+use crate::world::{World, WorldChange};
+
+/// How often a recording notes a hash of all bodies, and keeps a whole state (steps).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordingIntervals {
+    /// Steps from hash to hash, 1 or more: with 1, a replay names the step and the body of the first difference.
+    pub hash: u32,
+    /// Steps from state to state, 1 or more.
+    pub state: u32,
+}
+
+impl Default for RecordingIntervals {
+    fn default() -> Self {
+        Self { hash: 10, state: 600 }
+    }
+}
+
+/// Writes a recording of a simulation, step by step.
+///
+/// ```
+/// use drystone::{Body, Reference, Recorder, RecordingIntervals, Replay, Shape, Simulation, SolverConfig, World};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
+/// for step in 0..40 {
+///     if step == 20 {
+///         simulation.world.body_mut(ball).expect("the ball").linear_velocity.x = 3.0;
+///     }
+///     recorder.step(&mut simulation, 1.0 / 60.0)?;
+/// }
+/// let bytes = recorder.finish(&mut simulation)?;
+/// let mut replay = Replay::read(&bytes, Box::new(Reference::<f32>::new()))?;
+/// replay.seek(40)?;
+/// assert_eq!(replay.simulation().hash(), simulation.hash());
+/// assert!(replay.first_difference().is_none());
+/// # Ok::<(), drystone::Error>(())
+/// ```
+pub struct Recorder<W: Write> {
+    out: W,
+    intervals: RecordingIntervals,
+    /// The world as the last step left it.
+    world: World,
+    config: SolverConfig,
+    asleep: Vec<bool>,
+    /// How often the simulation had gone back to another state.
+    restored: u64,
+    /// The shapes that the recording has.
+    shapes: Writer,
+    steps: u32,
+}
+
+/// The first bytes of a recording.
+const MAGIC: [u8; 8] = *b"drystrec";
+/// The version of what follows them. It grows with every change of what is recorded.
+const VERSION: u32 = 1;
+/// Bytes before a part: its kind, its length and its hash.
+const PART: usize = 1 + 8 + 8;
+
+/// The kinds of parts.
+const TITLE: u8 = 0;
+const STATE: u8 = 1;
+const STEP: u8 = 2;
+const END: u8 = 3;
+/// A state that the caller went back to before the next step.
+const JUMP: u8 = 4;
+
+/// One step of a recording.
+struct StepRecord {
+    dt: f32,
+    change: WorldChange,
+    /// The settings, if they are others.
+    config: Option<SolverConfig>,
+    /// Bodies that the caller woke.
+    woken: Vec<u32>,
+    /// The hash of all bodies after the step, and of each a byte.
+    hash: Option<(u64, Vec<u8>)>,
+}
+
+crate::saved::fields!(StepRecord { dt, change, config, woken, hash });
+
+impl<W: Write> Recorder<W> {
+    /// Begins a recording under a title, from the state of a simulation.
+    ///
+    /// # Errors
+    /// Nothing can be written there.
+    pub fn new(out: W, title: &str, simulation: &mut Simulation, intervals: RecordingIntervals) -> Result<Self> {
+        let mut recorder = Self {
+            out,
+            intervals,
+            world: simulation.world.clone(),
+            config: simulation.config().clone(),
+            asleep: simulation.asleep().to_vec(),
+            restored: simulation.restored(),
+            shapes: Writer::default(),
+            steps: 0,
+        };
+        recorder.write(&MAGIC)?;
+        recorder.write(&VERSION.to_le_bytes())?;
+        recorder.part(TITLE, title.as_bytes())?;
+        recorder.part(STATE, &simulation.save())?;
+        Ok(recorder)
+    }
+
+    /// Steps the simulation, and notes what the caller changed since the last step.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`], and the recording then has nothing of it; or nothing more can be written.
+    pub fn step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
+        if self.restored != simulation.restored() {
+            self.part(JUMP, &simulation.save())?;
+            self.follow(simulation);
+        }
+        let change = WorldChange::between(&self.world, &simulation.world);
+        let woken = self.asleep.iter().zip(simulation.asleep()).enumerate().filter(|(_, (was, is))| **was && !**is);
+        let woken = woken.map(|(i, _)| i as u32).collect();
+        let config = (*simulation.config() != self.config).then(|| simulation.config().clone());
+        let stats = simulation.step(dt)?;
+        self.steps += 1;
+        let hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
+        let mut record = StepRecord { dt, change, config, woken, hash };
+        self.shapes.bytes.clear();
+        record.walk(&mut self.shapes)?;
+        let bytes = std::mem::take(&mut self.shapes.bytes);
+        self.part(STEP, &bytes)?;
+        self.shapes.bytes = bytes;
+        if self.steps.is_multiple_of(self.intervals.state) {
+            self.part(STATE, &simulation.save())?;
+        }
+        self.follow(simulation);
+        Ok(stats)
+    }
+
+    /// Ends the recording with the hash of the last state.
+    ///
+    /// # Errors
+    /// Nothing more can be written.
+    pub fn finish(mut self, simulation: &mut Simulation) -> Result<W> {
+        let (hash, bodies) = hashes(simulation);
+        self.part(END, &[&hash.to_le_bytes()[..], &bodies].concat())?;
+        self.out.flush().map_err(Error::file("recording"))?;
+        Ok(self.out)
+    }
+
+    fn follow(&mut self, simulation: &Simulation) {
+        self.world.clone_from(&simulation.world);
+        self.config.clone_from(simulation.config());
+        self.asleep.clear();
+        self.asleep.extend_from_slice(simulation.asleep());
+        self.restored = simulation.restored();
+    }
+
+    fn part(&mut self, kind: u8, bytes: &[u8]) -> Result<()> {
+        self.write(&[kind])?;
+        self.write(&(bytes.len() as u64).to_le_bytes())?;
+        self.write(&crate::saved::hash_of(bytes).to_le_bytes())?;
+        self.write(bytes)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).map_err(Error::file("recording"))
+    }
+}
+
+/// The hash of all bodies, and a byte for each: the lowest of its own hash.
+fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
+    (simulation.hash(), simulation.body_hashes().map(|hash| hash as u8).collect())
+}
+
+/// Where a replay first went another way than the recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ReplayDifference {
+    /// The step after which the hashes differ, from 1.
+    pub step: u32,
+    /// The last step before it after which they agreed; 0 for the beginning.
+    pub agreed: u32,
+    /// The first body that differs; none where the hashes of bodies are too short to say.
+    pub body: Option<usize>,
+    /// How many bodies differ at least.
+    pub bodies: usize,
+}
+
+/// A whole state of a recording.
+struct KeptState {
+    /// The steps before it.
+    step: u32,
+    /// Whether the caller went there, and the step before did not.
+    is_jump: bool,
+    bytes: Vec<u8>,
+}
+
+/// A recording that runs again.
+pub struct Replay {
+    title: String,
+    /// Ascending by their steps.
+    states: Vec<KeptState>,
+    steps: Vec<StepRecord>,
+    simulation: Simulation,
+    step: u32,
+    agreed: u32,
+    difference: Option<ReplayDifference>,
+}
+
+impl Replay {
+    /// Whether these are the first bytes of a recording.
+    pub fn is_recording(bytes: &[u8]) -> bool {
+        bytes.starts_with(&MAGIC)
+    }
+
+    /// A replay of a recording, before its first step.
+    ///
+    /// # Errors
+    /// The bytes are none of a recording, of another version, damaged or cut short.
+    pub fn read(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
+        Self::read_parts(bytes, backend).map_err(|error| error.within("a recording that cannot be replayed"))
+    }
+
+    fn read_parts(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
+        let cut_short = || input!("cut short");
+        let rest = bytes.strip_prefix(&MAGIC).ok_or_else(|| input!("these bytes are none"))?;
+        let (version, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut_short)?;
+        let version = u32::from_le_bytes(*version);
+        ensure(version == VERSION, || format!("it has version {version}, and this program reads {VERSION}"))?;
+        let (mut title, mut states, mut steps) = (String::new(), Vec::<KeptState>::new(), Vec::<StepRecord>::new());
+        let mut shapes = Vec::new();
+        loop {
+            let (header, after) = rest.split_first_chunk::<PART>().ok_or_else(cut_short)?;
+            let number = |from: usize| u64::from_le_bytes(std::array::from_fn(|k| header[from + k]));
+            let length = usize::try_from(number(1)).unwrap_or(usize::MAX);
+            let (part, after) = after.split_at_checked(length).ok_or_else(cut_short)?;
+            let place = || format!("step {}: damaged", steps.len());
+            ensure(number(9) == crate::saved::hash_of(part), place)?;
+            rest = after;
+            match header[0] {
+                TITLE => title = String::from_utf8_lossy(part).into_owned(),
+                kind @ (STATE | JUMP) => {
+                    states.push(KeptState { step: steps.len() as u32, is_jump: kind == JUMP, bytes: part.to_vec() });
+                }
+                STEP => {
+                    let mut reader = Reader::with_shapes(part, std::mem::take(&mut shapes));
+                    let mut record = StepRecord::blank();
+                    record.walk(&mut reader)?;
+                    shapes = reader.into_shapes();
+                    steps.push(record);
+                }
+                END => {
+                    let (hash, bodies) = part.split_first_chunk::<8>().ok_or_else(cut_short)?;
+                    if let Some(last) = steps.last_mut() {
+                        last.hash = Some((u64::from_le_bytes(*hash), bodies.to_vec()));
+                    }
+                    break;
+                }
+                kind => return Err(input!("a part of kind {kind} is not known")),
+            }
+        }
+        ensure(rest.is_empty(), || "it goes on behind its end".into())?;
+        let first = states.first().filter(|state| state.step == 0).ok_or_else(|| input!("it has no beginning"))?;
+        let simulation = Simulation::load(&first.bytes, backend)?;
+        Ok(Self { title, states, steps, simulation, step: 0, agreed: 0, difference: None })
+    }
+
+    /// The title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The number of steps.
+    pub fn len(&self) -> u32 {
+        self.steps.len() as u32
+    }
+
+    /// Whether it has no steps.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// The steps that are made.
+    pub fn step_number(&self) -> u32 {
+        self.step
+    }
+
+    /// Simulated time until here (s).
+    pub fn time(&self) -> f64 {
+        self.steps[..self.step as usize].iter().map(|step| f64::from(step.dt)).sum()
+    }
+
+    /// Length of the next step, or of the last one at the end (s); none without steps.
+    pub fn dt(&self) -> Option<f32> {
+        self.steps.get(self.step as usize).or(self.steps.last()).map(|step| step.dt)
+    }
+
+    /// The simulation after the steps that are made.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Changes what runs the steps, from the next one on.
+    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
+        self.simulation.set_backend(backend);
+    }
+
+    /// Where the replay first went another way than the recording, in the steps that were made so far.
+    pub fn first_difference(&self) -> Option<ReplayDifference> {
+        self.difference
+    }
+
+    /// Makes the next step; none at the end.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn step(&mut self) -> Result<Option<StepStats>> {
+        if self.step == self.len() {
+            return Ok(None);
+        }
+        if let Some(state) = self.states.iter().position(|state| state.step == self.step && state.is_jump) {
+            self.load(state)?;
+        }
+        let record = &self.steps[self.step as usize];
+        record.change.make(&mut self.simulation.world);
+        if let Some(config) = &record.config {
+            self.simulation.set_config(config.clone())?;
+        }
+        record.woken.iter().for_each(|&body| self.simulation.wake(body as usize));
+        let stats = self.simulation.step(record.dt)?;
+        self.step += 1;
+        if let Some((hash, bodies)) = &record.hash {
+            if *hash == self.simulation.hash() {
+                self.agreed = self.agreed.max(self.step);
+            } else if self.difference.is_none_or(|known| known.step > self.step) {
+                let own = self.simulation.body_hashes().map(|hash| hash as u8);
+                let differ: Vec<usize> =
+                    (0..).zip(own.zip(bodies)).filter(|(_, (a, b))| a != *b).map(|(i, _)| i).collect();
+                let (step, agreed) = (self.step, self.agreed);
+                self.difference =
+                    Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });
+            }
+        }
+        Ok(Some(stats))
+    }
+
+    /// Goes to the state after so many steps, or to the end: from the nearest state that the recording kept before it.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn seek(&mut self, step: u32) -> Result<()> {
+        let step = step.min(self.len());
+        let nearest = self.states.iter().rposition(|state| state.step <= step && !state.is_jump);
+        let nearest = nearest.expect("a recording begins with a state");
+        if step < self.step || self.states[nearest].step > self.step {
+            self.load(nearest)?;
+        }
+        while self.step < step {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// Goes to a kept state.
+    fn load(&mut self, state: usize) -> Result<()> {
+        let backend = self.simulation.set_backend(Box::new(Reference::<f32>::new()));
+        self.simulation = Simulation::load(&self.states[state].bytes, backend)?;
+        self.step = self.states[state].step;
+        Ok(())
+    }
+}

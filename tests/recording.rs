@@ -1,0 +1,165 @@
+//! Recordings of runs with all that a caller did, run again to the same bits.
+
+use drystone::glam::{Quat, Vec3};
+use drystone::stages::backend::CheckedStep;
+use drystone::{
+    Backend, BallJoint, Body, BodyKind, Cpu, Groups, Recorder, RecordingIntervals, Reference, Replay, Result, Scene,
+    Shape, Simulation, SolverConfig, World,
+};
+
+const DT: f32 = 1.0 / 60.0;
+const INTERVALS: RecordingIntervals = RecordingIntervals { hash: 5, state: 20 };
+
+fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+fn cube(x: f32, y: f32) -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, y, 0.0)
+}
+
+fn ground() -> Body {
+    Body::fixed().shape(Shape::cuboid(50.0, 0.5, 50.0)).position(0.0, -0.5, 0.0)
+}
+
+fn towers() -> World {
+    let mut world = World::new();
+    world.add(ground());
+    for i in 0..15 {
+        world.add(cube(3.0 * (i / 5) as f32, 0.5 + (i % 5) as f32));
+    }
+    world
+}
+
+/// Steps a world 120 times and changes it in every way on its way; the recording, and the simulation at its end.
+fn recorded() -> (Vec<u8>, Simulation) {
+    let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
+    let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+    let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
+    let mut kept = None;
+    for step in 0..120 {
+        let world = &mut simulation.world;
+        match step {
+            5 => drop(world.remove(world.bodies.handle(3).expect("a cube"))),
+            10 => drop(world.insert(cube(0.1, 8.0).named("new"))),
+            11 => drop(world.insert(Body::dynamic().shape(Shape::ball(0.4)).position(3.0, 9.0, 0.1))),
+            15 => world.bodies[7].linear_velocity = Vec3::new(2.0, 1.0, 0.0),
+            20 => world.bodies[8].kind = BodyKind::Fixed,
+            25 => world.gravity = Vec3::new(1.0, -8.0, 0.0),
+            30 => drop(world.join(BallJoint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
+            35 => world.bodies[12].groups = Groups { membership: 2, filter: 3 },
+            40 => world.bodies[13].colliders[0].shape = Shape::ball(0.5),
+            45 => world.bodies[14].force = Vec3::new(0.0, 5e3, 0.0),
+            50 => simulation.set_config(simulation.config().clone().with(|c| c.substeps = 6)).expect("settings"),
+            55 => kept = Some(simulation.snapshot()),
+            62 => simulation.restore(kept.as_ref().expect("a state")),
+            70 => world.bodies[15].material.friction = 0.1,
+            75 => {
+                world.bodies[1].position += 2.0 * Vec3::Z;
+                world.bodies[1].rotation = Quat::from_rotation_y(0.3);
+            }
+            100 => simulation.wake(2),
+            _ => {}
+        }
+        let dt = if step % 7 == 3 { 0.5 * DT } else { DT };
+        recorder.step(&mut simulation, dt).expect("a step");
+    }
+    (recorder.finish(&mut simulation).expect("memory"), simulation)
+}
+
+#[test]
+fn a_replay_goes_the_same_way_on_any_backend_and_from_any_step() {
+    let (bytes, simulation) = recorded();
+    let backends: [fn() -> Box<dyn Backend>; 2] = [reference, || Box::new(Cpu::new())];
+    for backend in backends {
+        let mut replay = Replay::read(&bytes, backend()).expect("a recording");
+        assert_eq!((replay.title(), replay.len()), ("towers", 120));
+        let mut hashes = vec![replay.simulation().hash()];
+        while replay.step().expect("a step").is_some() {
+            hashes.push(replay.simulation().hash());
+        }
+        assert_eq!(replay.first_difference(), None);
+        assert_eq!((hashes.len(), hashes[120]), (121, simulation.hash()));
+        assert!((replay.time() - (103.0 + 0.5 * 17.0) / 60.0).abs() < 1e-4, "{}", replay.time());
+        for step in [60, 3, 61, 62, 63, 20, 0, 119, 120, 41, 40, 39, 500] {
+            replay.seek(step).expect("a step");
+            assert_eq!(replay.step_number(), step.min(120));
+            assert_eq!(replay.simulation().hash(), hashes[step.min(120) as usize], "step {step}");
+        }
+        assert_eq!(replay.first_difference(), None);
+    }
+}
+
+/// Makes a mistake in its 33rd step.
+struct Broken(Reference<f32>, u32);
+
+impl Backend for Broken {
+    fn name(&self) -> &'static str {
+        "broken"
+    }
+
+    fn adapter(&self) -> String {
+        "makes one mistake".into()
+    }
+
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
+        self.0.run(problem, passes)?;
+        self.1 += 1;
+        if self.1 == 33 {
+            problem.bodies[9].v[0] += 1e-6;
+        }
+        Ok(())
+    }
+}
+
+/// With a hash in every step the step and the body are those of the mistake. With one in every fifth step the mistake has spread by then.
+#[test]
+fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
+    for (hash, expected) in [(1, (33, 32, Some(9), 1)), (5, (35, 30, Some(6), 5))] {
+        let config = SolverConfig::default().without_sleep();
+        let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+        let intervals = RecordingIntervals { hash, ..INTERVALS };
+        let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
+        (0..50).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
+        let bytes = recorder.finish(&mut simulation).expect("memory");
+        let mut replay = Replay::read(&bytes, Box::new(Broken(Reference::new(), 0))).expect("a recording");
+        while replay.step().expect("a step").is_some() {}
+        let first = replay.first_difference().expect("a difference");
+        assert_eq!((first.step, first.agreed, first.body, first.bodies), expected);
+    }
+}
+
+#[test]
+fn what_is_no_whole_recording_is_refused_in_one_line() {
+    let mut simulation = Simulation::new(towers(), SolverConfig::default(), reference()).expect("a world");
+    let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
+    (0..8).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
+    let bytes = recorder.finish(&mut simulation).expect("memory");
+    let refusal = |bytes: &[u8]| match Replay::read(bytes, reference()) {
+        Ok(_) => panic!("it is refused"),
+        Err(e) => e.to_string(),
+    };
+    for end in (0..bytes.len()).step_by(7) {
+        let line = refusal(&bytes[..end]);
+        assert!(line.starts_with("a recording that cannot be replayed: ") && !line.contains('\n'), "{end}: {line}");
+    }
+    for place in (8..bytes.len()).step_by(11) {
+        let mut damaged = bytes.clone();
+        damaged[place] ^= 0x55;
+        assert!(refusal(&damaged).starts_with("a recording that cannot be replayed: "), "byte {place}");
+    }
+    assert!(refusal(b"{}").contains("these bytes are none"));
+}
+
+#[test]
+fn a_world_that_the_caller_leaves_alone_takes_few_bytes_a_step() {
+    let scene = Scene::find("pile", &["n=500".into()]).expect("a scene");
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("a world");
+    let rare = RecordingIntervals { hash: 1000, state: 1000 };
+    let mut recorder = Recorder::new(Vec::new(), "pile", &mut simulation, rare).expect("memory");
+    let begin = simulation.save().len();
+    (0..30).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
+    let bytes = recorder.finish(&mut simulation).expect("memory");
+    assert!(bytes.len() < begin + 30 * 64 + 1000, "{} bytes after {begin}", bytes.len());
+}
