@@ -434,7 +434,7 @@ fn equal_answers_of_different_shapes_go_by_index() {
         Body::fixed().shape(Shape::cuboid(half, half, half)).position(half - 0.5, 0.0, 0.0)
     };
     let bodies: Vec<_> = (0..40).map(|k| world.insert(cube(k))).collect();
-    for away in [5.0, 4096.5] {
+    for away in [5.0, 8.5, 10.5, 14.5, 33.0, 70.0, 4096.5] {
         let from = Vec3::new(-away, 0.25, 0.125);
         for (k, body) in bodies.iter().enumerate().step_by(7) {
             let is_left = |handle: drystone::BodyHandle, _: &Body| handle.index() >= k;
