@@ -181,12 +181,13 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
         bodies,
         masses,
+        torques,
         inertias,
         contacts,
         points,
@@ -206,6 +207,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
         ("params", bytemuck::bytes_of(params)),
         ("bodies", bytemuck::cast_slice(bodies)),
         ("masses", bytemuck::cast_slice(masses)),
+        ("torques", bytemuck::cast_slice(torques)),
         ("inertias", bytemuck::cast_slice(inertias)),
         ("contacts", bytemuck::cast_slice(contacts)),
         ("points", bytemuck::cast_slice(points)),

@@ -31,7 +31,7 @@ pub struct Interface {
 }
 
 /// The class of effort of each island, and which islands are heaps.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Effort {
     /// Body by body.
     classes: Vec<u8>,
@@ -65,6 +65,23 @@ pub struct Effort {
     /// The island whose root each body is.
     of_root: Vec<Island>,
 }
+
+crate::saved::state!(Effort {
+    classes,
+    calm_for,
+    restless,
+    restless_need,
+    heaps,
+    heaps_before,
+    heaps_change,
+    has_heaps,
+    heaps_in,
+    used,
+    any_above,
+    highest,
+    movable,
+    counts,
+} scratch { awake, islands, of_root });
 
 /// What bodies of one block have in common: their class, and whether they are of heaps.
 type Kind = (u8, bool);
@@ -136,8 +153,10 @@ impl Effort {
             && self.follow_islands(world, asleep, interfaces(), looks);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
-            let restless = config.sleep_speed..FALL * world.gravity.length();
-            self.restless.retain(|&body| restless.contains(&of_root[islands.root(body) as usize].fastest));
+            self.restless.retain(|&body| {
+                let restless = config.sleep_speed..FALL * world.gravity_on(body as usize).length();
+                restless.contains(&of_root[islands.root(body) as usize].fastest)
+            });
         }
         changed
     }

@@ -21,6 +21,8 @@ pub struct Edge {
     pub rank: u64,
 }
 
+crate::saved::fields!(Edge { a, b, color, rank });
+
 impl Edge {
     fn is_fixed(&self) -> bool {
         self.a == IMMOVABLE || self.b == IMMOVABLE
@@ -28,7 +30,7 @@ impl Edge {
 }
 
 /// The constraints that take part, in the order in which they are swept.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct Coloring {
     /// Indices of the edges, color by color.
     pub order: Vec<u32>,
@@ -38,6 +40,8 @@ pub struct Coloring {
     pub overflow: u32,
 }
 
+crate::saved::state!(Coloring { order, offsets, overflow });
+
 impl Coloring {
     /// Number of colors, the single ones of the overflow included.
     pub fn color_count(&self) -> usize {
@@ -46,11 +50,13 @@ impl Coloring {
 }
 
 /// Which colors each body is in.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct ConstraintGraph {
     /// One bit a color and body, for constraints of two movable bodies and for those with a fixed one.
     used: [Vec<u64>; 2],
 }
+
+crate::saved::cloned!(ConstraintGraph {} scratch { used });
 
 impl ConstraintGraph {
     /// Gives every edge a color; see [`Self::color_members`].

@@ -22,6 +22,7 @@
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
 //! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
+//! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
 //! | measure overlap, speed, drift | [`metrics`] |
@@ -60,6 +61,7 @@ pub mod queries;
 mod random;
 pub mod residuals;
 mod rest;
+mod saved;
 pub mod scenes;
 mod simulation;
 mod sleep;
@@ -80,7 +82,7 @@ pub use glam;
 pub use plan::StepPlan;
 pub use problem::StepProblem;
 pub use scenes::Scene;
-pub use simulation::{Simulation, SolvedManifold, SolvedPoint};
+pub use simulation::{Rollback, Simulation, Snapshot, SolvedManifold, SolvedPoint};
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
 

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use rayon::prelude::*;
@@ -48,12 +48,16 @@ impl Load {
 
     /// The interfaces of `world`, as those of [`Self::heaviest`], that are wanted by their upper bodies and their gaps (m).
     pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
-        let up = up(world);
-        let boxes = upright_boxes(world, up);
+        let ups: Vec<DMat3> = (0..world.world_count()).map(|part| up(world.gravity_of(part))).collect();
+        let up_of = |i: usize| ups[world.bodies.worlds()[i] as usize];
+        let boxes = upright_boxes(world, up_of);
         let ground = Ground::new(&boxes, world);
-        let gravity = world.gravity.as_dvec3().length();
-        let weight = |b: &Body| f64::from(b.mass.mass) * gravity;
-        let mut borne: Vec<f64> = world.bodies.iter().map(weight).collect();
+        // What rises presses on nothing below.
+        let weight = |(&part, b): (&u32, &Body)| {
+            let gravity = world.gravity_of(part as usize).as_dvec3().length();
+            f64::from(b.mass.mass) * gravity * f64::from(b.gravity_scale).max(0.0)
+        };
+        let mut borne: Vec<f64> = world.bodies.worlds().iter().zip(&world.bodies).map(weight).collect();
         let mut from_the_top: Vec<usize> =
             (0..boxes.len()).filter(|&i| world.bodies[i].kind == BodyKind::Dynamic && !boxes[i].is_empty()).collect();
         from_the_top.sort_by(|&i, &j| boxes[j].low.y.total_cmp(&boxes[i].low.y).then(i.cmp(&j)));
@@ -66,7 +70,7 @@ impl Load {
                 borne[lower] += force;
                 let gap = boxes[upper].low.y - boxes[lower].high.y;
                 if is_wanted(upper, gap) {
-                    let stress = stress(world, (&boxes, up), upper, lower, force, config);
+                    let stress = stress(world, (&boxes, up_of(upper)), upper, lower, force, config);
                     all.push(Self { upper, lower, force, stress, gap });
                 }
             }
@@ -130,9 +134,9 @@ fn inverse_mass_at(body: &Body, at: DVec3, normal: DVec3) -> f64 {
     1.0 / f64::from(body.mass.mass) + turn.dot(inverse_inertia * turn)
 }
 
-/// Rotation of the world that turns gravity to -Y.
-fn up(world: &World) -> DMat3 {
-    let up = -world.gravity.as_dvec3().normalize_or(DVec3::NEG_Y);
+/// Rotation of a world that turns its gravity to -Y.
+fn up(gravity: Vec3) -> DMat3 {
+    let up = -gravity.as_dvec3().normalize_or(DVec3::NEG_Y);
     DMat3::from_quat(glam::DQuat::from_rotation_arc(up, DVec3::Y))
 }
 
@@ -157,12 +161,12 @@ impl Box3 {
     }
 }
 
-/// The bounding box of each body, turned by `up`; empty without shapes. A half-space is as wide as the world.
-fn upright_boxes(world: &World, up: DMat3) -> Vec<Box3> {
-    let turn = up.as_mat3();
-    let rotation = glam::Quat::from_mat3(&turn);
+/// The bounding box of each body, turned by `up_of` its world; empty without shapes. A half-space is as wide as the world.
+fn upright_boxes(world: &World, up_of: impl Fn(usize) -> DMat3) -> Vec<Box3> {
     let empty = Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
-    let of = |b: &Body| {
+    let of = |(i, b): (usize, &Body)| {
+        let turn = up_of(i).as_mat3();
+        let rotation = glam::Quat::from_mat3(&turn);
         b.colliders.iter().fold(empty, |all, c| {
             let at = pose(turn * b.position, rotation * b.rotation) * pose(c.position, c.rotation);
             let (low, high) = if c.shape.is_half_space() {
@@ -174,7 +178,7 @@ fn upright_boxes(world: &World, up: DMat3) -> Vec<Box3> {
             Box3 { low: all.low.min(low), high: all.high.max(high) }
         })
     };
-    world.bodies.iter().map(of).collect()
+    world.bodies.iter().enumerate().map(of).collect()
 }
 
 /// How deep the searches go after one of a body's height found nothing that bears the body, in its heights. The last one has no end.
@@ -189,19 +193,20 @@ fn aabb(low: DVec3, high: DVec3) -> Aabb {
 /// The boxes of all bodies that have shapes, to be asked for those under a body of the same world.
 struct Ground<'a> {
     boxes: &'a [Box3],
-    /// The world of each body, and a tree over the boxes of each world.
+    /// The world of each body, and a tree over the boxes of each world with the bodies that its leaves stand for.
     worlds: &'a [u32],
-    trees: Vec<Bvh>,
+    trees: Vec<(Bvh, Vec<usize>)>,
 }
 
 impl<'a> Ground<'a> {
     fn new(boxes: &'a [Box3], world: &'a World) -> Self {
-        let tree = |own: &Vec<usize>| {
-            let has_box = own.iter().copied().filter(|&i| !boxes[i].is_empty());
-            let leaves = has_box.map(|i| (i, aabb(boxes[i].low, boxes[i].high)));
-            Bvh::from_iter(BvhBuildStrategy::Binned, leaves)
+        let tree = |mut own: Vec<usize>| {
+            own.retain(|&i| !boxes[i].is_empty());
+            // parry takes the leaves of a tree of one or two to be 0 and 1.
+            let leaves = own.iter().map(|&i| aabb(boxes[i].low, boxes[i].high)).enumerate();
+            (Bvh::from_iter(BvhBuildStrategy::Binned, leaves), own)
         };
-        Self { boxes, worlds: world.bodies.worlds(), trees: world.worlds().iter().map(tree).collect() }
+        Self { boxes, worlds: world.bodies.worlds(), trees: world.worlds().into_iter().map(tree).collect() }
     }
 
     /// The bodies that bear `upper`, with the areas by which they overlap it from above.
@@ -235,8 +240,8 @@ impl<'a> Ground<'a> {
         };
         let column = aabb(above.low.with_y(floor), above.high.with_y(middle));
         let lower = |i: &usize| *i != upper && self.boxes[*i].high.y < middle;
-        let tree = &self.trees[self.worlds[upper] as usize];
-        let near = tree.intersect_aabb(&column).map(|i| i as usize).filter(lower);
+        let (tree, own) = &self.trees[self.worlds[upper] as usize];
+        let near = tree.intersect_aabb(&column).map(|leaf| own[leaf as usize]).filter(lower);
         let mut below: Vec<_> = near.map(|i| (i, area(i))).filter(|s| s.1 > 0.0).collect();
         below.sort_unstable_by_key(|s| s.0);
         below
@@ -287,7 +292,7 @@ mod tests {
         for y in [1e12, 1.1e12, 1e20, 1.1e20] {
             world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0));
         }
-        let boxes = upright_boxes(&world, up(&world));
+        let boxes = upright_boxes(&world, |_| up(world.gravity));
         let ground = Ground::new(&boxes, &world);
         let (mut alone, mut deep) = (0, 0);
         for upper in 0..boxes.len() {
@@ -325,6 +330,23 @@ mod tests {
     }
 
     #[test]
+    fn a_world_has_loads_whatever_the_indices_of_its_bodies() {
+        let pair = |world: &mut World| {
+            let floor = crate::Shape::cuboid(1.0, 0.5, 1.0);
+            world.add(Body::fixed().shape(floor.clone()).position(0.0, -0.5, 0.0));
+            world.add(Body::dynamic().shape(floor).position(0.0, 0.5, 0.0));
+        };
+        let (mut one, mut world) = (World::new(), World::new());
+        pair(&mut one);
+        let gone = world.insert(Body::fixed());
+        pair(&mut world);
+        world.remove(gone);
+        world.beside(&one);
+        let loads = Load::all(&world, &SolverConfig::default(), |_, _| true);
+        assert_eq!(loads.iter().map(|load| (load.upper, load.lower)).collect::<Vec<_>>(), [(2, 1), (4, 3)]);
+    }
+
+    #[test]
     fn gravity_may_point_anywhere_and_a_floor_may_be_a_half_space() {
         let mut world = World::new();
         world.gravity = glam::Vec3::new(9.81, 0.0, 0.0);
@@ -335,6 +357,24 @@ mod tests {
         let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
         assert_eq!((load.upper, load.lower), (2, 1));
         assert!((load.force - 9810.0).abs() < 0.1);
+        let lowest = |world: &World| {
+            let loads = Load::all(world, &SolverConfig::default(), |_, _| true);
+            *loads.iter().find(|load| (load.upper, load.lower) == (1, 0)).expect("the floor bears")
+        };
+        world.bodies[2].gravity_scale = 3.0;
+        assert!((lowest(&world).force - 4.0 * 9810.0).abs() < 0.1);
+        // What rises presses on nothing.
+        world.bodies[2].gravity_scale = -1.0;
+        let load = lowest(&world);
+        assert!((load.force - 9810.0).abs() < 0.1);
+        // Each world has its own up.
+        let mut sideways = world.clone();
+        sideways.gravity = glam::Vec3::new(0.0, 0.0, 1.0);
+        sideways.beside(&world);
+        let loads = Load::all(&sideways, &SolverConfig::default(), |_, _| true);
+        let in_second: Vec<_> = loads.iter().filter(|load| load.upper > 2).collect();
+        assert_eq!(in_second.len(), 2);
+        assert!(in_second.iter().any(|of| of.force == load.force && of.stress == load.stress), "{loads:?}");
         world.gravity = glam::Vec3::ZERO;
         assert_eq!(Load::heaviest(&world, &SolverConfig::default()).map(|l| l.force), Some(0.0));
     }

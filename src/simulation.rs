@@ -1,6 +1,9 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod hash;
 mod manifolds;
+mod rollback;
+mod saved;
 mod stages;
 
 use crate::backend::cpu::Reference;
@@ -17,6 +20,8 @@ use crate::world::World;
 use stages::{Changes, Stages};
 
 pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use rollback::Rollback;
+pub use saved::Snapshot;
 
 /// A world that moves.
 ///
@@ -87,9 +92,14 @@ impl Simulation {
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
-        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateVelocities};
-        let forces =
-            |p: &&Pass| matches!(p.kernel, BeginChanges | IntegrateVelocities { .. } | IntegrateGyroscopic { .. });
+        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities};
+        let forces = |p: &&Pass| {
+            let Pass { kernel, .. } = p;
+            matches!(
+                kernel,
+                BeginChanges | IntegrateVelocities { .. } | IntegrateTorques { .. } | IntegrateGyroscopic { .. }
+            )
+        };
         let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);
         let first: Vec<_> = blocks
             .flat_map(|own| own.iter().take_while(forces).chain(own.iter().filter(|p| p.kernel == EndChanges)))

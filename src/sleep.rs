@@ -3,7 +3,7 @@
 //! Bodies that touch, or that a joint holds together, form an island. An island whose bodies were all slow for a while falls
 //! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
 //! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it, or when
-//! the caller changes the pose, velocity or force of one of its bodies, the pose of a body under it, or gravity. A body that
+//! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it. A body that
 //! touches nothing never sleeps. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
@@ -14,34 +14,41 @@ use crate::graph::Islands;
 use crate::world::{Body, BodyKind, World};
 
 /// The state of a body that a caller may change between two steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Snapshot {
     position: Vec3,
     rotation: Quat,
     linear_velocity: Vec3,
     angular_velocity: Vec3,
     force: Vec3,
+    torque: Vec3,
+    /// The gravity that it feels.
+    gravity: Vec3,
 }
 
+crate::saved::fields!(Snapshot { position, rotation, linear_velocity, angular_velocity, force, torque, gravity });
+
 impl Snapshot {
-    fn of(body: &Body) -> Self {
+    fn of(world: &World, i: usize) -> Self {
+        let body = &world.bodies[i];
         Self {
             position: body.position,
             rotation: body.rotation,
             linear_velocity: body.linear_velocity,
             angular_velocity: body.angular_velocity,
-            force: body.force,
+            force: body.whole_force(),
+            torque: body.whole_torque(),
+            gravity: world.gravity_on(i),
         }
     }
 }
 
 /// Which bodies sleep, and since when the others are slow.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Sleep {
     /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
     after: f32,
     speed: f32,
-    gravity: Vec3,
     /// Whether each body sleeps; empty if nothing ever does.
     asleep: Vec<bool>,
     /// The activity of each body for the detection; empty likewise.
@@ -59,6 +66,19 @@ pub struct Sleep {
     steps: u32,
 }
 
+crate::saved::state!(Sleep {
+    after,
+    speed,
+    asleep,
+    activity,
+    slow_for,
+    reach,
+    left,
+    next,
+    count,
+    steps,
+} scratch { islands });
+
 /// Islands are looked for in every so many steps.
 const EVERY: u32 = 8;
 
@@ -72,12 +92,11 @@ impl Sleep {
         Self {
             after: config.sleep_after,
             speed: config.sleep_speed,
-            gravity: world.gravity,
             asleep: vec![false; bodies],
             activity: vec![Activity::Awake; bodies],
             slow_for: vec![0.0; bodies],
             reach: world.bodies.iter().map(Body::reach).collect(),
-            left: world.bodies.iter().map(Snapshot::of).collect(),
+            left: (0..bodies).map(|i| Snapshot::of(world, i)).collect(),
             islands: Islands::default(),
             next: (0..bodies as u32).collect(),
             count: 0,
@@ -112,9 +131,8 @@ impl Sleep {
         self.reach.resize(bodies, 0.0);
         self.next.truncate(bodies);
         self.next.extend(self.next.len() as u32..bodies as u32);
-        let new = world.bodies[before.min(bodies)..].iter();
         self.left.truncate(bodies);
-        self.left.extend(new.map(Snapshot::of));
+        self.left.extend((before.min(bodies)..bodies).map(|i| Snapshot::of(world, i)));
         for &i in changed.iter().filter(|&&i| i < bodies) {
             self.slow_for[i] = 0.0;
             self.reach[i] = world.bodies[i].reach();
@@ -144,18 +162,16 @@ impl Sleep {
 
     /// Wakes what was changed since the last step, and what touches what moves by itself.
     pub fn before_step(&mut self, world: &World, detector: &Detector) {
-        let everything = std::mem::replace(&mut self.gravity, world.gravity) != world.gravity;
         for i in 0..self.asleep.len() {
             let body = &world.bodies[i];
-            let changed = || everything || self.left[i] != Snapshot::of(body);
-            if self.asleep[i] && changed() {
+            if self.asleep[i] && self.left[i] != Snapshot::of(world, i) {
                 self.wake(i);
             }
             self.activity[i] = match body.kind {
                 BodyKind::Dynamic if self.asleep[i] => Activity::Still,
                 BodyKind::Dynamic => Activity::Awake,
                 BodyKind::Kinematic if body.is_driven() => Activity::Moving,
-                _ if self.left[i] != Snapshot::of(body) => Activity::Moving,
+                _ if self.left[i] != Snapshot::of(world, i) => Activity::Moving,
                 _ => Activity::Still,
             };
         }
@@ -204,7 +220,7 @@ impl Sleep {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
             if body.kind != BodyKind::Dynamic {
-                self.left[i] = Snapshot::of(body);
+                self.left[i] = Snapshot::of(world, i);
             } else if !self.asleep[i] {
                 let speed = body.linear_velocity.length() + self.reach[i] * body.angular_velocity.length();
                 self.slow_for[i] = if speed < self.speed { self.slow_for[i] + dt } else { 0.0 };
@@ -248,7 +264,7 @@ impl Sleep {
             }
             let body = &mut world.bodies[i];
             (body.linear_velocity, body.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
-            self.left[i] = Snapshot::of(body);
+            self.left[i] = Snapshot::of(world, i);
             self.asleep[i] = true;
             self.activity[i] = Activity::Still;
             self.count += 1;

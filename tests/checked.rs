@@ -5,7 +5,7 @@ mod settings;
 
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::InertiaRow;
+use drystone::stages::problem::{InertiaRow, TorqueRow};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 use settings::set;
 
@@ -115,7 +115,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 37] = [
+    let cases: [(&str, Break); 38] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -132,6 +132,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[2]: bodies", |p, _| p.contacts[2].body_a = u32::MAX),
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
         ("joints[1]: bodies", |p, n| p.joints[1].body_b = n),
+        ("torques: 1, but", |p, _| p.torques.push(TorqueRow::NONE)),
         ("inertias[0]: body", |p, n| p.inertias[0].body = n),
         ("inertias[1]: body", |p, _| p.inertias[1] = InertiaRow { ..p.inertias[0] }),
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),

@@ -71,7 +71,10 @@ fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         _ => {}
     }
     let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
-    if kernel == (Kernel::IntegrateGyroscopic { from_start: false }) {
+    if matches!(
+        kernel,
+        Kernel::IntegrateTorques { from_start: false } | Kernel::IntegrateGyroscopic { from_start: false }
+    ) {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
     }

@@ -1,14 +1,34 @@
 //! Worlds whose bodies come and go while they move.
 
+#[macro_use]
+mod common;
+
 use drystone::glam::{Quat, Vec3};
 use drystone::{
     Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Groups, Reference, Shape, Simulation, SolverConfig, World,
 };
 
+use common::Open;
+
 const DT: f32 = 1.0 / 60.0;
 
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
+tests! {
+    every_backend {
+        a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else,
+        a_body_that_comes_lands_and_rests_on_what_sleeps,
+        a_body_in_the_place_of_another_is_another_body,
+        kinds_and_shapes_change_between_steps,
+        a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse,
+        bodies_meet_only_those_of_their_groups,
+    }
+    no_gpu {
+        bodies_come_and_go_in_one_of_several_worlds,
+        a_pyramid_of_which_bricks_are_replaced_stands,
+        a_world_in_which_bodies_come_and_go_for_long_does_not_grow,
+    }
+    exact_gpu {
+        what_comes_and_goes_has_the_same_bits_everywhere,
+    }
 }
 
 fn cpu() -> Box<dyn Backend> {
@@ -38,8 +58,8 @@ fn towers(count: usize) -> (World, Vec<Vec<BodyHandle>>) {
     (world, towers)
 }
 
-fn simulation(world: &World, config: &SolverConfig, backend: fn() -> Box<dyn Backend>) -> Simulation {
-    Simulation::new(world.clone(), config.clone(), backend()).expect("a good world")
+fn simulation(world: &World, config: &SolverConfig, open: Open) -> Simulation {
+    Simulation::new(world.clone(), config.clone(), open()).expect("a good world")
 }
 
 fn bits(body: &Body) -> [u32; 13] {
@@ -49,111 +69,97 @@ fn bits(body: &Body) -> [u32; 13] {
 }
 
 /// What lies on a body falls when the body goes, and what the body does not touch does not see it, to the last bit.
-#[test]
-fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else() {
+fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else(open: Open) {
     for config in [SolverConfig::default(), SolverConfig::default().without_sleep()] {
-        for backend in [reference, cpu] {
-            let (world, towers) = towers(3);
-            let mut changed = simulation(&world, &config, backend);
-            let mut unchanged = simulation(&world, &config, backend);
-            run(&mut changed, 120);
-            run(&mut unchanged, 120);
-            assert_eq!(changed.is_asleep(towers[0][0].index()), config.sleep_after > 0.0);
-            let lowest = changed.world.remove(towers[1][0]).expect("a cube");
-            assert!((lowest.position.y - 0.5).abs() < 1e-3);
-            for step in 0..90 {
-                run(&mut changed, 1);
-                run(&mut unchanged, 1);
-                for cube in towers[0].iter().chain(&towers[2]).map(|cube| cube.index()) {
-                    assert_eq!(bits(&changed.world.bodies[cube]), bits(&unchanged.world.bodies[cube]), "step {step}");
-                }
+        let (world, towers) = towers(3);
+        let mut changed = simulation(&world, &config, open);
+        let mut unchanged = simulation(&world, &config, open);
+        run(&mut changed, 120);
+        run(&mut unchanged, 120);
+        assert_eq!(changed.is_asleep(towers[0][0].index()), config.sleep_after > 0.0);
+        let lowest = changed.world.remove(towers[1][0]).expect("a cube");
+        assert!((lowest.position.y - 0.5).abs() < 1e-3);
+        for step in 0..90 {
+            run(&mut changed, 1);
+            run(&mut unchanged, 1);
+            for cube in towers[0].iter().chain(&towers[2]).map(|cube| cube.index()) {
+                assert_eq!(bits(&changed.world.bodies[cube]), bits(&unchanged.world.bodies[cube]), "step {step}");
             }
-            for (level, cube) in towers[1].iter().skip(1).enumerate() {
-                let fell = changed.world.body(*cube).expect("a cube").position.y;
-                assert!((fell - (0.5 + level as f32)).abs() < 2e-3, "{level} is at {fell}");
-            }
-            assert!(changed.world.body(towers[1][0]).is_none() && changed.world.remove(towers[1][0]).is_none());
         }
+        for (level, cube) in towers[1].iter().skip(1).enumerate() {
+            let fell = changed.world.body(*cube).expect("a cube").position.y;
+            assert!((fell - (0.5 + level as f32)).abs() < 2e-3, "{level} is at {fell}");
+        }
+        assert!(changed.world.body(towers[1][0]).is_none() && changed.world.remove(towers[1][0]).is_none());
     }
 }
 
-#[test]
-fn a_body_that_comes_lands_and_rests_on_what_sleeps() {
-    for backend in [reference, cpu] {
-        let (world, towers) = towers(2);
-        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
-        run(&mut simulation, 120);
-        assert!(simulation.is_asleep(towers[0][0].index()));
-        let new = simulation.world.insert(cube(0.0, 7.0));
-        run(&mut simulation, 240);
-        let landed = simulation.world.body(new).expect("the cube").position;
-        assert!((landed.y - 5.5).abs() < 2e-3 && landed.x.abs() < 0.02, "{landed}");
-        assert!(simulation.is_asleep(new.index()));
-        assert!(simulation.manifolds().any(|m| [m.body_a, m.body_b].contains(&new.index())));
-    }
+fn a_body_that_comes_lands_and_rests_on_what_sleeps(open: Open) {
+    let (world, towers) = towers(2);
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 120);
+    assert!(simulation.is_asleep(towers[0][0].index()));
+    let new = simulation.world.insert(cube(0.0, 7.0));
+    run(&mut simulation, 240);
+    let landed = simulation.world.body(new).expect("the cube").position;
+    assert!((landed.y - 5.5).abs() < 2e-3 && landed.x.abs() < 0.02, "{landed}");
+    assert!(simulation.is_asleep(new.index()));
+    assert!(simulation.manifolds().any(|m| [m.body_a, m.body_b].contains(&new.index())));
 }
 
 /// The vacancy is filled at once: the new body begins without contacts and impulses of the one before.
-#[test]
-fn a_body_in_the_place_of_another_is_another_body() {
-    for backend in [reference, cpu] {
-        let (world, towers) = towers(2);
-        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
-        run(&mut simulation, 120);
-        let gone = towers[0][4];
-        simulation.world.remove(gone);
-        let new = simulation.world.insert(cube(20.0, 30.0));
-        assert_eq!(new.index(), gone.index());
-        assert!(new != gone && simulation.world.body(gone).is_none());
-        run(&mut simulation, 1);
-        let body = simulation.world.body(new).expect("the cube");
-        assert!((body.linear_velocity.y + 9.81 * DT).abs() < 1e-5, "{}", body.linear_velocity);
-        assert!(simulation.manifolds().all(|m| ![m.body_a, m.body_b].contains(&new.index())));
-        run(&mut simulation, 240);
-        assert!((simulation.world.body(new).expect("the cube").position.y - 0.5).abs() < 2e-3);
-        assert!((simulation.world.body(towers[0][3]).expect("a cube").position.y - 3.5).abs() < 2e-3);
-    }
+fn a_body_in_the_place_of_another_is_another_body(open: Open) {
+    let (world, towers) = towers(2);
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 120);
+    let gone = towers[0][4];
+    simulation.world.remove(gone);
+    let new = simulation.world.insert(cube(20.0, 30.0));
+    assert_eq!(new.index(), gone.index());
+    assert!(new != gone && simulation.world.body(gone).is_none());
+    run(&mut simulation, 1);
+    let body = simulation.world.body(new).expect("the cube");
+    assert!((body.linear_velocity.y + 9.81 * DT).abs() < 1e-5, "{}", body.linear_velocity);
+    assert!(simulation.manifolds().all(|m| ![m.body_a, m.body_b].contains(&new.index())));
+    run(&mut simulation, 240);
+    assert!((simulation.world.body(new).expect("the cube").position.y - 0.5).abs() < 2e-3);
+    assert!((simulation.world.body(towers[0][3]).expect("a cube").position.y - 3.5).abs() < 2e-3);
 }
 
-#[test]
-fn kinds_and_shapes_change_between_steps() {
-    for backend in [reference, cpu] {
-        let (world, towers) = towers(3);
-        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
-        run(&mut simulation, 120);
-        let body =
-            |s: &Simulation, tower: usize, level: usize| s.world.body(towers[tower][level]).expect("a cube").clone();
-        // The second from below hangs in the air when the lowest goes.
-        simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Fixed;
-        simulation.world.remove(towers[0][0]);
-        // The lowest becomes half as high.
-        let low = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5));
-        let lowest = simulation.world.body_mut(towers[1][0]).expect("a cube");
-        (lowest.colliders, lowest.mass) = (low.colliders, low.mass);
-        // The ground is a belt.
-        run(&mut simulation, 120);
-        for level in 1..5 {
-            let y = body(&simulation, 0, level).position.y;
-            assert!((y - 0.5 - level as f32).abs() < 2e-3, "{level}: {y}");
-            let y = body(&simulation, 1, level).position.y;
-            assert!((y - level as f32).abs() < 3e-3, "{level}: {y}");
-        }
-        assert!((body(&simulation, 1, 0).position.y - 0.25).abs() < 2e-3);
-        simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Dynamic;
-        run(&mut simulation, 120);
-        assert!((body(&simulation, 0, 1).position.y - 0.5).abs() < 2e-3);
-        assert!((body(&simulation, 0, 4).position.y - 3.5).abs() < 2e-3);
-        assert!((body(&simulation, 2, 4).position.y - 4.5).abs() < 2e-3);
+fn kinds_and_shapes_change_between_steps(open: Open) {
+    let (world, towers) = towers(3);
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 120);
+    let body = |s: &Simulation, tower: usize, level: usize| s.world.body(towers[tower][level]).expect("a cube").clone();
+    // The second from below hangs in the air when the lowest goes.
+    simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Fixed;
+    simulation.world.remove(towers[0][0]);
+    // The lowest becomes half as high.
+    let low = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5));
+    let lowest = simulation.world.body_mut(towers[1][0]).expect("a cube");
+    (lowest.colliders, lowest.mass) = (low.colliders, low.mass);
+    // The ground is a belt.
+    run(&mut simulation, 120);
+    for level in 1..5 {
+        let y = body(&simulation, 0, level).position.y;
+        assert!((y - 0.5 - level as f32).abs() < 2e-3, "{level}: {y}");
+        let y = body(&simulation, 1, level).position.y;
+        assert!((y - level as f32).abs() < 3e-3, "{level}: {y}");
     }
+    assert!((body(&simulation, 1, 0).position.y - 0.25).abs() < 2e-3);
+    simulation.world.body_mut(towers[0][1]).expect("a cube").kind = BodyKind::Dynamic;
+    run(&mut simulation, 120);
+    assert!((body(&simulation, 0, 1).position.y - 0.5).abs() < 2e-3);
+    assert!((body(&simulation, 0, 4).position.y - 3.5).abs() < 2e-3);
+    assert!((body(&simulation, 2, 4).position.y - 4.5).abs() < 2e-3);
 }
 
 /// Each copy of a world goes the way of the world alone, whatever comes and goes in the others.
-#[test]
 fn bodies_come_and_go_in_one_of_several_worlds() {
     let (alone, towers) = towers(1);
     let mut all = alone.clone();
     for _ in 0..2 {
-        all.beside(&alone).expect("the same gravity");
+        all.beside(&alone);
     }
     let each = alone.bodies.len();
     let mut one = simulation(&alone, &SolverConfig::default(), cpu);
@@ -176,37 +182,31 @@ fn bodies_come_and_go_in_one_of_several_worlds() {
     assert!(heights.iter().zip([4.5, 5.5, 5.5]).all(|(y, at)| (y - at).abs() < 3e-3), "{heights:?}");
 }
 
-#[test]
-fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse() {
-    for backend in [reference, cpu] {
-        let mut world = World::new();
-        let link = |y: f32| Body::dynamic().shape(Shape::cuboid(0.1, 0.25, 0.1)).position(0.0, y, 0.0);
-        let end = 0.25 * Vec3::Y;
-        let links: Vec<_> = (0..4).map(|k| world.insert(link(-0.25 - 0.5 * k as f32))).collect();
-        world.join(BallJoint::to_world(links[0].index(), end, Vec3::ZERO));
-        let joints: Vec<_> = links
-            .windows(2)
-            .map(|w| world.insert_joint(BallJoint::new(w[0].index(), -end, w[1].index(), end)))
-            .collect();
-        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
-        run(&mut simulation, 120);
-        let weight = simulation.joint_impulses()[0].y;
-        simulation.world.remove(links[2]);
-        assert!(simulation.world.joint(joints[0]).is_some() && simulation.world.joint(joints[1]).is_none());
-        assert_eq!(simulation.world.joints.len(), 2);
-        run(&mut simulation, 60);
-        // Two links of four are left on the first joint.
-        assert!((simulation.joint_impulses()[0].y / weight - 0.5).abs() < 0.01);
-        let new = simulation.world.insert(link(-1.25));
-        simulation.world.join(BallJoint::new(links[1].index(), -end, new.index(), end));
-        run(&mut simulation, 120);
-        assert!((simulation.joint_impulses()[0].y / weight - 0.75).abs() < 0.01);
-        assert!(simulation.world.joint_gap() < 1e-3);
-    }
+fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(open: Open) {
+    let mut world = World::new();
+    let link = |y: f32| Body::dynamic().shape(Shape::cuboid(0.1, 0.25, 0.1)).position(0.0, y, 0.0);
+    let end = 0.25 * Vec3::Y;
+    let links: Vec<_> = (0..4).map(|k| world.insert(link(-0.25 - 0.5 * k as f32))).collect();
+    world.join(BallJoint::to_world(links[0].index(), end, Vec3::ZERO));
+    let joints: Vec<_> =
+        links.windows(2).map(|w| world.insert_joint(BallJoint::new(w[0].index(), -end, w[1].index(), end))).collect();
+    let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), open);
+    run(&mut simulation, 120);
+    let weight = simulation.joint_impulses()[0].y;
+    simulation.world.remove(links[2]);
+    assert!(simulation.world.joint(joints[0]).is_some() && simulation.world.joint(joints[1]).is_none());
+    assert_eq!(simulation.world.joints.len(), 2);
+    run(&mut simulation, 60);
+    // Two links of four are left on the first joint.
+    assert!((simulation.joint_impulses()[0].y / weight - 0.5).abs() < 0.01);
+    let new = simulation.world.insert(link(-1.25));
+    simulation.world.join(BallJoint::new(links[1].index(), -end, new.index(), end));
+    run(&mut simulation, 120);
+    assert!((simulation.joint_impulses()[0].y / weight - 0.75).abs() < 0.01);
+    assert!(simulation.world.joint_gap() < 1e-3);
 }
 
 /// A brick is taken out and put back every tenth step: the pyramid stands, because all other contacts keep their impulses.
-#[test]
 fn a_pyramid_of_which_bricks_are_replaced_stands() {
     let mut world = World::new();
     world.add(ground());
@@ -233,7 +233,6 @@ fn a_pyramid_of_which_bricks_are_replaced_stands() {
 }
 
 /// Places are used again, so that nothing grows.
-#[test]
 fn a_world_in_which_bodies_come_and_go_for_long_does_not_grow() {
     let mut world = World::new();
     world.add(ground());
@@ -260,23 +259,60 @@ fn a_world_in_which_bodies_come_and_go_for_long_does_not_grow() {
 }
 
 /// The ghost falls through the tower and lands on the ground, and a cube that becomes a ghost falls through what it lay on.
-#[test]
-fn bodies_meet_only_those_of_their_groups() {
-    for backend in [reference, cpu] {
-        let (mut world, towers) = towers(1);
-        let (solid, ghost) = (Groups { membership: 1, filter: 1 }, Groups { membership: 2, filter: 2 });
-        world.bodies.iter_mut().skip(1).for_each(|body| body.groups = solid);
-        let falling = world.insert(cube(0.0, 8.0).groups(ghost));
-        let mut simulation = simulation(&world, &SolverConfig::default(), backend);
-        run(&mut simulation, 180);
-        let height = |s: &Simulation, body: BodyHandle| s.world.body(body).expect("a cube").position.y;
-        assert!((height(&simulation, falling) - 0.5).abs() < 2e-3);
-        assert!((height(&simulation, towers[0][4]) - 4.5).abs() < 2e-3);
-        simulation.world.body_mut(towers[0][4]).expect("a cube").groups = ghost;
-        run(&mut simulation, 180);
-        assert!((height(&simulation, towers[0][4]) - 1.5).abs() < 2e-3, "{}", height(&simulation, towers[0][4]));
-        assert!((height(&simulation, towers[0][3]) - 3.5).abs() < 2e-3);
+fn bodies_meet_only_those_of_their_groups(open: Open) {
+    let (mut world, towers) = towers(1);
+    let (solid, ghost) = (Groups { membership: 1, filter: 1 }, Groups { membership: 2, filter: 2 });
+    world.bodies.iter_mut().skip(1).for_each(|body| body.groups = solid);
+    let falling = world.insert(cube(0.0, 8.0).groups(ghost));
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 180);
+    let height = |s: &Simulation, body: BodyHandle| s.world.body(body).expect("a cube").position.y;
+    assert!((height(&simulation, falling) - 0.5).abs() < 2e-3);
+    assert!((height(&simulation, towers[0][4]) - 4.5).abs() < 2e-3);
+    simulation.world.body_mut(towers[0][4]).expect("a cube").groups = ghost;
+    run(&mut simulation, 180);
+    assert!((height(&simulation, towers[0][4]) - 1.5).abs() < 2e-3, "{}", height(&simulation, towers[0][4]));
+    assert!((height(&simulation, towers[0][3]) - 3.5).abs() < 2e-3);
+}
+
+/// Cubes come, go, change kind, shape and groups, and joints with them: reference, lanes on one thread and on three, and the GPU in exact mode.
+fn what_comes_and_goes_has_the_same_bits_everywhere() {
+    let opens: [Open; 3] =
+        [|| Box::new(Reference::<f32>::new()), cpu, || Box::new(common::gpu::exact()) as Box<dyn Backend>];
+    let end = |open: Open| {
+        let (world, towers) = towers(3);
+        let mut simulation = simulation(&world, &SolverConfig::default(), open);
+        let mut all: Vec<BodyHandle> = towers.concat();
+        let mut states = Vec::new();
+        for round in 0..24_usize {
+            run(&mut simulation, 5);
+            let world = &mut simulation.world;
+            let chosen = all[round * 7 % all.len()];
+            match round % 6 {
+                0 => drop(world.remove(all.remove(round * 5 % all.len()))),
+                1 => all.push(world.insert(cube(3.0 * (round % 3) as f32 + 0.1, 7.0))),
+                2 => world.body_mut(chosen).expect("a cube").colliders[0].shape = Shape::ball(0.5),
+                3 => world.body_mut(chosen).expect("a cube").kind = BodyKind::Fixed,
+                4 => {
+                    let at = world.bodies[chosen.index()].position;
+                    world.join(BallJoint::to_world(chosen.index(), Vec3::ZERO, at + 0.1 * Vec3::X));
+                }
+                _ => world.body_mut(chosen).expect("a cube").groups = Groups { membership: 2, filter: 3 },
+            }
+            states.push(simulation.world.bodies.iter().map(bits).collect::<Vec<_>>());
+        }
+        run(&mut simulation, 5);
+        states.push(simulation.world.bodies.iter().map(bits).collect());
+        states
+    };
+    let expected = end(opens[0]);
+    for (k, open) in opens.into_iter().enumerate().skip(1) {
+        for (round, (states, expected)) in end(open).iter().zip(&expected).enumerate() {
+            assert!(states == expected, "backend {k}: round {round}");
+        }
     }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("a pool");
+    assert!(pool.install(|| end(cpu)) == expected);
 }
 
 /// The first pair of the world has no contact, and the rows of a contact that ended are free: other settings write no free rows.

@@ -10,6 +10,8 @@ struct Mass {
     acceleration: vec3f,
 }
 
+struct Torque { angular_acceleration: vec3f }
+
 struct Inertia { principal: vec3f, body: u32, inv_principal: vec3f, frame: vec4f }
 
 struct Contact {

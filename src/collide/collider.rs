@@ -5,7 +5,7 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use crate::world::{Body, BodyKind, Collider};
+use crate::world::{Body, BodyKind, Collider, Shape};
 
 /// How a body takes part in the detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub enum Activity {
     /// Can be pushed.
     Awake,
 }
+
+crate::saved::kinds!(Activity { Still, Moving, Awake });
 
 /// A collider with what the detection asks of it all the time.
 #[derive(Clone)]
@@ -50,6 +52,12 @@ impl ColliderInfo {
             reach: c.position.length() + c.shape.bounding_radius(),
             unbounded: c.shape.is_half_space(),
         }
+    }
+
+    /// A collider that is gone.
+    pub fn gone() -> Self {
+        let collider = Collider { shape: Shape::ball(1.0), position: Vec3::ZERO, rotation: Quat::IDENTITY };
+        Self::new(NO_BODY, &collider)
     }
 
     /// Marks a collider that is gone.
@@ -98,7 +106,9 @@ pub(super) struct BodyState {
     /// 0 if it is still, 1 if it moves by itself, 2 if it is awake.
     pub activity: f32,
     pub position: Vec3,
-    pub rest: [f32; 5],
+    /// Size of the gravity that it feels over that of its world; 0 if it cannot be pushed.
+    pub gravity_scale: f32,
+    pub rest: [f32; 4],
 }
 
 /// The row of a [`BodyState`] that begins with rotation and center.
@@ -153,7 +163,8 @@ impl BodyState {
             in_range: f32::from(in_range),
             activity: [0.0, 1.0, 2.0][activity as usize],
             position,
-            rest: [0.0; 5],
+            gravity_scale: if body.kind == BodyKind::Dynamic { body.gravity_scale.abs() } else { 0.0 },
+            rest: [0.0; 4],
         }
     }
 }
@@ -166,7 +177,7 @@ pub(super) const FARTHEST: f32 = 1e15;
 pub(super) struct Margins {
     pub speculative: f32,
     pub recycle: f32,
-    /// How far gravity moves a body in one step (m).
+    /// How far gravity moves any body of the world in one step (m); with a gravity scale of 1 at least.
     pub fall: f32,
     pub dt: f32,
 }

@@ -10,12 +10,14 @@ use super::pair::Pair;
 use super::pairs::Placed;
 use super::places::Places;
 use super::report::{Change, DetectStats};
+use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
+use crate::error::{Result, ensure, input};
+use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, Groups, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
-#[derive(Clone)]
 pub struct Detector {
     worlds: Vec<WorldContacts>,
     /// The bodies that it knows, by their indices.
@@ -23,9 +25,15 @@ pub struct Detector {
     kinds: Vec<BodyKind>,
     groups: Vec<Groups>,
     moving: Vec<BodyState>,
+    /// Where the last step left each body.
+    left: Vec<Left>,
+    /// How far gravity moves a body in one step, in each world (m).
+    falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
 }
+
+crate::saved::cloned!(Detector { worlds, known, kinds, groups, left, jointed } scratch { moving, falls });
 
 /// A body as the detector knows it.
 #[derive(Clone, Copy, Default)]
@@ -36,6 +44,8 @@ struct KnownBody {
     colliders: ColliderRange,
 }
 
+crate::saved::fields!(KnownBody { generation, world, colliders });
+
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
     let apart = world.joints.iter().filter(|joint| !joint.collide);
@@ -43,6 +53,37 @@ fn jointed(world: &World) -> HashSet<(u32, u32)> {
 }
 
 impl Detector {
+    /// Writes all that lasts, or reads it: for the bodies of `world`.
+    pub(crate) fn walk<A: Archive>(&mut self, world: &World, archive: &mut A) -> Result<()> {
+        let mut are_of_world: Vec<bool> = Vec::new();
+        if !A::READS {
+            let is_of_world = |(i, known): (usize, &KnownBody)| {
+                world.bodies.get(i).is_some_and(|body| self.has_shapes_of(i, *known, body))
+            };
+            are_of_world.extend(self.known.iter().enumerate().map(is_of_world));
+        }
+        let Self { worlds, known, kinds, groups, moving: _, left, falls: _, jointed } = self;
+        known.walk(archive)?;
+        are_of_world.walk(archive)?;
+        kinds.walk(archive)?;
+        groups.walk(archive)?;
+        left.walk(archive)?;
+        jointed.walk(archive)?;
+        worlds.walk(archive)?;
+        if A::READS {
+            let count = known.len();
+            ensure(are_of_world.len() == count && kinds.len() == count && groups.len() == count, || {
+                format!("not all is there of {count} bodies")
+            })?;
+            for (i, (known, is_of_world)) in known.iter().zip(are_of_world).enumerate() {
+                let own = world.bodies.get(i).filter(|_| is_of_world).map(|body| &body.colliders[..]);
+                let part = worlds.get_mut(known.world as usize);
+                part.ok_or_else(|| input!("body {i} is of no world"))?.place(i as u32, known.colliders, own)?;
+            }
+        }
+        Ok(())
+    }
+
     /// A detector for the bodies of `world` as they are now.
     pub fn new(world: &World) -> Self {
         let mut detector = Self {
@@ -51,6 +92,8 @@ impl Detector {
             kinds: Vec::new(),
             groups: Vec::new(),
             moving: Vec::new(),
+            left: Vec::new(),
+            falls: Vec::new(),
             jointed: jointed(world),
         };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
@@ -97,6 +140,20 @@ impl Detector {
         self.known.truncate(world.bodies.len());
         self.kinds.truncate(world.bodies.len());
         self.groups.truncate(world.bodies.len());
+        self.left.resize(world.bodies.len(), Left::default());
+        changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.left[i] = Left::of(&world.bodies[i]));
+    }
+
+    /// Ends the contacts of bodies that the caller put elsewhere since [`Self::note_left`].
+    pub fn end_teleported(&mut self, world: &World) {
+        if let Some(teleports) = Teleports::find(&self.left, &world.bodies) {
+            self.worlds.iter_mut().for_each(|part| teleports.end_contacts(&self.kinds, &mut part.pairs));
+        }
+    }
+
+    /// Notes where a step left the bodies.
+    pub fn note_left(&mut self, world: &World) {
+        world.bodies.par_iter().with_min_len(1024).map(Left::of).collect_into_vec(&mut self.left);
     }
 
     /// Takes over which bodies joints keep from colliding.
@@ -153,21 +210,24 @@ impl Detector {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        let margins = Margins {
-            speculative: config.speculative_margin,
-            recycle: config.recycle_distance,
-            fall: world.gravity.length() * dt * dt,
-            dt,
-        };
-        let input = DetectionInput {
-            margins,
+        self.falls.clear();
+        self.falls.resize(self.worlds.len(), 1.0);
+        for (state, &part) in self.moving.iter().zip(world.bodies.worlds()) {
+            let largest = &mut self.falls[part as usize];
+            *largest = largest.max(state.gravity_scale);
+        }
+        (0..).zip(&mut self.falls).for_each(|(part, fall)| *fall *= world.gravity_of(part).length() * dt * dt);
+        let margins =
+            |fall: f32| Margins { speculative: config.speculative_margin, recycle: config.recycle_distance, fall, dt };
+        let input = |fall: f32| DetectionInput {
+            margins: margins(fall),
             kinds: &self.kinds,
             groups: &self.groups,
             moving: &self.moving,
             activity,
             jointed: &self.jointed,
         };
-        let detected = self.worlds.par_iter_mut().map(|world| world.detect(&input));
+        let detected = self.worlds.par_iter_mut().zip(&self.falls).map(|(world, &fall)| world.detect(&input(fall)));
         detected.reduce(DetectStats::default, DetectStats::and)
     }
 }

@@ -24,6 +24,8 @@ pub struct ManifoldPoint {
     pub before: Option<u8>,
 }
 
+crate::saved::fields!(ManifoldPoint { anchor_a, anchor_b, r_a, r_b, separation, features, before });
+
 /// The slot of a manifold that has none yet.
 pub const NO_SLOT: u32 = u32::MAX;
 
@@ -44,6 +46,8 @@ pub struct Manifold {
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
 }
+
+crate::saved::fields!(Manifold { normal, subshapes, radius_a, radius_b, slot, points, count });
 
 impl Manifold {
     /// A manifold of at most four of the `candidates`.

@@ -21,6 +21,7 @@ mod query;
 mod report;
 mod reuse;
 mod solid;
+mod teleport;
 #[cfg(test)]
 mod testing;
 mod tree;

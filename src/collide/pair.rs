@@ -13,7 +13,7 @@ use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::random::mixed;
 
 /// Two colliders whose boxes overlap.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Pair {
     /// The body with the collider that reaches further.
     pub body_a: u32,
@@ -28,6 +28,8 @@ pub struct Pair {
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
 }
+
+crate::saved::state!(Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part });
 
 /// A collider, and where its body is.
 pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);

@@ -19,6 +19,8 @@ pub struct Placed {
     rest: f32,
 }
 
+crate::saved::fields!(Placed { rotation, center, rest });
+
 impl Placed {
     pub(super) fn of(body: &BodyState) -> Self {
         Self { rotation: body.rotation, center: body.center, rest: 0.0 }
@@ -26,7 +28,7 @@ impl Placed {
 }
 
 /// What the test reads of a pair: three rows of eight numbers, so that lanes can gather them.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Track {
     /// Half of the smallest side of the thinner collider (m).
@@ -44,6 +46,8 @@ pub(super) struct Track {
     /// Where the bodies were when the manifolds were computed.
     pub then: [Placed; 2],
 }
+
+crate::saved::fields!(Track { size, reach_b, predicted, unbounded, takes_part, rest, bodies, then });
 
 /// The predicted distance of a pair that was never computed.
 pub(super) const NEVER: f32 = f32::NEG_INFINITY;
@@ -65,11 +69,13 @@ impl Track {
 }
 
 /// Pairs, in the order in which they were found.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Pairs {
     all: Vec<Pair>,
     tracks: Vec<Track>,
 }
+
+crate::saved::state!(Pairs { all, tracks });
 
 /// Some pairs one after another.
 pub(super) struct PairChunk<'a> {
@@ -100,6 +106,17 @@ impl Pairs {
     pub fn swap_remove(&mut self, place: usize) -> Pair {
         self.tracks.swap_remove(place);
         self.all.swap_remove(place)
+    }
+
+    /// Ends the contacts of a pair, which is computed anew.
+    pub fn end(&mut self, place: usize) {
+        self.all[place].end();
+        self.tracks[place].predicted = NEVER;
+    }
+
+    /// Radius around the origin of body b of a pair that holds its collider (m).
+    pub fn reach_b(&self, place: usize) -> f32 {
+        self.tracks[place].reach_b
     }
 
     /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.

@@ -142,7 +142,18 @@ mod tests {
             let [v, w] = [self.vector(), self.vector() * 10.0_f32.powf(3.0 * self.next())];
             let activity = (1.49 * (self.next() + 1.0)) as u32 as f32;
             let [kinematic, in_range] = [self.next() > 0.8, self.next() > -0.95].map(f32::from);
-            BodyState { rotation, center: at, kinematic, v, w, in_range, activity, position: at, rest: [0.0; 5] }
+            BodyState {
+                rotation,
+                center: at,
+                kinematic,
+                v,
+                w,
+                in_range,
+                activity,
+                position: at,
+                gravity_scale: 1.0,
+                rest: [0.0; 4],
+            }
         }
 
         /// A little before a body was where it is.

@@ -27,7 +27,7 @@ const WAITING: usize = 64;
 const STRAYS: usize = 8;
 
 /// The tree, for as many boxes as it was last given.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Tree {
     /// The boxes by their indices, in the order of the leaves.
     order: Vec<u32>,
@@ -38,6 +38,8 @@ pub(super) struct Tree {
     /// How long leaves were, relative to their boxes, when those were arranged.
     arranged: f32,
 }
+
+crate::saved::cloned!(Tree { order, levels, arranged } scratch { before });
 
 /// Four boxes, side by side.
 #[derive(Clone, Copy)]

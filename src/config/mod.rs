@@ -114,6 +114,43 @@ pub struct SolverConfig {
     pub rules: ComparisonRules,
 }
 
+crate::saved::fields!(SolverConfig {
+    substeps,
+    max_substeps,
+    max_penetration,
+    max_penetration_share,
+    iterations,
+    relax,
+    method,
+    stabilization,
+    baumgarte,
+    slop,
+    relaxation,
+    tolerance,
+    contact_frequency,
+    contact_damping,
+    fixed_contact_frequency_ratio,
+    preload_rate,
+    push_limit,
+    friction,
+    friction_at,
+    friction_sweeps,
+    max_joint_gap_share,
+    joint_solver,
+    joint_frequency,
+    joint_damping,
+    warm_start,
+    restitution_threshold,
+    gyroscopic,
+    speculative_margin,
+    recycle_distance,
+    sleep_after,
+    sleep_speed,
+    fuse_colors_below,
+    max_colors,
+    rules,
+});
+
 /// Colors smaller than this share a workgroup, unless told otherwise.
 pub const FUSE_BELOW: u32 = 256;
 

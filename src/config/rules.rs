@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::names::named;
+use crate::saved::{fields, kinds};
 
 /// The friction rule of a setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,6 +21,8 @@ pub enum Friction {
     #[default]
     Disc,
 }
+
+kinds!(Friction { None, Box, Disc });
 
 /// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison [`ComparisonRules::slip_friction`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -49,6 +52,8 @@ pub enum FrictionAt {
     Manifold,
 }
 
+kinds!(FrictionAt { Points, Manifold });
+
 /// Order of normals and friction within a manifold.
 ///
 /// Over the standing scenes, overlap and speed at rest of both orders agree to a few percent. Towers drift a little less with
@@ -64,6 +69,8 @@ pub enum FrictionOrder {
     FrictionFirst,
 }
 
+kinds!(FrictionOrder { NormalsFirst, FrictionFirst });
+
 /// The impulse that is kept non-negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
@@ -76,6 +83,8 @@ pub enum Clamping {
     #[default]
     Accumulated,
 }
+
+kinds!(Clamping { PerCorrection, Accumulated });
 
 /// How the solver removes overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -90,6 +99,8 @@ pub enum Stabilization {
     #[default]
     Soft,
 }
+
+kinds!(Stabilization { None, Baumgarte, Soft });
 
 named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
 
@@ -107,6 +118,8 @@ pub enum JointSolver {
     Direct,
 }
 
+kinds!(JointSolver { Auto, Sweeps, Direct });
+
 named!(JointSolver { Auto = "auto", Sweeps = "sweeps", Direct = "direct", });
 
 /// Which sweeps of a substep solve friction.
@@ -121,6 +134,8 @@ pub enum FrictionSweeps {
     Relax,
 }
 
+kinds!(FrictionSweeps { All, Relax });
+
 /// How the sweeps of a substep follow each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
@@ -133,6 +148,8 @@ pub enum Method {
     /// fewest that gain anything.
     Accelerated,
 }
+
+kinds!(Method { Plain, Accelerated });
 
 named!(Method { Plain = "plain", Accelerated = "accelerated", });
 
@@ -151,6 +168,8 @@ pub struct ComparisonRules {
     /// How often a sweep visits a manifold before the next manifold, 1 to 16. With 2, fewer but longer sweeps are needed.
     pub manifold_passes: u8,
 }
+
+fields!(ComparisonRules { friction_order, slip_friction, clamping, manifold_passes });
 
 impl Default for ComparisonRules {
     fn default() -> Self {

@@ -1,5 +1,5 @@
-//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_gyroscopic`, `integrate_positions`,
-//! `begin_changes` and `end_changes`.
+//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_torques`, `integrate_gyroscopic`,
+//! `integrate_positions`, `begin_changes` and `end_changes`.
 //!
 //! In a block of short substeps the velocities of a body are changes since the step began, and [`Free`] holds the velocities from
 //! then: `from_start`. A short substep changes a velocity by little more than the rounding error of the velocity, but by much more
@@ -34,6 +34,22 @@ pub fn integrate_velocities<L: Lane>(
         body.v += warm_v;
         body.w += warm_w;
     }
+}
+
+/// Adds the angular acceleration of a torque.
+#[inline(always)]
+pub fn integrate_torque<L: Lane>(
+    from_start: bool,
+    params: &StepParams<L>,
+    angular_acceleration: Vec3<L>,
+    body: &mut Body<L>,
+    free: &mut Free<L>,
+) {
+    let turn = angular_acceleration * params.substep;
+    if !from_start {
+        free.w += turn;
+    }
+    body.w += turn;
 }
 
 /// Moves a body by its velocity.

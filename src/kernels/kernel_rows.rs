@@ -13,6 +13,8 @@ pub struct KernelRows<S> {
     pub bodies: Vec<Body<S>>,
     /// Their masses.
     pub masses: Vec<Mass<S>>,
+    /// Their angular accelerations by torques, if any has one.
+    pub torques: Vec<Vec3<S>>,
     /// Principal inertia of those whose moments differ.
     pub inertias: Vec<Inertia<S>>,
     /// Manifolds.
@@ -39,6 +41,7 @@ impl<S: Scalar> KernelRows<S> {
         refill(&problem.blocks, &mut self.params, |block| StepParams::load(&problem.params, &block.substep));
         refill(&problem.bodies, &mut self.bodies, Body::load);
         refill(&problem.masses, &mut self.masses, Mass::load);
+        refill(&problem.torques, &mut self.torques, |r| Vec3::load(r.angular_acceleration));
         refill(&problem.inertias, &mut self.inertias, Inertia::load);
         refill(&problem.contacts, &mut self.contacts, Contact::load);
         refill(&problem.points, &mut self.points, Point::load);

@@ -7,7 +7,7 @@ use crate::config::FrictionRule;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
     BodyRow, ContactRow, ContactSummary, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
-    MassRow, PointRow, StepProblem, TurningRow,
+    MassRow, PointRow, StepProblem, TorqueRow, TurningRow,
 };
 
 impl StepPlan {
@@ -47,6 +47,10 @@ impl Pass {
             Kernel::EndChanges => rows.len() * (2 * VELOCITIES + size_of::<FreeRow>()),
             Kernel::IntegratePositions { from_start } => {
                 rows.len() * (BODY + BODY / 2 + if from_start { size_of::<FreeRow>() } else { 0 })
+            }
+            Kernel::IntegrateTorques { from_start } => {
+                let free = if from_start { 0 } else { size_of::<FreeRow>() };
+                rows.len() * (2 * VELOCITIES + size_of::<TorqueRow>() + free)
             }
             Kernel::IntegrateGyroscopic { .. } => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
             Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),

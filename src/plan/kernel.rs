@@ -20,6 +20,11 @@ pub enum Kernel {
     BeginChanges,
     /// Changes become velocities; over bodies.
     EndChanges,
+    /// Torques; over bodies.
+    IntegrateTorques {
+        /// As of `IntegrateVelocities`.
+        from_start: bool,
+    },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic {
         /// As of `IntegrateVelocities`.
@@ -77,6 +82,7 @@ impl Kernel {
             Self::IntegrateVelocities { .. } => "integrate_velocities",
             Self::BeginChanges => "begin_changes",
             Self::EndChanges => "end_changes",
+            Self::IntegrateTorques { .. } => "integrate_torques",
             Self::IntegrateGyroscopic { .. } => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
             Self::TurnInertias => "turn_inertias",
@@ -104,6 +110,7 @@ impl Kernel {
             Self::IntegrateVelocities { .. }
                 | Self::BeginChanges
                 | Self::EndChanges
+                | Self::IntegrateTorques { .. }
                 | Self::IntegrateGyroscopic { .. }
                 | Self::IntegratePositions { .. }
                 | Self::TurnInertias
@@ -130,6 +137,7 @@ impl Kernel {
     pub fn is_from_start(self) -> bool {
         match self {
             Self::IntegrateVelocities { from_start, .. }
+            | Self::IntegrateTorques { from_start }
             | Self::IntegrateGyroscopic { from_start }
             | Self::IntegratePositions { from_start } => from_start,
             _ => self.rules().is_some_and(|rules| rules.from_start),

@@ -2,7 +2,7 @@
 //!
 //! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm stands here
 //! and nowhere else. A plan has no pass for a feature that its scene lacks: without friction no kernel has friction, and without
-//! restitution, unequal moments of inertia or joints there are no passes for these.
+//! restitution, torques, unequal moments of inertia or joints there are no passes for these.
 
 mod bytes;
 mod kernel;
@@ -48,33 +48,40 @@ struct Sweeps<'a> {
 const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct StepPlan {
     /// In order.
     pub passes: Vec<Pass>,
 }
 
+crate::saved::cloned!(StepPlan { passes });
+
 /// The properties of a problem that its plan depends on, besides the settings and the rows of contacts.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
+    has_torques: bool,
 }
+
+crate::saved::cloned!(PlanKey { colors, blocks, isotropic, has_torques });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         self.blocks == problem.blocks
             && self.colors == problem.colors
+            && self.has_torques != problem.torques.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic }
+        let has_torques = !problem.torques.is_empty();
+        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic, has_torques }
     }
 }
 
@@ -171,6 +178,9 @@ impl StepPlan {
         for substep in 0..substeps {
             let warm_start = carried && substep > 0;
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
+            if !problem.torques.is_empty() {
+                self.over_colors(Kernel::IntegrateTorques { from_start }, block, bodies);
+            }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints, block, &joints);
             self.over_colors(Kernel::WarmStartJoints, block, &direct);

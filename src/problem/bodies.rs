@@ -1,10 +1,12 @@
 //! The rows of bodies: from a world, and back to it.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
 use super::StepProblem;
-use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params};
+use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params, TorqueRow};
 use crate::config::{SolverConfig, Stabilization};
 use crate::effort::Effort;
 use crate::math::Lane;
@@ -37,22 +39,37 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
         BodyRow { v: velocity(b.linear_velocity), w: velocity(b.angular_velocity), ..BodyRow::AT_REST }
     };
     world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
-    let mass = |(i, b): (usize, &Body)| {
-        if b.kind != BodyKind::Dynamic || rests(i) {
+    let has_torques = AtomicBool::new(false);
+    let mass = |(index, b): (usize, &Body)| {
+        if b.kind != BodyKind::Dynamic || rests(index) {
             return MassRow::default();
         }
-        let heap = if effort.is_in_heap(i) { 1.0 } else { 0.0 };
+        if b.whole_torque() != Vec3::ZERO {
+            has_torques.store(true, Ordering::Relaxed);
+        }
+        let heap = if effort.is_in_heap(index) { 1.0 } else { 0.0 };
         let i = b.mass.world_inverse_inertia(b.rotation);
         MassRow {
             inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
             inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
             inv_mass: 1.0 / b.mass.mass,
             heap,
-            acceleration: (world.gravity + b.force / b.mass.mass).to_array(),
+            acceleration: (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array(),
             ..MassRow::default()
         }
     };
     world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
+    problem.torques.clear();
+    if has_torques.into_inner() {
+        let torque = |(i, b): (usize, &Body)| {
+            if b.kind != BodyKind::Dynamic || rests(i) || b.whole_torque() == Vec3::ZERO {
+                return TorqueRow::NONE;
+            }
+            let angular_acceleration = b.mass.world_inverse_inertia(b.rotation) * b.whole_torque();
+            TorqueRow { angular_acceleration: angular_acceleration.to_array(), ..TorqueRow::NONE }
+        };
+        problem.torques.extend(world.bodies.iter().enumerate().map(torque));
+    }
     problem.inertias.clear();
     if config.gyroscopic {
         let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic();
@@ -79,6 +96,7 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
         if body.kind == BodyKind::Fixed || asleep.get(i) == Some(&true) {
             return;
         }
+        body.forget_applied_forces();
         let center = body.center_of_mass() + Vec3::from_array(row.dp);
         body.rotation = (Quat::from_array(row.dq) * body.rotation).normalize();
         body.position = center - body.rotation * body.mass.center;

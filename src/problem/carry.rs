@@ -10,7 +10,7 @@ use super::softness::HEAP_STIFFNESS;
 use crate::math::{Lane, smaller};
 
 /// The changes since the last step, for a backend that has the rows of that step.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Carry {
     /// Whether the device has the rows of the step before, and they alone have its impulses and preloads. Else the problem
     /// is complete, and nothing else here counts.
@@ -24,6 +24,8 @@ pub struct Carry {
     /// The coefficients of the preloads.
     pub preload: Preload,
 }
+
+crate::saved::cloned!(Carry { on_device, written, approach, tangents, preload });
 
 /// A contact whose rows were written again, 8 B.
 #[repr(C)]

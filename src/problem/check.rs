@@ -68,6 +68,10 @@ impl StepProblem {
                 return refuse(format_args!("{name}: {rows}, but {wanted} {of}"));
             }
         }
+        let (torques, bodies) = (self.torques.len(), self.bodies.len());
+        if torques > 0 && torques != bodies {
+            return refuse(format_args!("torques: {torques}, but {bodies} bodies"));
+        }
         Ok(())
     }
 

@@ -20,7 +20,7 @@ use crate::stats::HardestContact;
 use crate::world::{Body, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct ContactRows {
     slots: Slots,
     graph: ConstraintGraph,
@@ -44,6 +44,26 @@ pub struct ContactRows {
     pub carry: Carry,
 }
 
+crate::saved::fields!(ContactRows {
+    slots,
+    coloring,
+    patches,
+    computed,
+    jams,
+    classes,
+    materials,
+} scratch { graph, poses, new_bodies, carry });
+crate::saved::cloned!(ContactRows {
+    slots,
+    coloring,
+    patches,
+    computed,
+    jams,
+    classes,
+    materials,
+    carry,
+} scratch { graph, poses, new_bodies });
+
 /// What the materials of a world have in common.
 #[derive(Clone, Copy, Debug)]
 struct Materials {
@@ -52,6 +72,8 @@ struct Materials {
     /// Whether any has more friction than [`LEAST_JAMMING`].
     may_jam: bool,
 }
+
+crate::saved::fields!(Materials { bounce, may_jam });
 
 impl Materials {
     fn of(world: &World) -> Self {

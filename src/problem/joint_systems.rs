@@ -6,7 +6,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 /// Connected sets of joints, each solved at once by S = L D Lᵀ, in blocks of 3 x 3.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct JointSystems {
     /// Where the nodes of each system begin, and where the last end.
     pub begins: Vec<u32>,
@@ -19,6 +19,8 @@ pub struct JointSystems {
     /// The products that are subtracted from a block: of a block of L with the transpose of a block of L D.
     pub terms: Vec<[u32; 2]>,
 }
+
+crate::saved::state!(JointSystems { begins, softness, nodes, blocks, terms });
 
 /// One joint of a system and its column of L, 16 B.
 #[repr(C)]
@@ -34,6 +36,8 @@ pub struct NodeRow {
     pub pad: u32,
 }
 
+crate::saved::fields!(NodeRow { joint, first_block, end_block, pad });
+
 /// One block of L, 16 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -47,6 +51,8 @@ pub struct BlockRow {
     /// One past its last product.
     pub end_term: u32,
 }
+
+crate::saved::fields!(BlockRow { node, shared, first_term, end_term });
 
 impl JointSystems {
     /// The nodes of a system.

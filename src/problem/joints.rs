@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::joint_loads::borne_masses;
 use super::lent_inertia::{LentInertia, lend_inertia};
-use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow};
+use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
@@ -15,7 +15,7 @@ use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
 use crate::world::{BallJoint, BodyKind, JointHandle, World};
 
 /// The joints that have rows, and their colors.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct JointRows {
     joints: Vec<BallJoint>,
     handles: Vec<JointHandle>,
@@ -29,14 +29,30 @@ pub struct JointRows {
     shares: Vec<f32>,
     /// The system of each joint that is solved directly, `SWEPT` of the others.
     systems: Vec<u32>,
-    /// Gravity and the length of a substep that the systems were chosen for.
-    chosen_for: Option<(Vec3, f32)>,
+    /// The length of a substep that the systems were chosen for; none if they are to be chosen.
+    chosen_for: Option<f32>,
+    /// The gravity that the bodies of joints felt then.
+    gravity: Vec<Vec3>,
     swept_gap: f32,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
 }
+
+crate::saved::state!(JointRows {
+    joints,
+    handles,
+    edges,
+    coloring,
+    is_colored,
+    shares,
+    systems,
+    chosen_for,
+    gravity,
+    swept_gap,
+    needs,
+} scratch { graph, lent });
 
 /// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
@@ -68,9 +84,15 @@ impl JointRows {
 
     /// Chooses the joints that are solved at once, unless they are chosen. `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
-        if self.chosen_for.replace((world.gravity, substep)) == Some((world.gravity, substep)) {
+        let is_chosen = self.chosen_for.replace(substep) == Some(substep);
+        let felt = || {
+            let bodies = self.joints.iter().flat_map(|joint| [Some(joint.body_a), joint.body_b]);
+            bodies.flatten().map(|body| world.gravity_on(body))
+        };
+        if is_chosen && self.gravity.iter().copied().eq(felt()) {
             return;
         }
+        self.gravity = felt().collect();
         problem.systems = JointSystems::default();
         self.systems.clear();
         self.systems.resize(self.joints.len(), SWEPT);
@@ -119,6 +141,7 @@ impl JointRows {
     fn gap_of_sweeps(&self, joints: &[u32], world: &World, config: &SolverConfig, substep: f32) -> f32 {
         let sides: Vec<_> = joints.iter().map(|&joint| self.sides(joint)).collect();
         let mass = |body: u32| world.bodies[body as usize].mass.mass;
+        let weight = |body: u32| mass(body) * world.bodies[body as usize].gravity_scale.abs();
         let omega = TAU * config.joint_frequency / substep;
         let gap = |(&joint, borne): (&u32, f32)| {
             let BallJoint { body_a, body_b, .. } = self.joints[joint as usize];
@@ -126,10 +149,11 @@ impl JointRows {
             let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
             let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
             let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
-            borne * world.gravity.length() * softness / (omega * omega * arms)
+            let gravity = world.gravity_of(world.bodies.worlds()[body_a] as usize).length();
+            borne * gravity * softness / (omega * omega * arms)
         };
         // A joint without arms has no length to be held against.
-        joints.iter().zip(borne_masses(&sides, mass)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
+        joints.iter().zip(borne_masses(&sides, weight)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
     }
 
     /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.
@@ -244,6 +268,9 @@ impl JointRows {
         if world.joints.iter().any(|j| j.body_b.is_none()) {
             problem.bodies.push(BodyRow::AT_REST);
             problem.masses.push(MassRow::default());
+            if !problem.torques.is_empty() {
+                problem.torques.push(TorqueRow::NONE);
+            }
             problem.params.body_count += 1;
         }
     }

@@ -30,15 +30,18 @@ pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TurningRow,
+    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
 };
 pub use summary::ContactSummary;
 
 use std::ops::Range;
 
+use crate::error::Result;
+use crate::saved::{Archive, Saved};
+
 /// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
 /// `joint_impulses`, `convergence`, `momentum`).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct StepProblem {
     /// The same for all.
     pub params: Params,
@@ -46,6 +49,8 @@ pub struct StepProblem {
     pub bodies: Vec<BodyRow>,
     /// Masses, one row a body.
     pub masses: Vec<MassRow>,
+    /// Angular accelerations by torques, one row a body; empty where no body has a torque.
+    pub torques: Vec<TorqueRow>,
     /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
     pub inertias: Vec<InertiaRow>,
     /// Manifolds, in slots that they keep as long as they last. Only those in `order` take part.
@@ -75,6 +80,64 @@ pub struct StepProblem {
     pub convergence: ConvergenceRow,
     /// How far the sweeps extrapolate.
     pub momentum: MomentumRow,
+}
+
+crate::saved::cloned!(StepProblem {
+    params,
+    bodies,
+    masses,
+    torques,
+    inertias,
+    contacts,
+    points,
+    impulses,
+    sags,
+    joints,
+    joint_impulses,
+    order,
+    colors,
+    blocks,
+    systems,
+    turning,
+    convergence,
+    momentum,
+});
+
+/// What the next step goes on from; it writes all else anew.
+impl Saved for StepProblem {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self {
+            params,
+            bodies: _,
+            masses: _,
+            torques: _,
+            inertias: _,
+            contacts,
+            points,
+            impulses,
+            sags,
+            joints: _,
+            joint_impulses,
+            order: _,
+            colors: _,
+            blocks: _,
+            systems,
+            turning: _,
+            convergence: _,
+            momentum: _,
+        } = self;
+        params.patches.walk(archive)?;
+        contacts.walk(archive)?;
+        points.walk(archive)?;
+        impulses.walk(archive)?;
+        sags.walk(archive)?;
+        joint_impulses.walk(archive)?;
+        systems.walk(archive)
+    }
 }
 
 impl StepProblem {

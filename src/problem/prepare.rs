@@ -42,6 +42,8 @@ pub(super) struct ComputedRow {
     separations: [f32; MAX_POINTS],
 }
 
+crate::saved::fields!(ComputedRow { apart, pad, rotation_a, rotation_b, separations });
+
 impl ComputedRow {
     pub fn of([a, b]: &[Placed; 2], manifold: &Manifold) -> Self {
         let mut separations = [0.0; MAX_POINTS];

@@ -16,6 +16,8 @@ pub struct StepScale {
     fixed_compliance: f32,
 }
 
+crate::saved::fields!(StepScale { substep, movable_compliance, fixed_compliance });
+
 impl StepScale {
     /// That of steps of `dt` seconds.
     pub fn new(config: &SolverConfig, dt: f32) -> Self {

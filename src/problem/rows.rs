@@ -69,6 +69,21 @@ pub struct MassRow {
     pub pad_end: f32,
 }
 
+/// What the torque on one body does, 16 B.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct TorqueRow {
+    /// Inverse inertia when the step begins times torque, world axes (rad/s²).
+    pub angular_acceleration: [f32; 3],
+    #[doc(hidden)]
+    pub pad: f32,
+}
+
+impl TorqueRow {
+    /// The row of a body without torque: negative zero changes no bit of what it is added to, not even of a negative zero.
+    pub const NONE: Self = Self { angular_acceleration: [-0.0; 3], pad: 0.0 };
+}
+
 /// Principal inertia of one body whose moments differ, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -118,6 +133,21 @@ pub struct ContactRow {
     pub substep_share: f32,
 }
 
+crate::saved::fields!(ContactRow {
+    normal,
+    friction,
+    tangent,
+    restitution,
+    body_a,
+    body_b,
+    first_point,
+    point_count,
+    radius_a,
+    radius_b,
+    preload,
+    substep_share,
+});
+
 impl ContactRow {
     /// A row of nothing but a normal and the tangents that belong to it.
     pub fn framed(normal: Vec3) -> Self {
@@ -154,6 +184,8 @@ pub struct PointRow {
     /// Component of the slip direction along the second tangent.
     pub slip_2: f32,
 }
+
+crate::saved::fields!(PointRow { r_a, separation, r_b, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 });
 
 /// The inverse inertia of a body of joints that are solved at once, when the step begins; it turns with the body, 32 B.
 #[repr(C)]
@@ -197,6 +229,8 @@ pub struct JointImpulseRow {
     pub pad: f32,
 }
 
+crate::saved::fields!(JointImpulseRow { linear, pad });
+
 /// Whether sweeps still move anything, 16 B. Written by the sweeps of a step that has a tolerance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -238,6 +272,8 @@ pub struct ImpulseRow {
     /// Largest normal impulse so far in this step.
     pub peak: f32,
 }
+
+crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, peak });
 
 /// Coefficients of a soft contact over one substep, 16 B. Derivation: [`super::softness`].
 #[repr(C)]

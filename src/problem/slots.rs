@@ -21,6 +21,8 @@ pub(super) enum Write {
     New,
 }
 
+crate::saved::kinds!(Write { Separations, Rows, Computed, New });
+
 /// One slot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
@@ -39,6 +41,8 @@ pub(super) struct Slot {
     pub need: f32,
 }
 
+crate::saved::fields!(Slot { world, pair, manifold, write, takes_part, size, need });
+
 const FREE: Slot =
     Slot { world: u32::MAX, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
 
@@ -50,7 +54,7 @@ impl Slot {
 }
 
 /// All slots, those that are free included.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Slots {
     pub all: Vec<Slot>,
     /// The edges that the graph colors, one a slot.
@@ -59,6 +63,8 @@ pub(super) struct Slots {
     /// How many were taken since all were sorted.
     taken: usize,
 }
+
+crate::saved::state!(Slots { all, edges, free, taken });
 
 impl Slots {
     /// Follows the detection: manifolds that began take a slot, those that ended leave theirs.

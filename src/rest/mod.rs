@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 
 use crate::config::{FrictionRule, SolverConfig, Stabilization};
 use crate::problem::{BodyRow, ContactRow, ContactRows, PointRow, StepProblem};
-use crate::world::World;
+use crate::world::{Body, World};
 use bearing::{Balance, Point, Wrench};
 
 /// Sine of the slope above which a contact does not bear: its normal rises by less.
@@ -34,7 +34,8 @@ pub(crate) fn begin(
     contacts: &ContactRows,
     problem: &mut StepProblem,
 ) -> Vec<u32> {
-    if !config.warm_start || world.gravity == Vec3::ZERO || !contacts.new_bodies().contains(&true) {
+    let is_weightless = (0..world.world_count()).all(|part| world.gravity_of(part) == Vec3::ZERO);
+    if !config.warm_start || is_weightless || !contacts.new_bodies().contains(&true) {
         return Vec::new();
     }
     let mut structure = Structure::new(world, config, substep, contacts, problem);
@@ -68,21 +69,30 @@ struct Structure {
     falls: Vec<bool>,
     /// Those of them that no forces balance, though they lie on bodies that can move.
     unbalanced: Vec<u32>,
-    /// How deep a body sags by its own weight in class 0 (m): so far apart may surfaces be that bear.
-    sag: f64,
+    /// How deep each body sags by its own weight in class 0 (m): so far apart may surfaces be that bear. Of bodies that gravity moves less than
+    /// others, how deep the others would.
+    sags: Vec<f64>,
     has_friction: bool,
 }
 
 impl Structure {
     fn new(world: &World, config: &SolverConfig, substep: f32, contacts: &ContactRows, problem: &StepProblem) -> Self {
         let bodies = problem.bodies.len();
-        let gravity = world.gravity.as_dvec3();
-        // Bodies that are slower are held by something: gravity makes them faster in a substep.
-        let slow = gravity.length() * f64::from(substep);
         let omega = TAU * f64::from(config.contact_frequency) / f64::from(substep);
-        let sag = gravity.length() / (omega * omega);
-        let mut bearings: Vec<Bearing> =
-            contacts.coloring.order.iter().filter_map(|&row| bearing(row, gravity, slow, problem)).collect();
+        let gravities: Vec<DVec3> = (0..world.world_count()).map(|part| world.gravity_of(part).as_dvec3()).collect();
+        let gravity_at = |body: u32| gravities.get(*world.bodies.worlds().get(body as usize)? as usize).copied();
+        let sag_of = |(&part, body): (&u32, &Body)| {
+            let gravity = gravities[part as usize].length() * f64::from(body.gravity_scale.abs().max(1.0));
+            gravity / (omega * omega)
+        };
+        let sags = world.bodies.worlds().iter().zip(&world.bodies).map(sag_of).collect();
+        let bearing = |&row: &u32| {
+            let gravity =
+                gravity_at(problem.contacts[row as usize].body_a).filter(|gravity| *gravity != DVec3::ZERO)?;
+            // Bodies that are slower are held by something: gravity makes them faster in a substep.
+            bearing(row, gravity, gravity.length() * f64::from(substep), problem)
+        };
+        let mut bearings: Vec<Bearing> = contacts.coloring.order.iter().filter_map(bearing).collect();
         bearings.sort_unstable_by_key(|bearing| (bearing.upper, bearing.row));
         let mut bearings_of = vec![0; bodies + 1];
         bearings.iter().for_each(|bearing| bearings_of[bearing.upper as usize + 1] += 1);
@@ -99,7 +109,7 @@ impl Structure {
         }
         let forces = vec![[0.0; 3]; points_of[bearings.len()] as usize];
         let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);
-        Self { bearings, bearings_of, points_of, forces, falls, unbalanced: Vec::new(), sag, has_friction }
+        Self { bearings, bearings_of, points_of, forces, falls, unbalanced: Vec::new(), sags, has_friction }
     }
 
     fn bearings_of(&self, upper: u32) -> Range<usize> {
@@ -115,7 +125,7 @@ impl Structure {
         points.clear();
         for bearing in &self.bearings[bearings] {
             let contact = &problem.contacts[bearing.row as usize];
-            let reach = self.sag * f64::from(contact.substep_share).powi(2);
+            let reach = self.sags[bearing.upper as usize] * f64::from(contact.substep_share).powi(2);
             let (tangent_1, tangent_2) = contact.tangents();
             let axes = [contact.normal.into(), tangent_1, tangent_2].map(|axis| axis.as_dvec3() * bearing.sign);
             let (rows, impulses) = (points_of_row(contact, &problem.points), points_of_row(contact, &problem.impulses));

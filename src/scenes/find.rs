@@ -55,7 +55,7 @@ impl Scene {
         let mut dynamic = each;
         for k in 1..count {
             let Some((key, begin)) = vary else {
-                all.beside(&first)?;
+                all.beside(&first);
                 continue;
             };
             let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
@@ -67,7 +67,7 @@ impl Scene {
                     "{worlds} of {count} worlds have {dynamic} dynamic bodies: must be at most {MOST_BODIES} in all"
                 )
             })?;
-            all.beside(&next)?;
+            all.beside(&next);
         }
         Ok(all)
     }
@@ -94,14 +94,13 @@ impl Scene {
     }
 
     /// Sets the world of another scene beside the world of this scene. A container or a promise to stand remains if both scenes have it.
-    fn beside(&mut self, other: &Self) -> Result<()> {
+    fn beside(&mut self, other: &Self) {
         let first = self.world.bodies.len();
-        self.world.beside(&other.world)?;
+        self.world.beside(&other.world);
         let moved = |g: &Group| Group { name: g.name.clone(), bodies: first + g.bodies.start..first + g.bodies.end };
         self.groups.extend(other.groups.iter().map(moved));
         self.container = self.container.filter(|c| other.container == Some(*c));
         self.stands &= other.stands;
-        Ok(())
     }
 }
 

@@ -7,12 +7,12 @@ use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
 use crate::rest;
+use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::{MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
-#[derive(Clone)]
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
@@ -31,9 +31,23 @@ pub(super) struct Stages {
     bytes_moved: u64,
 }
 
+crate::saved::cloned!(Stages {
+    detector,
+    sleep,
+    effort,
+    found,
+    key,
+    contacts,
+    joints,
+    problem,
+    plan,
+    plan_key,
+    points,
+    bytes_moved,
+});
+
 /// The settings and the properties of bodies that all rows were written for. A change of this value, and nothing else, brings all state
 /// along.
-#[derive(Clone)]
 struct Key {
     config: SolverConfig,
     /// Body by body.
@@ -41,6 +55,8 @@ struct Key {
     /// Scale of impulses and preloads; none before the first step.
     scale: Option<StepScale>,
 }
+
+crate::saved::state!(Key { config, surfaces, scale });
 
 /// The changes of the caller since the last step that concern state between steps.
 #[derive(Clone, Debug, Default)]
@@ -84,6 +100,32 @@ impl Stages {
             points: 0,
             bytes_moved: 0,
         }
+    }
+
+    /// Writes all that lasts, or reads it: for the bodies of `world`. The plan of the step before is not part of it: without one, the next step
+    /// makes its own.
+    pub fn walk<A: Archive>(&mut self, world: &World, archive: &mut A) -> Result<()> {
+        let Self {
+            detector,
+            sleep,
+            effort,
+            found: _,
+            key,
+            contacts,
+            joints,
+            problem,
+            plan: _,
+            plan_key: _,
+            points: _,
+            bytes_moved: _,
+        } = self;
+        detector.walk(world, archive)?;
+        sleep.walk(archive)?;
+        effort.walk(archive)?;
+        key.walk(archive)?;
+        contacts.walk(archive)?;
+        joints.walk(archive)?;
+        problem.walk(archive)
     }
 
     /// The changes of the caller since the last step.
@@ -177,6 +219,7 @@ impl Stages {
         // Decided before the detection, by what a device that has the rows was asked to leave for.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         *found = timed(&mut times.detect, || {
+            detector.end_teleported(world);
             let mut found = detector.detect(world, config, dt, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step already.
@@ -243,6 +286,7 @@ impl Stages {
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
         problem::store(&self.problem, self.sleep.asleep(), world);
+        self.detector.note_left(world);
         self.sleep.after_step(world, &self.detector, dt);
     }
 }

@@ -24,7 +24,7 @@ impl BodyHandle {
 ///
 /// A removed body leaves a vacancy, a fixed body without shapes, which the next body of the same world fills. Indices depend on the
 /// order of the calls alone.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Bodies {
     all: Vec<Body>,
     /// Of each index; even while a body is there, odd while it is vacant.
@@ -34,6 +34,8 @@ pub struct Bodies {
     /// Vacant indices, world by world; the last of them is filled first.
     vacant: Vec<Vec<u32>>,
 }
+
+crate::saved::state!(Bodies { all, generations, worlds, vacant });
 
 impl Bodies {
     /// Puts a body into one of the worlds, or into the world after the last.

@@ -21,6 +21,8 @@ pub enum BodyKind {
     Dynamic,
 }
 
+crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
+
 /// Friction and restitution of a surface.
 ///
 /// Two materials combine: friction by the geometric mean, sqrt(a b); restitution by the larger.
@@ -31,6 +33,8 @@ pub struct Material {
     /// Ratio of separation to approach velocity, 0 to 1.
     pub restitution: f32,
 }
+
+crate::saved::fields!(Material { friction, restitution });
 
 impl Default for Material {
     fn default() -> Self {
@@ -56,6 +60,8 @@ pub struct Collider {
     pub rotation: Quat,
 }
 
+crate::saved::fields!(Collider { shape, position, rotation });
+
 /// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
 ///
 /// ```
@@ -63,7 +69,7 @@ pub struct Collider {
 /// let brick = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.25)).density(2000.0).position(0.0, 1.0, 0.0);
 /// assert_eq!(brick.mass.mass, 500.0);
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Body {
     /// Name for people; empty if none was given.
     pub name: String,
@@ -79,6 +85,10 @@ pub struct Body {
     pub angular_velocity: Vec3,
     /// Force through the center of mass, besides gravity, constant until changed (N).
     pub force: Vec3,
+    /// Torque in world axes, constant until changed (N m).
+    pub torque: Vec3,
+    /// The share of its world's gravity that the body feels: 1 unless set, 0 floats, -1 rises as fast as others fall. Of dynamic bodies.
+    pub gravity_scale: f32,
     /// Mass, center of mass and inertia; zero unless dynamic. A simulation raises moments of inertia that are less than a 32nd of the mass
     /// times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
     pub mass: MassProperties,
@@ -89,7 +99,29 @@ pub struct Body {
     /// Shapes on the body; several make a compound.
     pub colliders: Vec<Collider>,
     density: f32,
+    /// Force and torque of the next step alone.
+    applied_force: Vec3,
+    applied_torque: Vec3,
 }
+
+crate::saved::state!(Body {
+    name,
+    kind,
+    position,
+    rotation,
+    linear_velocity,
+    angular_velocity,
+    force,
+    torque,
+    gravity_scale,
+    mass,
+    material,
+    groups,
+    colliders,
+    density,
+    applied_force,
+    applied_torque,
+});
 
 impl Body {
     /// A body of this kind, without shapes.
@@ -102,11 +134,15 @@ impl Body {
             linear_velocity: Vec3::ZERO,
             angular_velocity: Vec3::ZERO,
             force: Vec3::ZERO,
+            torque: Vec3::ZERO,
+            gravity_scale: 1.0,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
             groups: Groups::ALL,
             colliders: Vec::new(),
             density: 1000.0,
+            applied_force: Vec3::ZERO,
+            applied_torque: Vec3::ZERO,
         }
     }
 
@@ -177,6 +213,12 @@ impl Body {
         self
     }
 
+    /// The share of its world's gravity that it feels.
+    pub fn gravity_scale(mut self, scale: f32) -> Self {
+        self.gravity_scale = scale;
+        self
+    }
+
     /// Coulomb coefficient.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
@@ -237,6 +279,85 @@ impl Body {
         self.linear_velocity + self.angular_velocity.cross(p - self.center_of_mass())
     }
 
+    /// Changes the velocity at once, as a hit through the center of mass does (N s). Nothing unless the body is dynamic; this and the following five
+    /// wake a body that sleeps, with all that it touches.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, glam::Vec3};
+    /// let mut cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0);
+    /// cube.apply_impulse(Vec3::X * 12.0);
+    /// assert_eq!(cube.linear_velocity, Vec3::X * 2.0);
+    /// // A hit on the side turns the cube as well: (0, 0, -0.5 * 12) N m s on 1 kg m².
+    /// cube.apply_impulse_at(Vec3::X * 12.0, Vec3::Y * 0.5);
+    /// assert_eq!((cube.linear_velocity, cube.angular_velocity), (Vec3::X * 4.0, Vec3::Z * -6.0));
+    /// ```
+    pub fn apply_impulse(&mut self, impulse: Vec3) {
+        if self.kind == BodyKind::Dynamic {
+            self.linear_velocity += impulse / self.mass.mass;
+        }
+    }
+
+    /// Changes velocity and angular velocity at once, as a hit (N s) at a point of the world (m) does.
+    pub fn apply_impulse_at(&mut self, impulse: Vec3, point: Vec3) {
+        self.apply_impulse(impulse);
+        self.apply_angular_impulse((point - self.center_of_mass()).cross(impulse));
+    }
+
+    /// Changes the angular velocity at once; an angular impulse in world axes (N m s).
+    pub fn apply_angular_impulse(&mut self, impulse: Vec3) {
+        if self.kind == BodyKind::Dynamic {
+            self.angular_velocity += self.mass.world_inverse_inertia(self.rotation) * impulse;
+        }
+    }
+
+    /// A force through the center of mass during the next step (N), besides [`Body::force`] and what was applied before. The step that acts by it
+    /// forgets it; one that fails does not.
+    ///
+    /// ```
+    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(2.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.world.body_mut(ball).expect("just put in").apply_force(Vec3::X * 8.0);
+    /// simulation.step(0.25)?;
+    /// simulation.step(0.25)?;
+    /// assert_eq!(simulation.world.body(ball).expect("still there").linear_velocity, Vec3::X);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn apply_force(&mut self, force: Vec3) {
+        if self.kind == BodyKind::Dynamic {
+            self.applied_force += force;
+        }
+    }
+
+    /// A force (N) at a point of the world (m) during the next step: [`Body::apply_force`] and the torque about the center of mass as it is now.
+    pub fn apply_force_at(&mut self, force: Vec3, point: Vec3) {
+        self.apply_force(force);
+        self.apply_torque((point - self.center_of_mass()).cross(force));
+    }
+
+    /// A torque in world axes during the next step (N m), besides [`Body::torque`] and what was applied before.
+    pub fn apply_torque(&mut self, torque: Vec3) {
+        if self.kind == BodyKind::Dynamic {
+            self.applied_torque += torque;
+        }
+    }
+
+    /// Force that acts in the next step, besides gravity (N).
+    pub fn whole_force(&self) -> Vec3 {
+        self.force + self.applied_force
+    }
+
+    /// Torque that acts in the next step, world axes (N m).
+    pub fn whole_torque(&self) -> Vec3 {
+        self.torque + self.applied_torque
+    }
+
+    /// Forgets forces and torques of one step.
+    pub(crate) fn forget_applied_forces(&mut self) {
+        (self.applied_force, self.applied_torque) = (Vec3::ZERO, Vec3::ZERO);
+    }
+
     /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds.
     pub fn move_to(&mut self, position: Vec3, rotation: Quat, dt: f32) {
         let center = position + rotation * self.mass.center;
@@ -281,7 +402,11 @@ impl Body {
             let message = || format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size");
             ensure(is_within(v, MOST_SPEED), message)?;
         }
-        ensure(self.force.is_finite(), || format!("force = {}: must be finite", self.force))
+        for (name, load) in [("force", self.whole_force()), ("torque", self.whole_torque())] {
+            ensure(load.is_finite(), || format!("{name} = {load}: must be finite"))?;
+        }
+        let scale = self.gravity_scale;
+        ensure(scale.is_finite(), || format!("gravity_scale = {scale}: must be finite"))
     }
 
     fn check_shapes(&self) -> Result<()> {

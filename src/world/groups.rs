@@ -20,6 +20,8 @@ pub struct Groups {
     pub filter: u32,
 }
 
+crate::saved::fields!(Groups { membership, filter });
+
 impl Groups {
     /// A member of all groups that meets all: what a body has unless told otherwise.
     pub const ALL: Self = Self { membership: u32::MAX, filter: u32::MAX };

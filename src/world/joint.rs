@@ -17,6 +17,8 @@ pub struct BallJoint {
     pub collide: bool,
 }
 
+crate::saved::fields!(BallJoint { body_a, body_b, anchor_a, anchor_b, collide });
+
 impl BallJoint {
     /// Ties two bodies together, which then do not collide.
     pub fn new(body_a: usize, anchor_a: Vec3, body_b: usize, anchor_b: Vec3) -> Self {

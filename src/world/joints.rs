@@ -12,9 +12,11 @@ pub struct JointHandle {
     generation: u32,
 }
 
+crate::saved::fields!(JointHandle { number, generation });
+
 /// The joints of a world: a slice in the order in which they were inserted. The index of a joint falls by one with each joint before it that
 /// is removed; its handle stays.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Joints {
     all: Vec<BallJoint>,
     /// The handle of each.
@@ -24,6 +26,8 @@ pub struct Joints {
     /// Numbers without a joint; the last is given first.
     free: Vec<u32>,
 }
+
+crate::saved::state!(Joints { all, handles, numbers, free });
 
 impl Joints {
     /// Adds a joint behind the others.

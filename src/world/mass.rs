@@ -22,6 +22,8 @@ pub struct MassProperties {
     pub principal_frame: Quat,
 }
 
+crate::saved::fields!(MassProperties { mass, center, principal_inertia, principal_frame });
+
 impl MassProperties {
     /// Infinite mass.
     pub const IMMOVABLE: Self =

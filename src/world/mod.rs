@@ -27,7 +27,7 @@ use glam::Vec3;
 use crate::error::{Result, ensure};
 use limits::{is_place, is_within};
 
-/// A set of rigid bodies under one gravity.
+/// A set of rigid bodies.
 ///
 /// Bodies and joints come and go at any time, also while a [`Simulation`](crate::Simulation) has the world:
 ///
@@ -41,15 +41,19 @@ use limits::{is_place, is_within};
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// assert!(world.body(brick).is_none() && world.body(ball).is_some());
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct World {
-    /// Acceleration of every dynamic body (m/s²).
+    /// Acceleration of gravity (m/s²) in every world without one of its own. A body feels its [`Body::gravity_scale`] of it.
     pub gravity: Vec3,
+    /// Gravity of single worlds of those that stand [beside](World::beside) each other (m/s²); none, and of those beyond its end, `gravity`.
+    pub own_gravity: Vec<Option<Vec3>>,
     /// The bodies. Joints and contacts name a body by its index here, which stays as long as the body does.
     pub bodies: Bodies,
     /// The ball joints.
     pub joints: Joints,
 }
+
+crate::saved::state!(World { gravity, own_gravity, bodies, joints });
 
 impl Default for World {
     fn default() -> Self {
@@ -60,7 +64,23 @@ impl Default for World {
 impl World {
     /// An empty world with gravity 9.81 m/s² along -Y.
     pub fn new() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), bodies: Bodies::default(), joints: Joints::default() }
+        let gravity = Vec3::new(0.0, -9.81, 0.0);
+        Self { gravity, own_gravity: Vec::new(), bodies: Bodies::default(), joints: Joints::default() }
+    }
+
+    /// Gravity in one of the worlds beside each other (m/s²).
+    pub fn gravity_of(&self, world: usize) -> Vec3 {
+        self.own_gravity.get(world).copied().flatten().unwrap_or(self.gravity)
+    }
+
+    /// Acceleration of a body by gravity (m/s²): that of its world times its [`Body::gravity_scale`], and zero unless it is dynamic.
+    pub fn gravity_on(&self, body: usize) -> Vec3 {
+        let Body { kind, gravity_scale, .. } = self.bodies[body];
+        if kind == BodyKind::Dynamic {
+            self.gravity_of(self.bodies.worlds()[body] as usize) * gravity_scale
+        } else {
+            Vec3::ZERO
+        }
     }
 
     /// Adds a body to the last world and returns its index, as [`World::insert`] does its handle.
@@ -142,20 +162,28 @@ impl World {
     }
 
     /// Sets another world beside this one: its bodies and joints follow those of this world, and bodies of different worlds never
-    /// meet, wherever they are.
+    /// meet, wherever they are. Where the gravity of the two differs, the other one's is its own.
     ///
-    /// # Errors
-    /// The gravity of the two is not the same.
-    pub fn beside(&mut self, other: &Self) -> Result<()> {
-        let (here, there) = (self.gravity, other.gravity);
-        ensure(here == there, || format!("worlds of gravity {here} and {there}: all must have the same"))?;
-        let first = self.bodies.len();
+    /// ```
+    /// use drystone::{World, glam::Vec3};
+    /// let mut world = World::new();
+    /// world.beside(&World { gravity: Vec3::Y * -1.62, ..World::new() });
+    /// assert_eq!([0, 1].map(|k| world.gravity_of(k).y), [-9.81, -1.62]);
+    /// ```
+    pub fn beside(&mut self, other: &Self) {
+        let (first, worlds) = (self.bodies.len(), self.world_count());
+        for world in 0..other.world_count() {
+            let gravity = other.gravity_of(world);
+            if gravity != self.gravity {
+                self.own_gravity.resize(worlds + world, None);
+                self.own_gravity.push(Some(gravity));
+            }
+        }
         self.bodies.append(&other.bodies);
         for joint in &other.joints {
             let (body_a, body_b) = (first + joint.body_a, joint.body_b.map(|b| first + b));
             self.joints.insert(BallJoint { body_a, body_b, ..*joint });
         }
-        Ok(())
     }
 
     /// The number of worlds beside each other, at least one.
@@ -202,9 +230,10 @@ impl World {
 
     /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
     pub(crate) fn check_gravity(&self) -> Result<()> {
-        let gravity = self.gravity;
-        let message = || format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis");
-        ensure(is_within(gravity, MOST_GRAVITY), message)
+        std::iter::once(self.gravity).chain(self.own_gravity.iter().flatten().copied()).try_for_each(|gravity| {
+            let message = || format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis");
+            ensure(is_within(gravity, MOST_GRAVITY), message)
+        })
     }
 
     /// Refuses masses and materials that cannot be simulated.
@@ -258,9 +287,10 @@ impl World {
 
     /// Sum of the potential energies of the dynamic bodies (J), zero at the origin, in f64.
     pub fn potential_energy(&self) -> f64 {
-        self.dynamic()
-            .map(|b| -f64::from(b.mass.mass) * self.gravity.as_dvec3().dot(b.center_of_mass().as_dvec3()))
-            .sum()
+        let of = |(i, b): (usize, &Body)| {
+            -f64::from(b.mass.mass) * self.gravity_on(i).as_dvec3().dot(b.center_of_mass().as_dvec3())
+        };
+        self.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic).map(of).sum()
     }
 
     /// Linear momentum of the dynamic bodies (kg m/s), in f64.

@@ -1,6 +1,7 @@
 //! The shapes of bodies, made by parry.
 
 use std::fmt;
+use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
@@ -14,7 +15,7 @@ use crate::error::{Error, Result, ensure, input};
 /// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; triangle mesh and height field not on dynamic
 /// ones, since they have no mass; half-space only on fixed ones.
 #[derive(Clone)]
-pub struct Shape(pub(crate) SharedShape);
+pub struct Shape(pub(crate) SharedShape, Option<Arc<[Vec3]>>);
 
 impl fmt::Debug for Shape {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -25,27 +26,27 @@ impl fmt::Debug for Shape {
 impl Shape {
     /// A ball of `radius` (m).
     pub fn ball(radius: f32) -> Self {
-        Self(SharedShape::ball(radius))
+        Self(SharedShape::ball(radius), None)
     }
 
     /// A box with half extents (m) along its own axes.
     pub fn cuboid(half_x: f32, half_y: f32, half_z: f32) -> Self {
-        Self(SharedShape::cuboid(half_x, half_y, half_z))
+        Self(SharedShape::cuboid(half_x, half_y, half_z), None)
     }
 
     /// A capsule along Y: a segment of `half_height` either way, swept by `radius` (m).
     pub fn capsule(half_height: f32, radius: f32) -> Self {
-        Self(SharedShape::capsule_y(half_height, radius))
+        Self(SharedShape::capsule_y(half_height, radius), None)
     }
 
     /// A cylinder along Y (m).
     pub fn cylinder(half_height: f32, radius: f32) -> Self {
-        Self(SharedShape::cylinder(half_height, radius))
+        Self(SharedShape::cylinder(half_height, radius), None)
     }
 
     /// A cone along Y, tip up (m).
     pub fn cone(half_height: f32, radius: f32) -> Self {
-        Self(SharedShape::cone(half_height, radius))
+        Self(SharedShape::cone(half_height, radius), None)
     }
 
     /// The convex hull of `points` (m).
@@ -55,12 +56,13 @@ impl Shape {
     pub fn convex_hull(points: &[Vec3]) -> Result<Self> {
         // Checked here, because a flat cloud makes the hull code panic rather than refuse.
         let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
-        hull.map(Self).ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
+        hull.map(|hull| Self(hull, Some(points.into())))
+            .ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
     }
 
     /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.
     pub fn half_space(normal: Vec3) -> Self {
-        Self(SharedShape::halfspace(normal))
+        Self(SharedShape::halfspace(normal), None)
     }
 
     /// A triangle mesh: vertices (m) and counter-clockwise triangles seen from outside.
@@ -76,7 +78,7 @@ impl Shape {
             return Err(input!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size"));
         }
         let mesh = SharedShape::trimesh_with_flags(vertices, triangles, TriMeshFlags::FIX_INTERNAL_EDGES);
-        mesh.map(Self).map_err(|e| input!("mesh: {e}"))
+        mesh.map(|mesh| Self(mesh, None)).map_err(|e| input!("mesh: {e}"))
     }
 
     /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` (m).
@@ -98,7 +100,7 @@ impl Shape {
         // parry stores columns one after another.
         let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
         let data = parry3d::utils::Array2::new(rows, columns, data);
-        Ok(Self(SharedShape::heightfield_with_flags(data, scale, HeightFieldFlags::FIX_INTERNAL_EDGES)))
+        Ok(Self(SharedShape::heightfield_with_flags(data, scale, HeightFieldFlags::FIX_INTERNAL_EDGES), None))
     }
 
     /// Refuses a shape without extent, or with a number that is not finite or larger than [`MOST_LENGTH`].
@@ -158,6 +160,11 @@ impl Shape {
     pub fn bounding_radius(&self) -> f32 {
         let sphere = self.0.compute_local_bounding_sphere();
         sphere.center().length() + sphere.radius()
+    }
+
+    /// The points that it is the convex hull of, if it is one. The hull of the corners alone may have them in another order.
+    pub(crate) fn hull_points(&self) -> Option<&[Vec3]> {
+        self.1.as_deref()
     }
 
     /// parry's shape, for use with another engine.

@@ -55,6 +55,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::IntegrateVelocities { warm_start: false, from_start: true },
         Kernel::BeginChanges,
         Kernel::EndChanges,
+        Kernel::IntegrateTorques { from_start: false },
+        Kernel::IntegrateTorques { from_start: true },
         Kernel::IntegrateGyroscopic { from_start: false },
         Kernel::IntegrateGyroscopic { from_start: true },
         Kernel::IntegratePositions { from_start: false },
@@ -108,6 +110,7 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
             contacts
         }
         Kernel::IntegrateVelocities { .. }
+        | Kernel::IntegrateTorques { .. }
         | Kernel::BeginChanges
         | Kernel::EndChanges
         | Kernel::IntegratePositions { .. } => bodies,

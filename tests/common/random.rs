@@ -7,7 +7,7 @@ use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
-    Substep, TurningRow,
+    Substep, TorqueRow, TurningRow,
 };
 use drystone::stages::random::SplitMix64;
 use glam::{Mat3, Quat, Vec3};
@@ -69,6 +69,11 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     for body in 0..BODIES {
         problem.bodies.push(body_row(random));
         problem.masses.push(if is_movable(body) { mass_row(random) } else { MassRow::default() });
+        let mut torque = TorqueRow::NONE;
+        if is_movable(body) && body % 3 == 0 {
+            torque.angular_acceleration = [1.0, 0.3, -0.7].map(|x| x * (body as f32 - 70.0));
+        }
+        problem.torques.push(torque);
         if is_movable(body) && random.happens(0.5) {
             problem.inertias.push(inertia_row(random, body));
         }
@@ -128,6 +133,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
         row.v.iter_mut().chain(&mut row.w).chain(&mut row.dp).for_each(scale);
     }
     problem.masses.iter_mut().flat_map(|row| &mut row.acceleration).for_each(scale);
+    problem.torques.iter_mut().flat_map(|row| &mut row.angular_acceleration).for_each(scale);
     problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);

@@ -8,7 +8,7 @@ use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams,
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
     BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, TurningRow,
+    MomentumRow, Params, PassRow, PointRow, Softness, TorqueRow, TurningRow,
 };
 
 const TYPES: &str = include_str!("../../shaders/lib/types.wgsl");
@@ -66,6 +66,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Body = BodyRow { v w dp dq }
         Free = FreeRow { v w }
         Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz heap acceleration }
+        Torque = TorqueRow { angular_acceleration }
         Inertia = InertiaRow { principal body inv_principal frame }
         Contact = ContactRow {
             normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b

@@ -21,9 +21,17 @@ pub fn content_hash(scene: &Scene) -> String {
     let mut sink = Sink(FnvHasher::default());
     // Writing to a hasher does not fail. Numbers are written with as many digits as tell them apart.
     let _ = write!(sink, "{:?} {:?}", scene.dt, scene.world.gravity);
+    if !scene.world.own_gravity.is_empty() {
+        let worlds = 0..scene.world.world_count();
+        let _ = write!(sink, "{:?}", worlds.map(|world| scene.world.gravity_of(world)).collect::<Vec<_>>());
+    }
     for b in &scene.world.bodies {
         let pose = (b.kind, b.position, b.rotation, b.linear_velocity, b.angular_velocity);
         let _ = write!(sink, "{pose:?} {:?} {:?} {:?}", b.force, b.mass, b.material);
+        // Most scenes have neither, and keep the hashes that reports name.
+        if (b.torque, b.gravity_scale) != (drystone::glam::Vec3::ZERO, 1.0) {
+            let _ = write!(sink, "{:?} {:?}", b.torque, b.gravity_scale);
+        }
         for c in &b.colliders {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
         }
@@ -43,13 +51,16 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(content_hash(&scene), content_hash(&Scene::find("drop", &[]).unwrap()));
-        let changes: [fn(&mut Scene); 6] = [
+        let changes: [fn(&mut Scene); 9] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
             |s| s.world.bodies[3].force.y = 1e-3,
+            |s| s.world.bodies[3].torque.y = 1e-3,
+            |s| s.world.bodies[3].gravity_scale = 0.5,
+            |s| s.world.own_gravity = vec![Some(drystone::glam::Vec3::X)],
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),
-            |s| s.world.beside(&drystone::World::new()).expect("the same gravity"),
+            |s| s.world.beside(&drystone::World::new()),
         ];
         for change in changes {
             let mut changed = scene.clone();

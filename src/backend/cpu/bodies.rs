@@ -5,7 +5,8 @@
 use std::ops::Range;
 
 use crate::kernels::integrate::{
-    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_velocities, start_of,
+    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
+    start_of,
 };
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
@@ -13,7 +14,7 @@ use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{BodyRow, Params, StepProblem, Substep};
+use crate::problem::{BodyRow, Params, StepProblem, Substep, TorqueRow};
 
 /// The state of a body, and the mass that acts in sweeps.
 #[derive(Clone, Copy, Default)]
@@ -74,10 +75,11 @@ pub(super) fn load_bodies(
         let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[i]);
         let state = State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) };
         let [x, y, z] = problem.masses[i].acceleration;
+        let [turn_x, turn_y, turn_z] = problem.torques.get(i).unwrap_or(&TorqueRow::NONE).angular_acceleration;
         // SAFETY: tasks have different bodies (`in_groups` cuts their range), and `Partition::give_slots` gives each a slot of its own.
         unsafe {
             states.write(slots[i] as usize, state);
-            accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]));
+            accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, turn_x, turn_y, turn_z, 0.0]));
         }
     }
 }
@@ -100,6 +102,7 @@ pub(super) struct BodyWork<'a> {
     pub bodies: Shared<'a, State>,
     /// v . w . of each without the impulses of the substep, or when the step began.
     pub free: Shared<'a, Row8>,
+    /// Acceleration, then angular acceleration.
     pub accelerations: &'a [Row8],
 }
 
@@ -124,6 +127,14 @@ impl Work for BodyWork<'_> {
                     let [x, y, z, ..] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS) };
                     let mass = Mass { acceleration: vec3(x, y, z), ..Mass::default() };
                     integrate_velocities(warm_start, from_start, &params, &mass, &mut body, &mut free);
+                    if !from_start {
+                        rows.copy_from_slice(&velocity_rows(free.v, free.w));
+                    }
+                }
+                Kernel::IntegrateTorques { from_start } => {
+                    // SAFETY: as above.
+                    let [_, _, _, _, x, y, z, _] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS) };
+                    integrate_torque(from_start, &params, vec3(x, y, z), &mut body, &mut free);
                     if !from_start {
                         rows.copy_from_slice(&velocity_rows(free.v, free.w));
                     }

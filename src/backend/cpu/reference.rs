@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::kernels::contact::clear_impulse;
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
-    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_velocities, start_of,
+    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
+    start_of,
 };
 use crate::kernels::joint_system::{JointChanges, JointFactors, factor_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
@@ -82,6 +83,12 @@ impl<S: Scalar> Reference<S> {
             Kernel::EndChanges => {
                 for i in places(problem, pass) {
                     end_changes(&mut self.rows.bodies[i], &self.free[i]);
+                }
+            }
+            Kernel::IntegrateTorques { from_start } => {
+                for i in places(problem, pass) {
+                    let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
+                    integrate_torque(from_start, &params, self.rows.torques[i], body, free);
                 }
             }
             Kernel::IntegrateGyroscopic { from_start } => {

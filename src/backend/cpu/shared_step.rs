@@ -47,6 +47,7 @@ impl SharedStep<'_> {
         let substep = &self.blocks[pass.block as usize].substep;
         match kernel {
             Kernel::IntegrateVelocities { .. }
+            | Kernel::IntegrateTorques { .. }
             | Kernel::BeginChanges
             | Kernel::EndChanges
             | Kernel::IntegratePositions { .. } => {

@@ -47,6 +47,8 @@ bindings! {
     Bodies "bodies": "array<Body>", Write;
     /// Masses of the bodies.
     Masses "masses": "array<Mass>", Write;
+    /// Angular accelerations of the bodies by torques.
+    Torques "torques": "array<Torque>", Read;
     /// Principal inertia of the bodies that have unequal moments.
     Inertias "inertias": "array<Inertia>", Read;
     /// Manifolds.

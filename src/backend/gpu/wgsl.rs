@@ -97,6 +97,9 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
         }
         Kernel::BeginChanges => (&[part!("begin_changes")], Over::Colors, "begin_change(row)".into()),
         Kernel::EndChanges => (&[part!("end_changes")], Over::Colors, "end_change(row)".into()),
+        Kernel::IntegrateTorques { from_start } => {
+            (&[part!("integrate_torques")], Over::Colors, format!("integrate_torque({from_start}, row)"))
+        }
         Kernel::IntegrateGyroscopic { from_start } => {
             (&[part!("integrate_gyroscopic")], Over::Colors, format!("turn_spin({from_start}, row)"))
         }

@@ -45,7 +45,7 @@ pub fn worlds(
         let first = rows.len();
         for &count in counts {
             let mut world = one.world.clone();
-            (1..count).try_for_each(|_| world.beside(&one.world))?;
+            (1..count).for_each(|_| world.beside(&one.world));
             let mut simulation = Simulation::new(world, config.clone(), Box::new(Cpu::new()))?;
             (0..SETTLE).try_for_each(|_| simulation.step(dt).map(drop))?;
             for &threads in threads {

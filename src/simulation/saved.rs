@@ -1,0 +1,159 @@
+//! Runs that fork, go back, and go into bytes.
+
+use super::{Simulation, Stages};
+use crate::backend::Backend;
+use crate::config::SolverConfig;
+use crate::error::{Error, Result, ensure, input};
+use crate::saved::{Archive, Reader, Saved, Writer};
+use crate::world::World;
+
+/// The state of a simulation between two steps, in memory: [`Simulation::snapshot`].
+pub struct Snapshot {
+    world: World,
+    config: SolverConfig,
+    stages: Box<Stages>,
+}
+
+crate::saved::cloned!(Snapshot { world, config, stages });
+
+/// The first bytes of a saved run.
+const MAGIC: [u8; 8] = *b"drystone";
+/// The version of the bytes that follow them. It grows with every change of what is saved.
+const VERSION: u32 = 1;
+/// Bytes before the content: the magic, the version, and the hash of the content.
+const HEADER: usize = 8 + 4 + 8;
+
+impl Simulation {
+    /// A second simulation that goes on from here, with a backend of its own: to the same bits, as long as both are told the same.
+    ///
+    /// ```
+    /// use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+    /// let mut one = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// one.step(1.0 / 60.0)?;
+    /// let mut other = one.fork(Box::new(Cpu::new()));
+    /// one.step(1.0 / 60.0)?;
+    /// other.step(1.0 / 60.0)?;
+    /// assert_eq!(one.hash(), other.hash());
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
+        let Snapshot { world, config, stages } = self.snapshot();
+        Self { world, config, backend, stages: *stages, on_device: false }
+    }
+
+    /// The state between two steps, to go back to.
+    ///
+    /// ```
+    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let before = simulation.snapshot();
+    /// simulation.step(1.0 / 60.0)?;
+    /// let after = simulation.hash();
+    /// simulation.restore(&before);
+    /// simulation.step(1.0 / 60.0)?;
+    /// assert_eq!(simulation.hash(), after);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn snapshot(&mut self) -> Snapshot {
+        self.fetch();
+        let Self { world, config, stages, backend: _, on_device: _ } = self;
+        Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
+    }
+
+    /// The same, in place of another state, with its memory.
+    pub fn snapshot_into(&mut self, snapshot: &mut Snapshot) {
+        self.fetch();
+        snapshot.world.clone_from(&self.world);
+        snapshot.config.clone_from(&self.config);
+        (*snapshot.stages).clone_from(&self.stages);
+    }
+
+    /// Goes back to a state, of this simulation or of another: the world, the settings, and all that the next step goes on from. The
+    /// backend stays.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.world.clone_from(&snapshot.world);
+        self.config.clone_from(&snapshot.config);
+        self.stages.clone_from(&*snapshot.stages);
+        self.on_device = false;
+    }
+
+    /// The state between two steps as bytes, for [`Simulation::load`]: the same on every machine. They begin with a version and a hash of
+    /// what follows.
+    ///
+    /// A run that goes on from them has the bits of one that was not interrupted. Until its first step,
+    /// [`Simulation::problem`] and [`Simulation::plan`] of it lack what each step writes anew.
+    pub fn save(&mut self) -> Vec<u8> {
+        self.fetch();
+        let mut writer = Writer::default();
+        writer.bytes.extend_from_slice(&[0; HEADER]);
+        let written = self.walk(&mut writer);
+        debug_assert!(written.is_ok(), "{written:?}");
+        let mut bytes = writer.bytes;
+        let hash = hash_of(&bytes[HEADER..]);
+        bytes[..8].copy_from_slice(&MAGIC);
+        bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
+        bytes[12..HEADER].copy_from_slice(&hash.to_le_bytes());
+        bytes
+    }
+
+    /// The simulation that was saved, with a backend of its own.
+    ///
+    /// # Errors
+    /// The bytes are none of a saved run, of another version, damaged or cut short.
+    ///
+    /// ```
+    /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let bytes = simulation.save();
+    /// let mut again = Simulation::load(&bytes, Box::new(Cpu::new()))?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// again.step(1.0 / 60.0)?;
+    /// assert_eq!(again.hash(), simulation.hash());
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn load(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
+        let (header, content) = bytes.split_first_chunk::<HEADER>().ok_or_else(|| refused("cut short"))?;
+        ensure(header[..8] == MAGIC, || refused("these bytes are none").to_string())?;
+        let number =
+            |from: usize, to: usize| header[from..to].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
+        let version = number(8, 12);
+        let other = || refused(format_args!("it has version {version}, and this program reads {VERSION}")).to_string();
+        ensure(version == u64::from(VERSION), other)?;
+        let damaged = || refused("damaged or cut short: the hash of its content is another").to_string();
+        ensure(number(12, HEADER) == hash_of(content), damaged)?;
+        let (world, config) = (World::blank(), SolverConfig::default());
+        let mut simulation = Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false };
+        let mut reader = Reader::new(content);
+        simulation.walk(&mut reader).map_err(refused)?;
+        ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
+        Ok(simulation)
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self { world, config, backend: _, stages, on_device: _ } = self;
+        world.walk(archive)?;
+        config.walk(archive)?;
+        stages.walk(world, archive)
+    }
+}
+
+fn refused(why: impl std::fmt::Display) -> Error {
+    input!("a saved run cannot be loaded: {why}")
+}
+
+/// A hash of bytes: by words of eight, so that it takes less time than writing them.
+fn hash_of(bytes: &[u8]) -> u64 {
+    let (words, rest) = bytes.as_chunks::<8>();
+    let mut last = [0; 8];
+    last[..rest.len()].copy_from_slice(rest);
+    let words = words.iter().chain([&last]).map(|word| u64::from_le_bytes(*word));
+    words.fold(bytes.len() as u64, |hash, word| (hash.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
