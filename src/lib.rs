@@ -92,3 +92,8 @@ pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, Mass
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
+
+/// The example of the page for people who come from another engine, likewise.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/from-other-engines.md")]
+pub struct FromOtherEngines;

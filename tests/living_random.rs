@@ -177,7 +177,6 @@ impl Run {
                 self.model.gone.insert(handle);
                 let ended = self.model.joints.extract_if(.., |_, bodies| bodies.contains(&handle));
                 self.model.gone_joints.extend(ended.map(|(joint, _)| joint));
-                return;
             }
             6 => {
                 let kinds = [BodyKind::Dynamic, BodyKind::Dynamic, BodyKind::Fixed, BodyKind::Kinematic];
@@ -315,7 +314,7 @@ impl Run {
     }
 
     /// Makes random calls with steps between them.
-    fn run(seed: u64, calls: usize, backend: Box<dyn Backend>) -> Self {
+    fn of_calls(seed: u64, calls: usize, backend: Box<dyn Backend>) -> Self {
         let mut run = Self::new(seed, backend);
         while run.calls < calls {
             let before = run.calls;
@@ -367,7 +366,7 @@ fn random_calls_give_the_same_world_on_any_backend_and_any_number_of_threads() {
     let calls = of_environment("DRYSTONE_CALLS", 2000);
     let run = |threads: usize, backend: fn() -> Box<dyn Backend>| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| Run::run(seed(), calls, backend()))
+        pool.install(|| Run::of_calls(seed(), calls, backend()))
     };
     let one = run(1, || Box::new(Cpu::new()));
     assert!(one.model.gone.len() > calls / 20 && one.model.gone_joints.len() > calls / 50, "little went");
@@ -377,7 +376,7 @@ fn random_calls_give_the_same_world_on_any_backend_and_any_number_of_threads() {
 }
 
 fn what_random_calls_leave_hardly_overlaps() {
-    let mut run = Run::run(seed(), of_environment("DRYSTONE_CALLS", 2000) / 2, Box::new(Cpu::new()));
+    let mut run = Run::of_calls(seed(), of_environment("DRYSTONE_CALLS", 2000) / 2, Box::new(Cpu::new()));
     let before = run.simulation.penetration();
     run.calm();
     run.check();
@@ -390,8 +389,8 @@ fn what_random_calls_leave_hardly_overlaps() {
 fn random_calls_give_the_same_world_on_an_exact_gpu() {
     let calls = of_environment("DRYSTONE_CALLS", 2000) / 2;
     assert_same(
-        &Run::run(seed(), calls, Box::new(gpu::exact())),
-        &Run::run(seed(), calls, Box::new(Cpu::new())),
+        &Run::of_calls(seed(), calls, Box::new(gpu::exact())),
+        &Run::of_calls(seed(), calls, Box::new(Cpu::new())),
         "the exact GPU",
     );
 }

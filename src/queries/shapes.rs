@@ -3,7 +3,7 @@
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
-use parry3d::query::{self, PointQuery, Ray, ShapeCastHit, ShapeCastOptions};
+use parry3d::query::{self, Ray, ShapeCastHit, ShapeCastOptions};
 use parry3d::shape::{HeightField, Shape as ParryShape, Triangle};
 
 use super::boxes::BoxRay;
@@ -21,9 +21,12 @@ pub(super) fn ray(shape: &Shape, pose: &Pose, ray: &BoxRay, [enters, most]: [f32
     Some((distance, if is_inside { -ray.direction } else { hit.normal }))
 }
 
-/// Where a ray that enters a box at a distance begins to be looked at: outside of the box by its diagonal.
+/// Where a ray that enters a box at a distance begins to be looked at: outside of the box by its diagonal, at a multiple of a power of two
+/// about as long, so that equal surfaces of different shapes stay equally far along an axis.
 fn begin(aabb: &Aabb, enters: f32) -> f32 {
-    (enters - (aabb.maxs - aabb.mins).length()).max(0.0)
+    let diagonal = (aabb.maxs - aabb.mins).length();
+    let unit = f32::from_bits(diagonal.to_bits() & f32::INFINITY.to_bits());
+    (((enters - diagonal) / unit).floor() * unit).max(0.0)
 }
 
 /// Whether a shape contains a point.
@@ -66,7 +69,7 @@ pub(super) fn intersect((a, pose_a): (&Shape, &Pose), (b, pose_b): (&Shape, &Pos
     do_intersect((&*a.0, pose_a), (&*b.0, pose_b))
 }
 
-/// parry asks nothing of height fields but rays and points, and takes a ball behind a mesh for one inside of it.
+/// parry asks nothing of height fields but rays and points.
 fn do_intersect((a, pose_a): (&dyn ParryShape, &Pose), (b, pose_b): (&dyn ParryShape, &Pose)) -> bool {
     if a.as_heightfield().is_none() && b.as_heightfield().is_some() {
         return do_intersect((b, pose_b), (a, pose_a));
@@ -78,12 +81,6 @@ fn do_intersect((a, pose_a): (&dyn ParryShape, &Pose), (b, pose_b): (&dyn ParryS
             do_meet = do_meet || do_intersect((triangle, pose_a), (b, pose_b));
         });
         return do_meet;
-    }
-    for ((mesh, pose), (ball, own)) in [((a, pose_a), (b, pose_b)), ((b, pose_b), (a, pose_a))] {
-        if let (Some(mesh), Some(ball)) = (mesh.as_trimesh(), ball.as_ball()) {
-            let center = own.translation;
-            return mesh.project_point(pose, center, true).point.distance(center) <= ball.radius;
-        }
     }
     query::intersection_test(pose_a, a, pose_b, b).is_ok_and(|answer| answer.intersecting)
 }
@@ -138,7 +135,7 @@ fn do_cast(
     query::cast_shapes(pose, Vec3::ZERO, fixed, own, direction, moving, options).ok()?
 }
 
-/// Whether a shape has no inside.
+/// Whether a shape has no inside. For parry a triangle contains its own points.
 fn is_surface(shape: &dyn ParryShape) -> bool {
     shape.as_trimesh().is_some() || shape.as_heightfield().is_some()
 }
