@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::plan::{Pass, StepPlan};
 use crate::problem::{JointSystems, StepProblem};
 use crate::scenes::Scene;
+use crate::scenes::Spawners;
 use crate::simulation::Simulation;
 use crate::world::World;
 
@@ -132,9 +133,11 @@ pub fn compare(
         Simulation::new(scene.world.clone(), config.clone(), open(0)?)?,
         Simulation::new(scene.world.clone(), config.clone(), open(1)?)?,
     ];
+    let mut spawners = [Spawners::new(scene), Spawners::new(scene)];
     let mut comparison = Comparison::default();
     for _ in 0..steps {
-        for simulation in &mut simulations {
+        for (simulation, spawners) in simulations.iter_mut().zip(&mut spawners) {
+            spawners.before_step(&mut simulation.world, scene.dt);
             simulation.step(scene.dt)?;
         }
         comparison.steps.push(Difference::between(&simulations[0].world, &simulations[1].world));
@@ -156,9 +159,12 @@ fn first_stage(
 ) -> Result<Stage> {
     let mut assembled = |which: usize| -> Result<(StepProblem, StepPlan)> {
         let mut simulation = Simulation::new(scene.world.clone(), config.clone(), open(which)?)?;
+        let mut spawners = Spawners::new(scene);
         for _ in 0..before {
+            spawners.before_step(&mut simulation.world, scene.dt);
             simulation.step(scene.dt)?;
         }
+        spawners.before_step(&mut simulation.world, scene.dt);
         simulation.next_problem(scene.dt)
     };
     let [(problem, plan), (other, other_plan)] = [assembled(0)?, assembled(1)?];

@@ -2,6 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};
+use drystone::scenes::Spawners;
 use drystone::{Body, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig};
 
 /// A scene of the catalogue, and its simulation after some steps.
@@ -194,4 +195,71 @@ fn every_domino_falls() {
     let tilts = simulation.world.bodies[1..].iter().map(|b| (b.rotation * Vec3::Y).y);
     let upright: Vec<_> = tilts.filter(|&y| y > 0.5).collect();
     assert!(upright.is_empty(), "{upright:?}");
+}
+
+/// A scene with spawners, stepped as the program does; `tell` is called after each step with what came and left so far.
+fn flow(name: &str, parameters: &[&str], steps: u32, mut tell: impl FnMut(u32, &Simulation, &Spawners)) {
+    let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
+    let scene = Scene::find(name, &parameters).expect(name);
+    let mut spawners = Spawners::new(&scene);
+    let reference = Box::new(Reference::<f32>::new());
+    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect(name);
+    for step in 0..steps {
+        spawners.before_step(&mut simulation.world, scene.dt);
+        simulation.step(scene.dt).expect("a step");
+        tell(step + 1, &simulation, &spawners);
+    }
+}
+
+/// A box rides from x = 0.6 m to the last roller at 8 m: 7.4 s at 1 m/s, and falls by a meter in 0.5 s.
+#[test]
+fn boxes_ride_on_a_conveyor_at_its_speed_and_as_many_leave_as_come() {
+    for (speed, every, most) in [(1.0, 120, 0.1), (2.0, 60, 0.3)] {
+        let parameters = [format!("speed={speed}"), format!("every={every}")];
+        let (mut carried, mut sum, mut left) = (0, 0.0, Vec::new());
+        flow("conveyor", &[&parameters[0], &parameters[1]], 1500, |step, simulation, spawners| {
+            assert_eq!(spawners.came(), (step - 1) / every);
+            left.push(spawners.left());
+            for body in simulation.world.dynamic().filter(|b| (2.0..6.0).contains(&b.position.x)) {
+                let slip = (body.linear_velocity - Vec3::X * speed).length();
+                assert!(slip < most * speed, "step {step}: {slip} m/s");
+                assert!((body.position.y - 0.2).abs() < 1e-2 && body.position.z.abs() < 0.1, "{}", body.position);
+                (carried, sum) = (carried + 1, sum + body.linear_velocity.x);
+            }
+        });
+        let mean = sum / carried as f32;
+        assert!(carried > 500 && (mean - speed).abs() < 0.01 * speed, "{mean} m/s of {carried}");
+        // From the first that leaves on, one leaves every so many steps.
+        let first = left.iter().position(|&count| count == 1).expect("one leaves") as u32;
+        let ride = first as f32 / 60.0;
+        assert!((ride - 7.4 / speed - 0.6).abs() < 0.6, "{ride} s");
+        let expected = 1 + (1500 - 1 - first) / every;
+        assert!(left[1499].abs_diff(expected) <= 1, "{} left, not {expected}", left[1499]);
+    }
+}
+
+#[test]
+fn every_ball_that_passes_a_turnstile_turns_its_cross_by_a_quarter_and_all_pass() {
+    for every in [45, 60, 120] {
+        let (mut quarters, mut passed, mut left) = (0.0, 0, 0);
+        flow("turnstile", &[&format!("every={every}")], 1900, |step, simulation, spawners| {
+            let world = &simulation.world;
+            let cross = world.bodies.iter().find(|b| b.name == "cross").expect("a cross");
+            quarters -= cross.angular_velocity.y / 60.0 / std::f32::consts::FRAC_PI_2;
+            let balls = || world.dynamic().filter(|b| b.name == "ball");
+            let beyond = balls().filter(|b| b.position.x > 1.0).count() as u32 + spawners.left();
+            // The first arm stands across, so that the first ball passes within a quarter turn.
+            if beyond > passed {
+                (passed, left) = (beyond, spawners.left());
+                assert!(quarters > passed as f32 - 0.1, "step {step}: {passed} passed in {quarters} quarter turns");
+            }
+            assert!(
+                balls().all(|b| b.position.x > 3.5 || b.position.z.abs() < 0.2),
+                "step {step}: a ball left the channel"
+            );
+            assert!(world.joint_gap() < 2e-3, "step {step}: the hinge is open by {} m", world.joint_gap());
+            left = left.max(spawners.left());
+        });
+        assert_eq!((passed, left), (12, 12), "every {every} steps");
+    }
 }

@@ -6,6 +6,7 @@ use super::catalogue::{CATALOGUE, MOST_BODIES};
 #[cfg(feature = "serde")]
 use super::file::load;
 use super::scene::{Group, Scene};
+use super::spawner::Spawner;
 use crate::error::{Result, ensure, input};
 use crate::memory;
 use crate::suggest::hint;
@@ -95,7 +96,10 @@ impl Scene {
 
     /// Sets the world of another scene beside the world of this scene. A container or a promise to stand remains if both scenes have it.
     fn beside(&mut self, other: &Self) {
-        let first = self.world.bodies.len();
+        let (first, worlds) = (self.world.bodies.len(), self.world.world_count());
+        let spawner = |s: &Spawner| Spawner { world: worlds + s.world, ..s.clone() };
+        self.spawners.extend(other.spawners.iter().map(spawner));
+        self.leaving.extend(other.leaving.iter().map(|&(body, leaves)| (first + body, leaves)));
         self.world.beside(&other.world);
         let moved = |g: &Group| Group { name: g.name.clone(), bodies: first + g.bodies.start..first + g.bodies.end };
         self.groups.extend(other.groups.iter().map(moved));

@@ -5,8 +5,12 @@ mod catalogue;
 mod file;
 mod find;
 mod scene;
+mod spawner;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 #[cfg(feature = "serde")]
-pub use file::{BodyFile, BodyRef, Geometry, JointFile, MassFile, SceneFile, ShapeFile, load, schema};
+pub use file::{
+    BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile, load, schema,
+};
 pub use scene::{Group, Scene};
+pub use spawner::{Leaves, Spawner, Spawners};

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::spawner::{Leaves, Spawner};
 use crate::world::World;
 
 /// A world, with what a run needs to know about it.
@@ -23,6 +24,10 @@ pub struct Scene {
     pub stands: bool,
     /// Bodies that stand or fall together; empty if the scene names none.
     pub groups: Vec<Group>,
+    /// What brings bodies while the scene runs; [`Spawners`](super::Spawners) drives them.
+    pub spawners: Vec<Spawner>,
+    /// Bodies of the world that leave while the scene runs, by their indices.
+    pub leaving: Vec<(usize, Leaves)>,
 }
 
 /// Bodies that stand or fall together.
@@ -37,7 +42,17 @@ pub struct Group {
 impl Scene {
     /// A scene at 60 steps a second, without a container, whose bodies need not stand.
     pub fn new(name: impl Into<String>, world: World, steps: u32) -> Self {
-        Self { name: name.into(), world, dt: 1.0 / 60.0, steps, container: None, stands: false, groups: Vec::new() }
+        Self {
+            name: name.into(),
+            world,
+            dt: 1.0 / 60.0,
+            steps,
+            container: None,
+            stands: false,
+            groups: Vec::new(),
+            spawners: Vec::new(),
+            leaving: Vec::new(),
+        }
     }
 
     /// Says that every dynamic body should still be in place at the end.

@@ -13,6 +13,11 @@
 /// assert!(!Groups { membership: 0b01, filter: u32::MAX }.meets(ghosts));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize, serde::Serialize, schemars::JsonSchema),
+    serde(deny_unknown_fields, default)
+)]
 pub struct Groups {
     /// The groups that it is a member of.
     pub membership: u32,

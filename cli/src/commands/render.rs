@@ -12,6 +12,7 @@ use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
 use drystone::backend::{BackendChoice, choose};
 use drystone::scenes::CATALOGUE;
+use drystone::scenes::Spawners;
 use drystone::stages::memory;
 use drystone::{Error, Result, Scene, Simulation, SolverConfig};
 
@@ -99,12 +100,14 @@ impl RenderArgs {
         }
         let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();
         memory::check(FRAME * (scene.world.bodies.len() * kept.len()) as f64, format_args!("{} pictures", kept.len()))?;
+        let mut spawners = Spawners::new(&scene);
         let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
         let bar = Progress::steps(scene.steps, quiet);
         let (steps, dt) = (scene.steps, scene.dt);
         let mut film = Film::new(scene, self.color);
         for step in 0..=steps {
             if step > 0 {
+                spawners.before_step(&mut simulation.world, dt);
                 simulation.step(dt)?;
                 bar.inc();
             }

@@ -12,6 +12,7 @@ use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, ch
 use crate::files::{self, Draft};
 use crate::report::{RunReport, Trajectory};
 use drystone::backend::choose;
+use drystone::scenes::{SceneFile, Spawners};
 use drystone::{Error, Recorder, RecordingIntervals, Result, Scene, Simulation};
 
 #[derive(Args)]
@@ -38,6 +39,11 @@ pub struct RunArgs {
     /// Write the motion of all bodies except fixed ones as CSV.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out: Option<PathBuf>,
+    /// Write the world as it is at the end as a scene file.
+    ///
+    /// Poses, velocities, and the spawners with what is left of them; not the impulses of contacts.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    out_scene: Option<PathBuf>,
     /// Write every K-th step.
     #[arg(long, help_heading = OUTPUT, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -85,6 +91,9 @@ impl RunArgs {
     pub fn run(&self) -> Result<()> {
         let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
         self.save_problem.iter().try_for_each(|save| check_save(save, &scene))?;
+        if self.out_scene.is_some() {
+            SceneFile::of(&scene).map_err(|e| e.within("--out-scene"))?;
+        }
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         let (mut backend, why) = choose(self.backend.choice, scene.world.dynamic_count(), self.backend.exact)?;
@@ -93,6 +102,7 @@ impl RunArgs {
         let copy_bandwidth = if self.kernel_times { backend.time_kernels()? } else { None };
         let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
+        let mut spawners = Spawners::new(&scene);
         let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
         let draft = self.record.as_deref().map(Draft::of).transpose()?;
         let mut recorder =
@@ -100,6 +110,7 @@ impl RunArgs {
         let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
+                spawners.before_step(&mut simulation.world, scene.dt);
                 let stats = match self.save_problem.as_ref().filter(|save| save.0 == step) {
                     Some((_, file)) => {
                         let name = format!("{}, step {step}", scene.name);
@@ -127,6 +138,12 @@ impl RunArgs {
         if let (Some(recorder), Some(draft), Some(path)) = (recorder, draft, &self.record) {
             recorder.finish(&mut simulation).map_err(|e| e.within(path.display()))?;
             replacing(path, || draft.keep())?;
+        }
+        if let Some(path) = &self.out_scene {
+            (scene.spawners, scene.leaving) = spawners.remaining(scene.dt);
+            scene.world = simulation.world.clone();
+            let file = SceneFile::of(&scene).map_err(|e| e.within("--out-scene"))?;
+            replacing(path, || files::write(path, file.to_text().as_bytes()))?;
         }
         report.measure(&scene, simulation);
         if self.scene.json {

@@ -264,8 +264,10 @@ impl RunReport {
         self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
         // As `drystone::metrics::in_place`, from the stored positions.
         let in_place = |&i: &usize| {
-            let (center, half_height) = self.places[i];
-            center.as_dvec3().distance(world.bodies[i].center_of_mass().as_dvec3()) < half_height
+            let begun = self.places.get(i);
+            begun.is_some_and(|(center, half_height)| {
+                center.as_dvec3().distance(world.bodies[i].center_of_mass().as_dvec3()) < *half_height
+            })
         };
         let standing = |group: &str, bodies: Range<usize>| {
             let dynamic = bodies.filter(|&i| world.bodies.get(i).is_some_and(|b| b.kind == BodyKind::Dynamic));

@@ -9,6 +9,7 @@ use super::colors::ColorBy;
 use super::film::bounds;
 use super::overlay::Overlay;
 use drystone::backend::{BackendChoice, choose};
+use drystone::scenes::Spawners;
 use drystone::{JointHandle, Result, Scene, Simulation, SolverConfig, StepStats};
 
 /// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
@@ -19,6 +20,7 @@ pub struct Live {
     exact: bool,
     pub(super) choice: BackendChoice,
     pub(super) simulation: Simulation,
+    spawners: Spawners,
     pub(super) color: ColorBy,
     pub(super) overlay: Overlay,
     pub(super) paused: bool,
@@ -61,6 +63,7 @@ impl Live {
             exact,
             choice,
             simulation,
+            spawners: Spawners::new(&scene),
             color,
             overlay: Overlay::default(),
             paused: false,
@@ -88,6 +91,7 @@ impl Live {
         let config = self.simulation.config().clone();
         let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;
         self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
+        self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
         Ok(())
     }
@@ -108,6 +112,7 @@ impl Live {
 
     pub(super) fn step(&mut self) -> Result<()> {
         let dt = self.scene.dt;
+        self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
         if let Some(grabbed) = &self.grabbed {
             let body = &world.bodies[grabbed.body];

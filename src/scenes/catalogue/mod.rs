@@ -6,6 +6,7 @@ mod common;
 mod drop;
 mod drum;
 mod entry;
+mod flow;
 mod jointed;
 mod masonry;
 mod stacks;
@@ -297,5 +298,26 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[0],
         build: |v| Ok(drum::drum(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "conveyor",
+        summary: "boxes come onto driven rollers, ride along at their speed, fall off the end and leave: as many leave as come",
+        parameters: &[
+            Parameter::real("length", 8.0, (2.0, 1000.0), "length of the conveyor [m]"),
+            Parameter::real("speed", 1.0, (0.1, 2.5), "speed of the tops of the rollers [m/s]"),
+            Parameter::whole("every", 120, (1.0, 1e6), "steps from one box to the next"),
+        ],
+        bodies: |_| 1.0,
+        build: |v| Ok(flow::conveyor(v[0] as f32, v[1] as f32, v[2] as u32)),
+    },
+    Entry {
+        name: "turnstile",
+        summary: "balls roll down a channel and push a cross of four arms on its hinge: one passes in a quarter turn, and all in the end",
+        parameters: &[
+            Parameter::whole("n", 12, (1.0, 1e6), "number of balls"),
+            Parameter::whole("every", 60, (45.0, 1e6), "steps from one ball to the next"),
+        ],
+        bodies: |_| 1.0,
+        build: |v| Ok(flow::turnstile(v[0] as u32, v[1] as u32)),
     },
 ];

@@ -6,10 +6,11 @@ use glam::{Quat, Vec3};
 
 use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
-use super::schema::{BodyFile, Geometry, MassFile, SceneFile, ShapeFile};
+use super::schema::{BodyFile, Geometry, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
 use crate::config::check_step_length;
-use crate::error::{Error, Result, input};
+use crate::error::{Error, Result, ensure, input};
 use crate::scenes::scene::Scene;
+use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Body, BodyKind, MassProperties, Shape, World};
 
 /// The scene that a file describes, named `name` if the file gives it none.
@@ -22,15 +23,28 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     let mut world = World { gravity: finite("gravity", file.gravity)?.into(), ..World::new() };
     world.check_gravity()?;
     let container = file.container.map(container).transpose()?;
+    let mut leaving = Vec::new();
     for (index, body_file) in file.bodies.into_iter().enumerate() {
-        let built = body(&body_file).map_err(|e| e.within(body_label(index, body_file.name.as_deref())))?;
+        let of_body = |e: Error| e.within(body_label(index, body_file.name.as_deref()));
+        let built = body(&body_file).map_err(of_body)?;
+        if let Some(file) = &body_file.leaves {
+            leaving.push((index, leaves(file).map_err(of_body)?));
+        }
         world.add(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
     }
     for (index, joint_file) in file.joints.iter().enumerate() {
         let joint = joint(joint_file, &world).map_err(|e| e.within(format_args!("joints[{index}]")))?;
         world.join(joint);
     }
-    Ok(Scene { dt, container, ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps) })
+    let spawner = |(k, s): (usize, &SpawnerFile)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
+    let spawners = file.spawners.iter().enumerate().map(spawner).collect::<Result<_>>()?;
+    Ok(Scene {
+        dt,
+        container,
+        spawners,
+        leaving,
+        ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps)
+    })
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
@@ -58,8 +72,10 @@ fn body(file: &BodyFile) -> Result<Body> {
     let linear = velocity("linear_velocity", file.linear_velocity)?;
     let angular = velocity("angular_velocity", file.angular_velocity)?;
     let pushed = |x: f32| x == 0.0 || file.kind == BodyKind::Dynamic;
-    let force = checked("force", file.force, "zero unless the body is dynamic", pushed)?;
-    body.force = force.into();
+    let load = |name, load| checked(name, load, "zero unless the body is dynamic", pushed);
+    (body.force, body.torque) = (load("force", file.force)?.into(), load("torque", file.torque)?.into());
+    [body.gravity_scale] = finite("gravity_scale", [file.gravity_scale])?;
+    body.groups = file.groups;
     let [friction, restitution] =
         [("friction", file.friction), ("restitution", file.restitution)].map(|(name, x)| finite(name, [x]));
     let mut body = body
@@ -74,6 +90,21 @@ fn body(file: &BodyFile) -> Result<Body> {
     }
     let body = with_mass(body, file)?;
     body.check().map(|()| body)
+}
+
+fn spawner(file: &SpawnerFile) -> Result<Spawner> {
+    let SpawnerFile { first, every, count, .. } = *file;
+    ensure(every > 0, || "every = 0: must be at least 1 step".into())?;
+    let name = file.body.name.clone().unwrap_or_default();
+    let built = |file: &BodyFile| Ok((body(file)?, file.leaves.as_ref().map(leaves).transpose()?));
+    let (body, leaves) = built(&file.body).map_err(|e: Error| e.within("body"))?;
+    Ok(Spawner { body: body.named(name), leaves: leaves.unwrap_or_default(), first, every, count, world: 0 })
+}
+
+fn leaves(file: &LeavesFile) -> Result<Leaves> {
+    let below = file.below.map(|x| finite("leaves.below", [x])).transpose()?.map(|[x]| x);
+    let after = file.after.map(|x| checked("leaves.after", [x], "0 or more", |x| x >= 0.0)).transpose()?.map(|[x]| x);
+    Ok(Leaves { below, after })
 }
 
 /// The body with the mass that the file gives it.

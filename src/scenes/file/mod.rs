@@ -4,8 +4,9 @@ mod check;
 mod joint;
 mod numbers;
 mod schema;
+mod write;
 
-pub use schema::{BodyFile, BodyRef, Geometry, JointFile, MassFile, SceneFile, ShapeFile};
+pub use schema::{BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
 
 use std::path::Path;
 
@@ -33,6 +34,35 @@ impl SceneFile {
     /// A value that no scene can be made of: one line with the body, the value and what it must be.
     pub fn into_scene(self, name: &str) -> Result<Scene> {
         check::scene(self, name)
+    }
+
+    /// The file of a scene, every number to the last bit, for bodies at rest or in motion. Whether the scene stands and its groups of bodies are
+    /// not in it, nor forces of the next step alone and the impulses of contacts.
+    ///
+    /// ```
+    /// use drystone::{Scene, scenes::SceneFile};
+    /// let scene = Scene::find("tower", &[])?;
+    /// let text = SceneFile::of(&scene)?.to_text();
+    /// let again = SceneFile::parse(&text)?.into_scene("tower")?;
+    /// assert_eq!(again.world.bodies[3].position, scene.world.bodies[3].position);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// There are several worlds, or a body with numbers that are not finite or that no scene file may have: one line that names it.
+    pub fn of(scene: &Scene) -> Result<Self> {
+        let file = write::file(scene)?;
+        file.clone().into_scene(&scene.name).map(|_| file)
+    }
+
+    /// The text of the file, as JSON.
+    pub fn to_text(&self) -> String {
+        let mut text = serde_json::to_string(self).unwrap_or_default();
+        // A body a line.
+        for list in ["\"bodies\":[", "\"joints\":[", "\"spawners\":["] {
+            text = text.replacen(list, &format!("\n{list}\n"), 1);
+        }
+        text.replace("},{\"name\":", "},\n{\"name\":") + "\n"
     }
 }
 

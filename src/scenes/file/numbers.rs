@@ -10,6 +10,9 @@ use crate::world::MOST_LENGTH;
 /// How far a quaternion or a normal may be from length 1; nearer ones are normalized.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
+/// How far rounding to single precision takes a quaternion from length 1.
+const ROUNDING: f64 = 3.0 * f32::EPSILON as f64;
+
 /// The values in single precision if each of them `fits`; else a line that says what the values `must` be.
 pub(super) fn checked<const N: usize>(
     name: impl Display,
@@ -49,6 +52,10 @@ pub(super) fn rotation(name: &str, values: [f64; 4]) -> Result<Quat> {
 /// A direction or a quaternion, normalized.
 pub(super) fn unit<const N: usize>(name: &str, values: [f64; N]) -> Result<[f32; N]> {
     let length = values.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // What was normalized in single precision is read as it was written.
+    if (length - 1.0).abs() <= ROUNDING {
+        return Ok(values.map(|x| x as f32));
+    }
     if (length - 1.0).abs() <= UNIT_TOLERANCE {
         Ok(values.map(|x| (x / length) as f32))
     } else {

@@ -1,9 +1,9 @@
 //! The types of a scene file: version 1 of the format, and the source of its JSON Schema.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use crate::world::BodyKind;
+use crate::world::{BodyKind, Groups};
 
 /// The content of a scene file, of which only the form is checked: version 1 of the format.
 ///
@@ -16,7 +16,7 @@ use crate::world::BodyKind;
 /// assert_eq!(scene.world.dynamic_count(), 1);
 /// # Ok::<(), drystone::Error>(())
 /// ```
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Scene")]
 pub struct SceneFile {
@@ -35,16 +35,51 @@ pub struct SceneFile {
     #[serde(default = "defaults::steps")]
     pub steps: u32,
     /// Lower and upper corner of the space that no dynamic body should leave (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub container: Option<[[f64; 3]; 2]>,
     /// The bodies.
     pub bodies: Vec<BodyFile>,
     /// The joints between them.
     #[serde(default)]
     pub joints: Vec<JointFile>,
+    /// What brings more bodies while the scene runs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub spawners: Vec<SpawnerFile>,
+}
+
+/// Brings bodies that are alike while a scene runs: before a step, one every so many steps, whatever is at their place already.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Spawner")]
+pub struct SpawnerFile {
+    /// The body as it comes, with when it leaves.
+    pub body: BodyFile,
+    /// Steps before the first comes.
+    #[serde(default)]
+    pub first: u32,
+    /// Steps from one to the next, at least 1.
+    #[schemars(range(min = 1))]
+    pub every: u32,
+    /// How many come in all; without end if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub count: Option<u32>,
+}
+
+/// When a body leaves the scene: as soon as either holds.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Leaves")]
+pub struct LeavesFile {
+    /// When its center of mass is below this height (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub below: Option<f64>,
+    /// After this time (s), 0 or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after: Option<f64>,
 }
 
 /// A body of a scene file.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "Body")]
 pub struct BodyFile {
@@ -62,16 +97,28 @@ pub struct BodyFile {
     pub angular_velocity: [f64; 3],
     /// Force through the center of mass, besides gravity (N); zero unless dynamic.
     pub force: [f64; 3],
+    /// Torque in world axes (N m); zero unless dynamic.
+    pub torque: [f64; 3],
+    /// The share of gravity that a dynamic body feels: 0 floats, -1 rises as fast as others fall.
+    pub gravity_scale: f64,
     /// Density of all shapes (kg/m³), more than 0. 1000 for a dynamic body that says nothing about its mass.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
     /// Total mass (kg), more than 0, instead of the density.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// Mass, center and inertia, instead of those of the shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_properties: Option<MassFile>,
     /// Coulomb coefficient, 0 or more. Two bodies meet with the geometric mean of theirs.
     pub friction: f64,
     /// Ratio of separation to approach velocity, 0 to 1. Two bodies meet with the larger of theirs.
     pub restitution: f64,
+    /// Which bodies it meets: 32 groups, one bit each.
+    pub groups: Groups,
+    /// When it leaves the scene; never if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaves: Option<LeavesFile>,
     /// Shapes on the body; several make a compound.
     pub shapes: Vec<ShapeFile>,
 }
@@ -86,18 +133,22 @@ impl Default for BodyFile {
             linear_velocity: [0.0; 3],
             angular_velocity: [0.0; 3],
             force: [0.0; 3],
+            torque: [0.0; 3],
+            gravity_scale: 1.0,
             density: None,
             mass: None,
             mass_properties: None,
             friction: 0.5,
             restitution: 0.0,
+            groups: Groups::ALL,
+            leaves: None,
             shapes: Vec::new(),
         }
     }
 }
 
 /// Mass, center of mass and inertia of a body, in its own frame.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Mass properties")]
 pub struct MassFile {
@@ -114,7 +165,7 @@ pub struct MassFile {
 }
 
 /// A shape at a place on a body.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[schemars(title = "Shape", extend("unevaluatedProperties" = false))]
 pub struct ShapeFile {
     /// Position in the body's frame (m).
@@ -129,7 +180,7 @@ pub struct ShapeFile {
 }
 
 /// A shape in its own frame. All lengths are in m and more than 0.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Geometry {
@@ -191,7 +242,7 @@ pub enum Geometry {
 }
 
 /// A joint of a scene file.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(title = "Joint")]
 #[non_exhaustive]
@@ -212,7 +263,7 @@ pub enum JointFile {
 }
 
 /// Which body of the scene.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(untagged, expecting = "a body is named by its index from 0 or by its name")]
 pub enum BodyRef {
     /// Its index, counted from 0.

@@ -7,6 +7,7 @@ use crate::report::rounds::{interleave, thirds};
 use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::metrics::{Penetration, rms_speed};
+use drystone::scenes::Spawners;
 use drystone::stats::{largest, median};
 use drystone::{Backend, Result, Scene, Simulation, SolverConfig, StepStats};
 
@@ -52,6 +53,7 @@ struct Fall {
     hash: String,
     dt: f32,
     simulation: Simulation,
+    spawners: Spawners,
     pool: rayon::ThreadPool,
     steps: Vec<[f64; 6]>,
     counts: Vec<[f64; 3]>,
@@ -78,6 +80,7 @@ pub fn falling(
                     hash: content_hash(&scene),
                     dt: scene.dt,
                     simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?,
+                    spawners: Spawners::new(&scene),
                     pool: pool(threads)?,
                     steps: Vec::new(),
                     counts: Vec::new(),
@@ -106,9 +109,10 @@ pub fn turns(steps: usize) -> usize {
 
 impl Fall {
     fn turn(&mut self) -> Result<()> {
-        let Self { simulation, pool, dt, steps, counts, .. } = self;
+        let Self { simulation, spawners, pool, dt, steps, counts, .. } = self;
         pool.install(|| {
             (0..TURN).try_for_each(|_| {
+                spawners.before_step(&mut simulation.world, *dt);
                 let stats: StepStats = simulation.step(*dt)?;
                 steps.push(stage_times(&stats));
                 counts.push([stats.pairs, stats.computed, stats.manifolds].map(|count| count as f64));

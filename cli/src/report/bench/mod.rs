@@ -28,6 +28,7 @@ use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::metrics::rms_speed;
 use drystone::residuals::Residuals;
+use drystone::scenes::Spawners;
 use drystone::stages::plan::Kernel;
 use drystone::stats::median;
 use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig, StepStats};
@@ -115,6 +116,7 @@ struct Case {
     hash: String,
     dt: f32,
     simulation: Simulation,
+    spawners: Spawners,
     ways: Vec<Way>,
     last: StepStats,
 }
@@ -137,8 +139,8 @@ pub fn bench(
                 ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
             }
         }
-        let (simulation, hash, dt) = settled(spec, config)?;
-        cases.push(Case { spec: spec.clone(), hash, dt, simulation, ways, last: StepStats::default() });
+        let (simulation, spawners, hash, dt) = settled(spec, config)?;
+        cases.push(Case { spec: spec.clone(), hash, dt, simulation, spawners, ways, last: StepStats::default() });
         after_turn();
     }
     interleave(turns, &mut cases, |_, case| {
@@ -152,15 +154,20 @@ pub fn bench(
 
 /// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container at one
 /// substep. Then preloads and warm starts settle at the measured settings.
-fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, String, f32)> {
+fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, Spawners, String, f32)> {
     let scene = Scene::find_spec(spec)?;
     let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());
     let coarse = config.clone().with(|c| c.substeps = 1);
+    let mut spawners = Spawners::new(&scene);
     let mut simulation = Simulation::new(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
-    (0..if falls { COARSE } else { 0 }).try_for_each(|_| simulation.step(dt).map(drop))?;
+    let mut step = |simulation: &mut Simulation| {
+        spawners.before_step(&mut simulation.world, dt);
+        simulation.step(dt).map(drop)
+    };
+    (0..if falls { COARSE } else { 0 }).try_for_each(|_| step(&mut simulation))?;
     simulation.set_config(config.clone())?;
-    (0..FINE).try_for_each(|_| simulation.step(dt).map(drop))?;
-    Ok((simulation, hash, dt))
+    (0..FINE).try_for_each(|_| step(&mut simulation))?;
+    Ok((simulation, spawners, hash, dt))
 }
 
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
@@ -170,13 +177,14 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 
 impl Case {
     fn turn(&mut self) -> Result<()> {
-        let Self { simulation, ways, dt, last, .. } = self;
+        let Self { simulation, spawners, ways, dt, last, .. } = self;
         for way in ways {
             let Some(backend) = way.backend.take() else { continue };
             let before = simulation.set_backend(backend);
             let mut steps = Vec::with_capacity(TURN);
             let stepped: Result<()> = way.pool.install(|| {
                 (0..TURN).try_for_each(|_| {
+                    spawners.before_step(&mut simulation.world, *dt);
                     *last = simulation.step(*dt)?;
                     steps.push(stage_times(last));
                     Ok(())
@@ -190,7 +198,7 @@ impl Case {
     }
 
     fn rows(self, config: &SolverConfig) -> Vec<StagesRow> {
-        let Self { spec, hash, dt, mut simulation, ways, last: stats } = self;
+        let Self { spec, hash, dt, mut simulation, ways, last: stats, .. } = self;
         let penetration = simulation.penetration();
         let residual = residual(&mut simulation, dt);
         let world = &simulation.world;

@@ -41,7 +41,7 @@ pub fn worlds(
     let config = SolverConfig::default().without_sleep();
     let mut rows = Vec::new();
     for spec in specs {
-        let (one, _, dt) = settled(spec, &config)?;
+        let (one, _, _, dt) = settled(spec, &config)?;
         let first = rows.len();
         for &count in counts {
             let mut world = one.world.clone();

@@ -3,6 +3,7 @@
 use crate::settings;
 use drystone::backend::BackendKind;
 use drystone::config::{Friction, Method};
+use drystone::scenes::Spawners;
 use drystone::{Result, Scene, Simulation, SolverConfig, World};
 
 /// An engine with its settings, stepping one scene.
@@ -71,13 +72,15 @@ impl Setting {
 
 pub struct Drystone {
     simulation: Simulation,
+    spawners: Spawners,
     dt: f32,
 }
 
 impl Drystone {
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
         let backend = backend.parse::<BackendKind>()?.open(false)?;
-        Ok(Self { simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?, dt: scene.dt })
+        let simulation = Simulation::new(scene.world.clone(), config.clone(), backend)?;
+        Ok(Self { simulation, spawners: Spawners::new(scene), dt: scene.dt })
     }
 }
 
@@ -87,6 +90,7 @@ impl Contender for Drystone {
     }
 
     fn step(&mut self) -> Result<()> {
+        self.spawners.before_step(&mut self.simulation.world, self.dt);
         self.simulation.step(self.dt).map(drop)
     }
 

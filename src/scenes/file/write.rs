@@ -1,0 +1,122 @@
+//! From a world, at rest or in motion, to a scene file that says the same.
+
+use parry3d::shape::TypedShape;
+
+use super::schema::{BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
+use crate::error::{Error, Result, ensure, input};
+use crate::scenes::scene::Scene;
+use crate::scenes::spawner::{Leaves, Spawner};
+use crate::world::{BallJoint, Body, BodyKind, Collider};
+
+/// The file of a scene: every number as it is, to the last bit. A body has the index in the file that it has among the bodies that are there.
+pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
+    let world = &scene.world;
+    let worlds = world.world_count();
+    ensure(worlds == 1, || format!("a scene file holds one world, and there are {worlds} beside each other"))?;
+    if let Some(i) = world.first_non_finite() {
+        return Err(input!(
+            "body {i} {:?}: its numbers are not finite: no scene file can say them",
+            world.bodies[i].name
+        ));
+    }
+    let mut index_of = vec![usize::MAX; world.bodies.len()];
+    let mut bodies = Vec::new();
+    for handle in world.bodies.handles() {
+        let i = handle.index();
+        index_of[i] = bodies.len();
+        let of_body = |e: Error| e.within(format_args!("body {i} {:?}", world.bodies[i].name));
+        let leaves = scene.leaving.iter().find(|(body, _)| *body == i).map(|(_, leaves)| *leaves);
+        bodies.push(body(&world.bodies[i], leaves).map_err(of_body)?);
+    }
+    let of_spawner = |(k, s): (usize, &Spawner)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
+    Ok(SceneFile {
+        version: 1,
+        name: Some(scene.name.clone()),
+        gravity: numbers(world.gravity_of(0).to_array()),
+        dt: number(scene.dt),
+        steps: scene.steps,
+        container: scene.container.map(|(low, high)| [low, high].map(|corner| numbers(corner.to_array()))),
+        bodies,
+        joints: world.joints.iter().map(|joint| self::joint(joint, &index_of)).collect(),
+        spawners: scene.spawners.iter().enumerate().map(of_spawner).collect::<Result<_>>()?,
+    })
+}
+
+/// A number whose text is short, and which is the same in single precision.
+fn number(x: f32) -> f64 {
+    let short = x.to_string().parse().unwrap_or(f64::from(x));
+    if short as f32 == x { short } else { f64::from(x) }
+}
+
+fn numbers<const N: usize>(x: [f32; N]) -> [f64; N] {
+    x.map(number)
+}
+
+fn spawner(s: &Spawner) -> Result<SpawnerFile> {
+    let Spawner { first, every, count, .. } = *s;
+    Ok(SpawnerFile { body: body(&s.body, Some(s.leaves))?, first, every: every.max(1), count })
+}
+
+fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
+    let mass = |b: &Body| MassFile {
+        mass: number(b.mass.mass),
+        center: numbers(b.mass.center.to_array()),
+        principal_inertia: numbers(b.mass.principal_inertia.to_array()),
+        principal_frame: numbers(b.mass.principal_frame.to_array()),
+    };
+    let leaves = leaves.filter(|leaves| *leaves != Leaves::default());
+    Ok(BodyFile {
+        name: Some(b.name.clone()),
+        kind: b.kind,
+        position: numbers(b.position.to_array()),
+        rotation: numbers(b.rotation.to_array()),
+        linear_velocity: numbers(b.linear_velocity.to_array()),
+        angular_velocity: numbers(b.angular_velocity.to_array()),
+        force: numbers(b.force.to_array()),
+        torque: numbers(b.torque.to_array()),
+        gravity_scale: number(b.gravity_scale),
+        density: None,
+        mass: None,
+        mass_properties: (b.kind == BodyKind::Dynamic).then(|| mass(b)),
+        friction: number(b.material.friction),
+        restitution: number(b.material.restitution),
+        groups: b.groups,
+        leaves: leaves.map(|Leaves { below, after }| LeavesFile { below: below.map(number), after: after.map(number) }),
+        shapes: b.colliders.iter().map(shape).collect::<Result<_>>()?,
+    })
+}
+
+fn shape(c: &Collider) -> Result<ShapeFile> {
+    let points = |all: &[glam::Vec3]| all.iter().map(|p| numbers(p.to_array())).collect();
+    let geometry = match c.shape.parry().as_typed_shape() {
+        TypedShape::Ball(ball) => Geometry::Ball { radius: number(ball.radius) },
+        TypedShape::Cuboid(cuboid) => Geometry::Cuboid { half_extents: numbers(cuboid.half_extents.to_array()) },
+        TypedShape::Capsule(c) => Geometry::Capsule { half_height: number(c.segment.b.y), radius: number(c.radius) },
+        TypedShape::Cylinder(c) => Geometry::Cylinder { half_height: number(c.half_height), radius: number(c.radius) },
+        TypedShape::Cone(c) => Geometry::Cone { half_height: number(c.half_height), radius: number(c.radius) },
+        TypedShape::ConvexPolyhedron(hull) => Geometry::ConvexHull { points: points(hull.points()) },
+        TypedShape::HalfSpace(plane) => Geometry::HalfSpace { normal: numbers(plane.normal.to_array()) },
+        TypedShape::TriMesh(mesh) => {
+            Geometry::Mesh { vertices: points(mesh.vertices()), triangles: mesh.indices().to_vec() }
+        }
+        TypedShape::HeightField(field) => {
+            let heights = field.heights();
+            let row = |i: usize| (0..heights.ncols()).map(|j| number(heights[(i, j)])).collect();
+            Geometry::HeightField {
+                heights: (0..heights.nrows()).map(row).collect(),
+                scale: numbers(field.scale().to_array()),
+            }
+        }
+        _ => return Err(input!("a shape of type {:?}: no scene file can say it", c.shape)),
+    };
+    Ok(ShapeFile { position: numbers(c.position.to_array()), rotation: numbers(c.rotation.to_array()), geometry })
+}
+
+fn joint(joint: &BallJoint, index_of: &[usize]) -> JointFile {
+    JointFile::Ball {
+        bodies: [Some(joint.body_a), joint.body_b].into_iter().flatten().map(|b| BodyRef::Index(index_of[b])).collect(),
+        anchor: None,
+        anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
+        collide: joint.collide,
+    }
+}
