@@ -7,6 +7,7 @@ use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::{Shape, pose};
 use crate::error::{Result, ensure};
+use crate::saved::{Archive, Saved};
 
 /// How a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,7 +98,7 @@ pub struct Body {
     density: f32,
 }
 
-crate::saved::state!(Body {
+crate::saved::cloned!(Body {
     name,
     kind,
     position,
@@ -111,6 +112,50 @@ crate::saved::state!(Body {
     colliders,
     density,
 });
+
+impl Saved for Body {
+    fn blank() -> Self {
+        Self::new(BodyKind::Fixed)
+    }
+
+    /// Pose and velocity are each body's own; most bodies share the rest.
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self {
+            name,
+            kind,
+            position,
+            rotation,
+            linear_velocity,
+            angular_velocity,
+            force,
+            mass,
+            material,
+            groups,
+            colliders,
+            density,
+        } = self;
+        let mut velocities = [*linear_velocity, *angular_velocity];
+        let mut moves = velocities.iter().flat_map(|v| v.to_array()).any(|x| x.to_bits() != 0);
+        archive.repeated(|archive| {
+            moves.walk(archive)?;
+            name.walk(archive)?;
+            kind.walk(archive)?;
+            force.walk(archive)?;
+            mass.walk(archive)?;
+            material.walk(archive)?;
+            groups.walk(archive)?;
+            colliders.walk(archive)?;
+            density.walk(archive)
+        })?;
+        position.walk(archive)?;
+        rotation.walk(archive)?;
+        if moves {
+            velocities.walk(archive)?;
+            [*linear_velocity, *angular_velocity] = velocities;
+        }
+        Ok(())
+    }
+}
 
 impl Body {
     /// A body of this kind, without shapes.
