@@ -16,16 +16,14 @@ pub struct Placed {
     pub rotation: Quat,
     /// Center of mass (m).
     pub center: Vec3,
-    rest: f32,
+    /// 1 if the center is the origin of its frame, otherwise 0.
+    pub(super) is_centered: f32,
 }
 
 impl Placed {
-    pub(super) fn new(rotation: Quat, center: Vec3) -> Self {
-        Self { rotation, center, rest: 0.0 }
-    }
-
     pub(super) fn of(body: &BodyState) -> Self {
-        Self { rotation: body.rotation, center: body.center, rest: 0.0 }
+        let is_centered = body.center.to_array().map(f32::to_bits) == body.position.to_array().map(f32::to_bits);
+        Self { rotation: body.rotation, center: body.center, is_centered: f32::from(is_centered) }
     }
 }
 

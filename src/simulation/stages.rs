@@ -140,7 +140,7 @@ impl Stages {
         sleep.walk(world, detector.kinds(), archive)?;
         effort.walk(archive)?;
         problem.walk(archive)?;
-        contacts.walk(world, detector, (&key.config, key.scale.as_ref()), effort, problem, archive)?;
+        contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
         joints.walk(archive)
     }
 

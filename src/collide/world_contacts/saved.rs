@@ -1,10 +1,11 @@
 //! The contacts of one world as bytes.
 //!
 //! Most of it follows from little: a manifold from where its bodies were when it was computed, and from the distance up to which contacts
-//! were predicted. Manifolds are made again from that when they are saved, and only those that come out otherwise are written as they
-//! are. Where a body was is near where it is, and the same for most of its pairs.
+//! were predicted. The places of bodies tell the centers of mass, so that only manifolds of bodies whose center is their origin are made
+//! again from that, and the others are written as they are. Builds for tests make them again when they are saved, too, and compare all bits.
+//! Where a body was is near where it is, and the same for some of its pairs.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use parry3d::bounding_volume::BoundingVolume;
 use parry3d::math::Pose;
 use rayon::prelude::*;
@@ -42,6 +43,8 @@ struct Flags {
     is_computed: bool,
     /// The manifolds follow from the rest.
     are_remade: bool,
+    /// How many manifolds there are; 3 for more than 2.
+    manifolds: u8,
 }
 
 impl Saved for Flags {
@@ -50,10 +53,11 @@ impl Saved for Flags {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { is_swapped, takes_part, is_plain, is_computed, are_remade } = self;
+        let Self { is_swapped, takes_part, is_plain, is_computed, are_remade, manifolds } = self;
         let all = [is_swapped, takes_part, is_plain, is_computed, are_remade];
-        let mut bits = (0..).zip(&all).map(|(k, flag)| u8::from(**flag) << k).sum::<u8>();
+        let mut bits = (0..).zip(&all).map(|(k, flag)| u8::from(**flag) << k).sum::<u8>() | *manifolds << 5;
         bits.walk(archive)?;
+        *manifolds = bits >> 5 & 3;
         (0..).zip(all).for_each(|(k, flag)| *flag = bits >> k & 1 == 1);
         Ok(())
     }
@@ -113,17 +117,32 @@ impl Places {
             }
             let now = world.bodies.get(body as usize);
             let center = now.map_or(Vec3::ZERO, Body::center_of_mass);
-            let rotation = now.map_or_else(Default::default, |body| body.rotation).to_array();
-            let mut own = then.rotation.to_array();
+            let rotation = now.map_or_else(Default::default, |body| body.rotation);
             archive.near_vector(&mut then.center, center)?;
-            (0..4).try_for_each(|k| archive.near(&mut own[k], rotation[k]))?;
-            *then = Placed::new(glam::Quat::from_array(own), then.center);
+            walk_rotation(&mut then.rotation, rotation, archive)?;
+            let mut is_centered = then.is_centered == 1.0;
+            is_centered.walk(archive)?;
+            *then = Placed { is_centered: f32::from(is_centered), ..*then };
             let latest = &mut self.latest[body as usize];
             self.all.push((*then, *latest));
             *latest = self.all.len() as u32;
         }
         Ok(())
     }
+}
+
+/// A rotation near another. Its length is known, so that the component which is largest there follows from the others but for rounding.
+fn walk_rotation<A: Archive>(rotation: &mut Quat, near: Quat, archive: &mut A) -> Result<()> {
+    let (mut own, near) = (rotation.to_array(), near.to_array());
+    let largest = (1..4).fold(0, |best, k| if near[k].abs() > near[best].abs() { k } else { best });
+    let mut square = 1.0;
+    for k in (0..4).filter(|&k| k != largest) {
+        archive.near(&mut own[k], near[k])?;
+        square -= f64::from(own[k]) * f64::from(own[k]);
+    }
+    archive.near(&mut own[largest], (square.max(0.0).sqrt() as f32).copysign(near[largest]))?;
+    *rotation = Quat::from_array(own);
+    Ok(())
 }
 
 impl WorldContacts {
@@ -216,7 +235,7 @@ impl WorldContacts {
         [share, added]: [f32; 2],
         archive: &mut A,
     ) -> Result<()> {
-        let mut are_remade = if A::READS { Vec::new() } else { self.remade(are_current, world) };
+        let mut are_remade = vec![false; if A::READS { 0 } else { self.pairs.len() }];
         let count = archive.count(self.pairs.len())?;
         let mut pairs = Pairs::default();
         let mut places = Places { latest: vec![0; known as usize], all: Vec::new() };
@@ -234,14 +253,16 @@ impl WorldContacts {
             if !A::READS {
                 let (pair, track) = self.pairs.with_track(i);
                 let plain = Track::of(&Pair::new(pair.collider_a, pair.collider_b, &self.colliders), &self.colliders);
+                let are_current = are_current[i_key.0 as usize] && are_current[i_key.1 as usize];
+                let is_plain = are_current && is_plain(pair, track, &plain);
+                are_remade[i] = is_plain && self.is_remade(i);
                 flags = Flags {
                     is_swapped: pair.collider_a > pair.collider_b,
                     takes_part: pair.takes_part,
-                    is_plain: are_current[i_key.0 as usize]
-                        && are_current[i_key.1 as usize]
-                        && is_plain(pair, track, &plain),
+                    is_plain,
                     is_computed: track.predicted != NEVER,
                     are_remade: are_remade[i],
+                    manifolds: pair.manifolds.len().min(3) as u8,
                 };
                 manifolds = pair.manifolds.len();
             }
@@ -250,7 +271,7 @@ impl WorldContacts {
             archive.index(&mut i_key.1, i_key.0)?;
             last = i_key.0;
             self.keys[i] = i_key;
-            manifolds = archive.count(manifolds)?;
+            manifolds = if flags.manifolds < 3 { flags.manifolds.into() } else { archive.count(manifolds)? };
             if !A::READS {
                 let (pair, track) = self.pairs.with_track(i);
                 let (mut pair, mut track) = (PairRest::of(pair, track), *track);
@@ -300,38 +321,37 @@ impl WorldContacts {
             slots_of.push(slots.len() as u32);
             pairs.push(pair, track);
         }
+        let remade: Vec<u32> = (0..count as u32).filter(|&i| are_remade[i as usize]).collect();
         if A::READS {
             self.pairs = pairs;
-            self.remake(&are_remade, &slots, &slots_of, world)?;
+            return self.remake(&remade, &slots, &slots_of);
         }
+        debug_assert!(self.are_same_again(&remade), "a manifold does not follow from where its bodies were");
         Ok(())
     }
 
-    /// Which pairs have manifolds that come out the same when they are made again.
-    fn remade(&self, are_current: &[bool], world: &World) -> Vec<bool> {
-        let is_wanted = |&i: &u32| {
-            let pair = &self.pairs[i as usize];
-            let are_current = [pair.collider_a, pair.collider_b].iter().all(|&c| are_current[c as usize]);
-            are_current && !pair.manifolds.is_empty() && self.pairs.computed_at(i as usize).is_some()
-        };
-        let wanted: Vec<u32> = (0..self.pairs.len() as u32).filter(is_wanted).collect();
-        let are_same = wanted.par_chunks(PAIRS_A_TASK).flat_map_iter(|chunk| {
-            let again = self.made_again(chunk, world);
-            let is_same = |(now, &i): (Pair, &u32)| {
-                let then = &self.pairs[i as usize].manifolds;
-                now.manifolds.len() == then.len() && now.manifolds.iter().zip(then).all(|(now, then)| now.is_as(then))
-            };
-            again.into_iter().zip(chunk).map(is_same).collect::<Vec<_>>()
-        });
-        let mut remade = vec![false; self.pairs.len()];
-        let are_same: Vec<bool> = are_same.collect();
-        wanted.iter().zip(are_same).for_each(|(&i, is_same)| remade[i as usize] = is_same);
-        remade
+    /// Whether the manifolds of a pair follow from the rest, where its colliders and all that follows from them are as they were.
+    fn is_remade(&self, i: usize) -> bool {
+        let then = self.pairs.computed_at(i);
+        then.is_some_and(|then| then.iter().all(|place| place.is_centered == 1.0))
+            && !self.pairs[i].manifolds.is_empty()
+    }
+
+    /// Whether the manifolds of pairs come out with the same bits when they are made again.
+    fn are_same_again(&self, pairs: &[u32]) -> bool {
+        pairs.par_chunks(PAIRS_A_TASK).all(|chunk| {
+            let mut same = 0;
+            self.make_again(chunk, |k, now| {
+                let then = &self.pairs[chunk[k] as usize].manifolds;
+                let is_same = now.len() == then.len() && now.iter().zip(then).all(|(now, then)| now.is_as(then));
+                same += usize::from(is_same);
+            });
+            same == chunk.len()
+        })
     }
 
     /// Makes the manifolds of these pairs again and gives them their slots.
-    fn remake(&mut self, are_remade: &[bool], slots: &[u32], slots_of: &[u32], world: &World) -> Result<()> {
-        let wanted: Vec<u32> = (0..self.pairs.len() as u32).filter(|&i| are_remade[i as usize]).collect();
+    fn remake(&mut self, wanted: &[u32], slots: &[u32], slots_of: &[u32]) -> Result<()> {
         let can_be = |&i: &u32| {
             let (_, Track { predicted, then, .. }) = self.pairs.with_track(i as usize);
             let is_near = |place: &Placed| {
@@ -340,55 +360,70 @@ impl WorldContacts {
             then.iter().all(is_near) && *predicted >= 0.0
         };
         ensure(wanted.iter().all(can_be), || "a pair was computed where nothing can be".to_owned())?;
-        let again: Vec<Vec<Pair>> =
-            wanted.par_chunks(PAIRS_A_TASK).map(|chunk| self.made_again(chunk, world)).collect();
-        for (pair, &i) in again.into_iter().flatten().zip(&wanted) {
+        let again = wanted.par_chunks(PAIRS_A_TASK).flat_map_iter(|chunk| {
+            let mut all = vec![Vec::new(); chunk.len()];
+            self.make_again(chunk, |k, now| all[k] = std::mem::take(now));
+            all
+        });
+        let again: Vec<Vec<Manifold>> = again.collect();
+        for (manifolds, &i) in again.into_iter().zip(wanted) {
             let i = i as usize;
             let own = &slots[slots_of[i] as usize..slots_of[i + 1] as usize];
-            ensure(own.len() == pair.manifolds.len(), || {
-                format!("pair {i} has {} manifolds, not {}", pair.manifolds.len(), own.len())
+            ensure(own.len() == manifolds.len(), || {
+                format!("pair {i} has {} manifolds, not {}", manifolds.len(), own.len())
             })?;
-            self.pairs[i].manifolds = pair.manifolds;
+            self.pairs[i].manifolds = manifolds;
             self.pairs[i].manifolds.iter_mut().zip(own).for_each(|(manifold, &slot)| manifold.slot = slot);
         }
         Ok(())
     }
 
-    /// Pairs with the manifolds that they get where their bodies were.
-    fn made_again(&self, chunk: &[u32], world: &World) -> Vec<Pair> {
+    /// Makes the manifolds of pairs again where their bodies were, and calls `with` on the place of each in the chunk and on them; not on pairs
+    /// of cuboids that do not touch.
+    fn make_again(&self, chunk: &[u32], mut with: impl FnMut(usize, &mut Vec<Manifold>)) {
+        let Some(&first) = chunk.first() else { return };
         let mut scratch = PairScratch::default();
+        let mut again = self.pairs[first as usize].clone();
+        let begin = |pair: &Pair, again: &mut Pair| {
+            let Pair { body_a, body_b, manifolds: _, collider_a, collider_b, size, takes_part } = *pair;
+            let mut manifolds = std::mem::take(&mut again.manifolds);
+            manifolds.clear();
+            *again = Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part };
+        };
         let mut states = Vec::with_capacity(2 * chunk.len());
-        let (mut pairs, mut cuboids) = (Vec::with_capacity(chunk.len()), Vec::with_capacity(chunk.len()));
-        for &i in chunk {
+        let mut cuboids = Vec::with_capacity(chunk.len());
+        for (number, &i) in chunk.iter().enumerate() {
             let (pair, track) = self.pairs.with_track(i as usize);
-            let (number, first) = (pairs.len() as u32, states.len() as u32);
-            for (&body, then) in track.bodies.iter().zip(&track.then) {
-                let com = world.bodies.get(body as usize).map_or(Vec3::ZERO, |body| body.mass.center);
-                let position = then.center - then.rotation * com;
-                states.push(BodyState {
-                    rotation: then.rotation,
-                    center: then.center,
-                    position,
-                    ..BodyState::default()
-                });
-            }
+            let state = |&Placed { rotation, center, .. }: &Placed| BodyState {
+                rotation,
+                center,
+                position: center,
+                ..BodyState::default()
+            };
+            states.extend(track.then.iter().map(state));
             let places = [pair.collider_a, pair.collider_b];
-            pairs.push(Pair::new(places[0], places[1], &self.colliders));
             if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
-                let bodies = [first, first + 1];
-                cuboids.push(CuboidPair { bodies, cuboids: places, prediction: track.predicted, number });
+                let bodies = [0, 1].map(|side| (2 * number + side) as u32);
+                cuboids.push(CuboidPair {
+                    bodies,
+                    cuboids: places,
+                    prediction: track.predicted,
+                    number: number as u32,
+                });
             } else {
-                let sides = self.sides_of(pair, &states[first as usize..]);
-                pairs[number as usize].compute(sides, track.predicted, &mut scratch);
+                begin(pair, &mut again);
+                again.compute(self.sides_of(pair, &states[2 * number..]), track.predicted, &mut scratch);
+                with(number, &mut again.manifolds);
             }
         }
         let set = InstructionSet::default();
         cuboid_contacts(set, &states, &self.cuboids, &cuboids, &mut CuboidScratch::default(), |number, write| {
-            let (pair, track) = self.pairs.with_track(chunk[number as usize] as usize);
-            let sides = self.sides_of(pair, &states[2 * number as usize..]);
-            pairs[number as usize].take_over(sides, track.predicted, write, &mut scratch);
+            let number = number as usize;
+            let (pair, track) = self.pairs.with_track(chunk[number] as usize);
+            begin(pair, &mut again);
+            again.take_over(self.sides_of(pair, &states[2 * number..]), track.predicted, write, &mut scratch);
+            with(number, &mut again.manifolds);
         });
-        pairs
     }
 
     fn sides_of<'a>(&'a self, pair: &Pair, states: &'a [BodyState]) -> [Side<'a>; 2] {

@@ -1,8 +1,8 @@
 //! The rows of contacts as bytes.
 //!
-//! Slots follow from the manifolds that have them, and rows from manifolds, materials and masses. They are written again from these
-//! when they are saved, and only what comes out otherwise is saved as it is: the masses of bodies that turned since, most of all. What
-//! stays are impulses, preloads, and how deep contacts sag and sagged.
+//! Slots follow from the manifolds that have them, and rows from manifolds, materials and masses. Only what may have changed since they were
+//! written is saved as it is: effective masses of bodies with unequal moments, which turned, most of all. Builds for tests write the other
+//! rows again when they are saved, too, and compare all bits. What is left are impulses, preloads, and how deep contacts sag and sagged.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use super::super::bodies::mass_row;
 use super::super::carry::Carry;
 use super::super::prepare::{ComputedRow, PoseRow};
 use super::super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
-use super::super::slots::{FREE, Slots, Write};
+use super::super::slots::{FREE, Slot, Slots, Write};
 use super::super::write::{Chosen, SLOTS_A_TASK, SlotRows, Writer};
 use super::super::{StepProblem, StepScale, points_a_slot};
 use super::{ContactRows, Materials};
@@ -20,7 +20,7 @@ use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::{Edge, IMMOVABLE, lay_out};
 use crate::saved::{Archive, Saved};
-use crate::world::{BodyKind, World};
+use crate::world::{Body, BodyKind, MassProperties, Material, World};
 
 /// How the rows of a slot are written.
 #[derive(Clone, Copy)]
@@ -69,7 +69,7 @@ impl ContactRows {
         &mut self,
         world: &World,
         detector: &Detector,
-        (config, scale): (&SolverConfig, Option<&StepScale>),
+        (config, scale, surfaces): (&SolverConfig, Option<&StepScale>, &[(MassProperties, Material)]),
         effort: &Effort,
         problem: &mut StepProblem,
         archive: &mut A,
@@ -157,18 +157,42 @@ impl ContactRows {
             (own, buffers)
         };
         let firsts: Vec<usize> = (0..count).step_by(SLOTS_A_TASK).collect();
-        let mut kinds = vec![Rows::All; count];
+        let mut kinds = Vec::new();
         if !A::READS {
-            let of_task = |&first: &usize| {
-                let (own, now) = task(first);
-                let rows = own.clone().map(|i| {
-                    let points = &points[i * stride..(i + 1) * stride];
-                    now.rows(i - own.start, slips, (&contacts[i], points, &computed[i], jams[i]))
-                });
-                rows.collect::<Vec<_>>()
+            let of_slot = |slot: &Slot| {
+                let pair = detector.pair(slot.world, slot.pair);
+                let bodies = [pair.body_a, pair.body_b].map(|body| body as usize);
+                let is_same = |&body: &usize| {
+                    let now = world.bodies.get(body);
+                    now.is_some_and(|b| {
+                        surfaces.get(body) == Some(&(b.mass, b.material)) && b.kind == detector.kinds()[body]
+                    })
+                };
+                let turns = |&body: &usize| masses[body].inv_mass > 0.0 && !has_equal_moments(&world.bodies[body]);
+                match all_there && bodies.iter().any(turns) {
+                    // Rows of contacts that rest are written again before they are swept.
+                    _ if !slot.takes_part && all_there => Rows::Remade,
+                    _ if slot.write != Write::Separations || !all_there || !bodies.iter().all(is_same) => Rows::All,
+                    true => Rows::Masses,
+                    false => Rows::Remade,
+                }
             };
-            kinds = firsts.par_iter().flat_map_iter(of_task).collect();
+            kinds.extend(
+                slots.all.iter().zip(&is_taken).map(|(slot, taken)| if *taken { of_slot(slot) } else { Rows::All }),
+            );
+            debug_assert!(
+                firsts.iter().all(|&first| {
+                    let (own, now) = task(first);
+                    own.clone().filter(|&i| is_taken[i] && slots.all[i].takes_part).all(|i| {
+                        let points = &points[i * stride..(i + 1) * stride];
+                        now.rows(i - own.start, slips, (&contacts[i], points, &computed[i], jams[i])) as u8
+                            <= kinds[i] as u8
+                    })
+                }),
+                "a row does not follow from its manifold"
+            );
         } else {
+            kinds.resize(count, Rows::All);
             for (own, buffers) in firsts.par_iter().map(|&first| task(first)).collect::<Vec<_>>() {
                 contacts[own.clone()].copy_from_slice(&buffers.contacts);
                 points[own.start * stride..own.end * stride].copy_from_slice(&buffers.points);
@@ -176,10 +200,14 @@ impl ContactRows {
                 jams[own].copy_from_slice(&buffers.jams);
             }
         }
+        let movable = |body: u32| masses.get(body as usize).is_some_and(|mass| mass.inv_mass > 0.0);
         for i in (0..count).filter(|&i| is_taken[i]) {
             let (slot, contact, sag) = (&mut slots.all[i], &mut contacts[i], &mut sags[i]);
             let points = &mut points[i * stride..(i + 1) * stride];
-            let has = [contact.preload, *sag, slot.need, contact.substep_share - 1.0].map(|x| x.to_bits() != 0);
+            let pair = detector.pair(slot.world, slot.pair);
+            let usual_share = effort.share(if movable(pair.body_a) { pair.body_a } else { pair.body_b } as usize);
+            let has = [contact.preload, *sag, slot.need].map(|x| x.to_bits() != 0);
+            let has = [has[0], has[1], has[2], contact.substep_share != usual_share];
             let mut bits = (0..).zip(has).fold(kinds[i] as u8, |bits, (k, has)| bits | u8::from(has) << (2 + k));
             bits.walk(archive)?;
             let has = [2, 3, 4, 5].map(|k| bits >> k & 1 == 1);
@@ -207,7 +235,7 @@ impl ContactRows {
             let impulses = &mut impulses[i * stride..][..count + usize::from(*patches)];
             walk_impulses(impulses, archive)?;
             if A::READS {
-                (contact.preload, *sag, slot.need, contact.substep_share) = (0.0, 0.0, 0.0, 1.0);
+                (contact.preload, *sag, slot.need, contact.substep_share) = (0.0, 0.0, 0.0, usual_share);
             }
             if has[0] {
                 contact.preload.walk(archive)?;
@@ -258,6 +286,12 @@ impl Buffers {
             false => Rows::Masses,
         }
     }
+}
+
+/// Whether no rotation changes the inverse inertia of a body.
+fn has_equal_moments(body: &Body) -> bool {
+    let moments = body.mass.principal_inertia;
+    moments.x == moments.y && moments.y == moments.z
 }
 
 /// Writes what is most of the time as `usual` makes it, or reads it.
