@@ -11,8 +11,10 @@
 mod island;
 
 use crate::config::{Method, SolverConfig, Stabilization};
+use crate::error::{Result, ensure};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
+use crate::saved::{Archive, Saved};
 use crate::stats::EFFORT_CLASSES;
 use crate::world::{BodyKind, World};
 use island::{HIGHEST, Island};
@@ -66,7 +68,7 @@ pub struct Effort {
     of_root: Vec<Island>,
 }
 
-crate::saved::state!(Effort {
+crate::saved::cloned!(Effort {
     classes,
     calm_for,
     restless,
@@ -82,6 +84,60 @@ crate::saved::state!(Effort {
     movable,
     counts,
 } scratch { awake, islands, of_root });
+
+impl Saved for Effort {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self {
+            classes,
+            calm_for,
+            restless,
+            restless_need,
+            heaps,
+            heaps_before,
+            heaps_change,
+            has_heaps,
+            heaps_in,
+            used,
+            any_above,
+            highest,
+            movable,
+            counts,
+            awake: _,
+            islands: _,
+            of_root: _,
+        } = self;
+        let bodies = archive.count(classes.len())?;
+        if A::READS {
+            classes.resize(bodies, 0);
+            calm_for.resize(bodies, 0);
+            heaps.resize(bodies, false);
+            heaps_before.resize(bodies, false);
+        }
+        for i in 0..bodies {
+            archive.repeated(|archive| {
+                classes[i].walk(archive)?;
+                calm_for[i].walk(archive)?;
+                heaps[i].walk(archive)?;
+                heaps_before[i].walk(archive)
+            })?;
+            ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))?;
+        }
+        restless.walk(archive)?;
+        restless_need.walk(archive)?;
+        heaps_change.walk(archive)?;
+        has_heaps.walk(archive)?;
+        heaps_in.walk(archive)?;
+        used.walk(archive)?;
+        any_above.walk(archive)?;
+        highest.walk(archive)?;
+        movable.walk(archive)?;
+        counts.walk(archive)
+    }
+}
 
 /// What bodies of one block have in common: their class, and whether they are of heaps.
 type Kind = (u8, bool);

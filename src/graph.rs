@@ -162,7 +162,7 @@ impl Islands {
 }
 
 /// Sorts the members by color: movable ones, their overflow, those with fixed bodies, their overflow.
-fn lay_out(edges: &[Edge], members: &[u32]) -> Coloring {
+pub fn lay_out(edges: &[Edge], members: &[u32]) -> Coloring {
     // 64 colors and one bucket for the overflow, twice.
     let bucket = |i: u32| {
         let edge = &edges[i as usize];

@@ -136,11 +136,10 @@ impl<W: Write> Recorder<W> {
         self.steps += 1;
         let hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
         let mut record = StepRecord { dt, change, config, woken, hash };
-        self.shapes.bytes.clear();
+        self.shapes = Writer::behind(std::mem::take(&mut self.shapes));
         record.walk(&mut self.shapes)?;
         let bytes = std::mem::take(&mut self.shapes.bytes);
         self.part(STEP, &bytes)?;
-        self.shapes.bytes = bytes;
         if self.steps.is_multiple_of(self.intervals.state) {
             self.part(STATE, &simulation.save())?;
         }

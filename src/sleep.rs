@@ -10,7 +10,9 @@ use glam::{Quat, Vec3};
 
 use crate::collide::{Activity, Detector};
 use crate::config::SolverConfig;
+use crate::error::{Result, ensure};
 use crate::graph::Islands;
+use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, World};
 
 /// The state of a body that a caller may change between two steps.
@@ -41,6 +43,12 @@ impl Snapshot {
             gravity: world.gravity_on(i),
         }
     }
+
+    fn bits(&self) -> ([u32; 4], [[u32; 3]; 6]) {
+        let Self { position, rotation, linear_velocity, angular_velocity, force, torque, gravity } = self;
+        let vectors = [position, linear_velocity, angular_velocity, force, torque, gravity];
+        (rotation.to_array().map(f32::to_bits), vectors.map(|v| v.to_array().map(f32::to_bits)))
+    }
 }
 
 /// Which bodies sleep, and since when the others are slow.
@@ -66,7 +74,7 @@ pub struct Sleep {
     steps: u32,
 }
 
-crate::saved::state!(Sleep {
+crate::saved::cloned!(Sleep {
     after,
     speed,
     asleep,
@@ -82,7 +90,60 @@ crate::saved::state!(Sleep {
 /// Islands are looked for in every so many steps.
 const EVERY: u32 = 8;
 
+/// What [`Sleep::walk`] does with the state in which a body was left.
+#[derive(Clone, Copy, PartialEq)]
+enum Left {
+    /// A body that is awake and can be pushed has none.
+    Unused,
+    AsTheBody,
+    Other,
+}
+
+crate::saved::kinds!(Left { Unused, AsTheBody, Other });
+
 impl Sleep {
+    /// Writes all that lasts, or reads it: for the bodies of `world`, whose kinds were `kinds` in the step before.
+    pub fn walk<A: Archive>(&mut self, world: &World, kinds: &[BodyKind], archive: &mut A) -> Result<()> {
+        let Self { after, speed, asleep, activity, slow_for, reach, left, islands: _, next, count, steps } = self;
+        after.walk(archive)?;
+        speed.walk(archive)?;
+        steps.walk(archive)?;
+        let bodies = archive.count(asleep.len())?;
+        if A::READS {
+            ensure(bodies == 0 || bodies == kinds.len(), || format!("{bodies} of {} bodies may sleep", kinds.len()))?;
+            asleep.resize(bodies, false);
+            activity.resize(bodies, Activity::Awake);
+            slow_for.resize(bodies, 0.0);
+            reach.resize(bodies, 0.0);
+            left.resize(bodies, Snapshot::default());
+            next.resize(bodies, 0);
+        }
+        for i in 0..bodies {
+            let now = world.bodies.get(i).map(|_| Snapshot::of(world, i)).unwrap_or_default();
+            let mut is_left = match left[i].bits() == now.bits() {
+                _ if kinds[i] == BodyKind::Dynamic && !asleep[i] => Left::Unused,
+                true => Left::AsTheBody,
+                false => Left::Other,
+            };
+            archive.repeated(|archive| {
+                asleep[i].walk(archive)?;
+                activity[i].walk(archive)?;
+                slow_for[i].walk(archive)?;
+                reach[i].walk(archive)?;
+                is_left.walk(archive)
+            })?;
+            match is_left {
+                Left::Other => left[i].walk(archive)?,
+                _ if A::READS => left[i] = now,
+                _ => {}
+            }
+            archive.index(&mut next[i], i as u32)?;
+            ensure((next[i] as usize) < bodies, || format!("body {} of {bodies} sleeps", next[i]))?;
+        }
+        *count = asleep.iter().filter(|asleep| **asleep).count();
+        Ok(())
+    }
+
     /// Everything is awake.
     pub fn new(world: &World, config: &SolverConfig) -> Self {
         if config.sleep_after == 0.0 {

@@ -11,9 +11,9 @@ use super::pairs::Placed;
 use super::places::Places;
 use super::report::{Change, DetectStats};
 use super::teleport::{Left, Teleports};
-use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
+use super::world_contacts::{ColliderRange, DetectionInput, PlacedBody, WorldContacts, key};
 use crate::config::SolverConfig;
-use crate::error::{Result, ensure, input};
+use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, Groups, World};
 
@@ -53,35 +53,70 @@ fn jointed(world: &World) -> HashSet<(u32, u32)> {
 }
 
 impl Detector {
-    /// Writes all that lasts, or reads it: for the bodies of `world`.
-    pub(crate) fn walk<A: Archive>(&mut self, world: &World, archive: &mut A) -> Result<()> {
-        let mut are_of_world: Vec<bool> = Vec::new();
-        if !A::READS {
-            let is_of_world = |(i, known): (usize, &KnownBody)| {
-                world.bodies.get(i).is_some_and(|body| self.has_shapes_of(i, *known, body))
-            };
-            are_of_world.extend(self.known.iter().enumerate().map(is_of_world));
-        }
-        let Self { worlds, known, kinds, groups, moving: _, left, falls: _, jointed } = self;
-        known.walk(archive)?;
-        are_of_world.walk(archive)?;
-        kinds.walk(archive)?;
-        groups.walk(archive)?;
-        left.walk(archive)?;
-        jointed.walk(archive)?;
-        worlds.walk(archive)?;
+    /// Writes all that lasts, or reads it: for the bodies of `world`. `base` guesses the distance up to which contacts are predicted: its
+    /// share of the size of a pair, and what is added (m).
+    pub(crate) fn walk<A: Archive>(&mut self, world: &World, base: [f32; 2], archive: &mut A) -> Result<()> {
+        let bodies = archive.count(self.known.len())?;
         if A::READS {
-            let count = known.len();
-            ensure(are_of_world.len() == count && kinds.len() == count && groups.len() == count, || {
-                format!("not all is there of {count} bodies")
-            })?;
-            for (i, (known, is_of_world)) in known.iter().zip(are_of_world).enumerate() {
-                let own = world.bodies.get(i).filter(|_| is_of_world).map(|body| &body.colliders[..]);
-                let part = worlds.get_mut(known.world as usize);
-                part.ok_or_else(|| input!("body {i} is of no world"))?.place(i as u32, known.colliders, own)?;
-            }
+            self.known.resize(bodies, KnownBody::default());
+            self.kinds.resize(bodies, BodyKind::Fixed);
+            self.groups.resize(bodies, Groups::ALL);
+            self.left.resize(bodies, Left::default());
         }
-        Ok(())
+        // Whether the colliders of a body are still those of the world.
+        let mut are_current = vec![false; bodies];
+        let mut next = KnownBody::default();
+        for i in 0..bodies {
+            let mut known = self.known[i];
+            let body = world.bodies.get(i);
+            let mut is_left = !A::READS && body.is_some_and(|body| self.left[i].is_of(body));
+            let mut is_current = !A::READS && body.is_some_and(|body| self.has_shapes_of(i, known, body));
+            archive.repeated(|archive| {
+                known.generation.walk(archive)?;
+                known.world.walk(archive)?;
+                archive.index(&mut known.colliders.first, next.colliders.first)?;
+                known.colliders.count.walk(archive)?;
+                self.kinds[i].walk(archive)?;
+                self.groups[i].walk(archive)?;
+                is_left.walk(archive)?;
+                is_current.walk(archive)
+            })?;
+            match body.filter(|_| is_left) {
+                Some(body) => self.left[i] = Left::of(body),
+                None => self.left[i].walk(archive)?,
+            }
+            next.colliders.first = known.colliders.first.wrapping_add(known.colliders.count);
+            (self.known[i], are_current[i]) = (known, is_current);
+        }
+        self.jointed.walk(archive)?;
+        let parts = archive.count(self.worlds.len())?;
+        self.worlds.resize_with(parts, WorldContacts::default);
+        for (part, own) in (0..).zip(&mut self.worlds) {
+            own.walk_places(archive)?;
+            let known = self.known.iter().zip(&are_current).enumerate().filter(|(_, (known, _))| known.world == part);
+            let bodies = known.map(|(i, (known, &is_current))| PlacedBody {
+                index: i as u32,
+                colliders: known.colliders,
+                body: world.bodies.get(i),
+                is_current,
+            });
+            own.walk_contacts(&bodies.collect::<Vec<_>>(), world, base, archive)?;
+        }
+        ensure(self.known.iter().all(|known| (known.world as usize) < parts), || {
+            format!("a body is in none of {parts} worlds")
+        })
+    }
+
+    /// The kinds of the bodies that it knows.
+    pub(crate) fn kinds(&self) -> &[BodyKind] {
+        &self.kinds
+    }
+
+    /// All pairs, each with its world and its place there.
+    pub(crate) fn placed_pairs(&self) -> impl Iterator<Item = ([u32; 2], &Pair)> {
+        (0..)
+            .zip(&self.worlds)
+            .flat_map(|(part, world)| (0..).zip(&world.pairs[..]).map(move |(i, pair)| ([part, i], pair)))
     }
 
     /// A detector for the bodies of `world` as they are now.

@@ -2,6 +2,9 @@
 
 use glam::Vec3;
 
+use crate::error::{Result, input};
+use crate::saved::{Archive, Saved};
+
 /// Most points that a manifold keeps.
 pub const MAX_POINTS: usize = 4;
 
@@ -47,7 +50,23 @@ pub struct Manifold {
     count: u8,
 }
 
-crate::saved::fields!(Manifold { normal, subshapes, radius_a, radius_b, slot, points, count });
+impl Saved for Manifold {
+    fn blank() -> Self {
+        Self::new(Vec3::Y, (0, 0), &[])
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self { normal, subshapes, radius_a, radius_b, slot, points, count } = self;
+        normal.walk(archive)?;
+        subshapes.walk(archive)?;
+        radius_a.walk(archive)?;
+        radius_b.walk(archive)?;
+        slot.walk(archive)?;
+        count.walk(archive)?;
+        let own = points.get_mut(..usize::from(*count)).ok_or_else(|| input!("a manifold of {count} points"))?;
+        own.iter_mut().try_for_each(|point| point.walk(archive))
+    }
+}
 
 impl Manifold {
     /// A manifold of at most four of the `candidates`.
@@ -55,6 +74,22 @@ impl Manifold {
         let mut points = [ManifoldPoint::default(); MAX_POINTS];
         let count = reduce(normal, candidates, &mut points);
         Self { normal, subshapes, radius_a: 0.0, radius_b: 0.0, slot: NO_SLOT, points, count: count as u8 }
+    }
+
+    /// Whether another has the same bits, slots and the points before apart.
+    pub(super) fn is_as(&self, other: &Self) -> bool {
+        let numbers = |point: &ManifoldPoint| {
+            let ManifoldPoint { anchor_a, anchor_b, r_a, r_b, separation, features, before: _ } = *point;
+            let vectors = [anchor_a, anchor_b, r_a, r_b].map(|v| v.to_array().map(f32::to_bits));
+            (vectors, separation.to_bits(), features)
+        };
+        let Self { normal, subshapes, radius_a, radius_b, slot: _, points: _, count: _ } = self;
+        let same = |a: f32, b: f32| a.to_bits() == b.to_bits();
+        (0..3).all(|k| same(normal[k], other.normal[k]))
+            && *subshapes == other.subshapes
+            && same(*radius_a, other.radius_a)
+            && same(*radius_b, other.radius_b)
+            && self.points().iter().map(numbers).eq(other.points().iter().map(numbers))
     }
 
     /// Its points.

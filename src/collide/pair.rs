@@ -29,7 +29,7 @@ pub struct Pair {
     pub takes_part: bool,
 }
 
-crate::saved::state!(Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part });
+crate::saved::cloned!(Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part });
 
 /// A collider, and where its body is.
 pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);

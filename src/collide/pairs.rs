@@ -16,19 +16,19 @@ pub struct Placed {
     pub rotation: Quat,
     /// Center of mass (m).
     pub center: Vec3,
-    rest: f32,
+    /// 1 if the center is the origin of its frame, otherwise 0.
+    pub(super) is_centered: f32,
 }
-
-crate::saved::fields!(Placed { rotation, center, rest });
 
 impl Placed {
     pub(super) fn of(body: &BodyState) -> Self {
-        Self { rotation: body.rotation, center: body.center, rest: 0.0 }
+        let is_centered = body.center.to_array().map(f32::to_bits) == body.position.to_array().map(f32::to_bits);
+        Self { rotation: body.rotation, center: body.center, is_centered: f32::from(is_centered) }
     }
 }
 
 /// What the test reads of a pair: three rows of eight numbers, so that lanes can gather them.
-#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Track {
     /// Half of the smallest side of the thinner collider (m).
@@ -47,13 +47,11 @@ pub(super) struct Track {
     pub then: [Placed; 2],
 }
 
-crate::saved::fields!(Track { size, reach_b, predicted, unbounded, takes_part, rest, bodies, then });
-
 /// The predicted distance of a pair that was never computed.
 pub(super) const NEVER: f32 = f32::NEG_INFINITY;
 
 impl Track {
-    fn of(pair: &Pair, colliders: &[ColliderInfo]) -> Self {
+    pub fn of(pair: &Pair, colliders: &[ColliderInfo]) -> Self {
         let [a, b] = [pair.collider_a, pair.collider_b].map(|c| &colliders[c as usize]);
         Self {
             size: pair.size,
@@ -75,7 +73,7 @@ pub(super) struct Pairs {
     tracks: Vec<Track>,
 }
 
-crate::saved::state!(Pairs { all, tracks });
+crate::saved::cloned!(Pairs { all, tracks });
 
 /// Some pairs one after another.
 pub(super) struct PairChunk<'a> {
@@ -100,6 +98,17 @@ impl Pairs {
         self.all.par_extend(found.par_iter().with_min_len(1024).map(begin));
         let new = self.all[first..].par_iter().with_min_len(1024);
         self.tracks.par_extend(new.map(|pair| Track::of(pair, colliders)));
+    }
+
+    /// A pair and what the test of it reads.
+    pub fn with_track(&self, place: usize) -> (&Pair, &Track) {
+        (&self.all[place], &self.tracks[place])
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, pair: Pair, track: Track) {
+        self.all.push(pair);
+        self.tracks.push(track);
     }
 
     /// Ends a pair; the last takes its place.

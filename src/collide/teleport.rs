@@ -24,6 +24,13 @@ impl Left {
     pub fn of(body: &Body) -> Self {
         Self { rotation: body.rotation, position: body.position }
     }
+
+    /// Whether the body is there, to the last bit.
+    pub fn is_of(&self, body: &Body) -> bool {
+        let bits =
+            |left: &Self| (left.rotation.to_array().map(f32::to_bits), left.position.to_array().map(f32::to_bits));
+        bits(self) == bits(&Self::of(body))
+    }
 }
 
 /// Where all bodies were left, and where they are now; made only if one of them was put elsewhere.

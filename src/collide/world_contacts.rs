@@ -1,5 +1,9 @@
 //! The colliders of one world: which of them are near each other, and what they touch with.
 
+mod saved;
+
+pub(super) use saved::PlacedBody;
+
 use std::collections::{BTreeMap, HashSet};
 
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -14,8 +18,6 @@ use super::pairs::Pairs;
 use super::places::{Place, Standing};
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
-use crate::error::{Result, ensure, input};
-use crate::saved::{Archive, Saved};
 use crate::world::{BodyKind, Collider, Groups};
 
 /// The input of one detection, for all worlds; body indices count over all worlds.
@@ -93,48 +95,6 @@ crate::saved::cloned!(WorldContacts {
     look_again,
 } scratch { found });
 
-impl Saved for WorldContacts {
-    fn blank() -> Self {
-        Self::default()
-    }
-
-    /// The colliders are those of bodies, which [`Self::place`] puts back. Their tree gives the same pairs however it is arranged.
-    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self {
-            colliders,
-            leaving,
-            vacant,
-            cuboids,
-            fat,
-            moved,
-            before,
-            tree: _,
-            planes,
-            pairs,
-            keys,
-            found: _,
-            ended,
-            changed,
-            look_again,
-        } = self;
-        leaving.walk(archive)?;
-        vacant.walk(archive)?;
-        fat.walk(archive)?;
-        if A::READS {
-            colliders.resize_with(fat.len(), ColliderInfo::gone);
-            cuboids.resize(fat.len(), CuboidPlace::default());
-            moved.resize(fat.len(), false);
-            before.resize(fat.len(), NOWHERE);
-        }
-        planes.walk(archive)?;
-        pairs.walk(archive)?;
-        keys.walk(archive)?;
-        ended.walk(archive)?;
-        changed.walk(archive)?;
-        look_again.walk(archive)
-    }
-}
-
 /// A pair, by its place, that is not as it was.
 #[derive(Clone, Copy)]
 struct PairChange {
@@ -182,22 +142,6 @@ impl WorldContacts {
             }
         }
         range
-    }
-
-    /// Puts the colliders of a body back to where they were, unless they are others now: then those that were are of no use any more.
-    pub fn place(&mut self, body: u32, range: ColliderRange, colliders: Option<&[Collider]>) -> Result<()> {
-        let places = range.places();
-        ensure(places.end <= self.colliders.len(), || {
-            format!("body {body} has colliders {places:?} of {}", self.colliders.len())
-        })?;
-        for (i, place) in places.enumerate() {
-            let own =
-                colliders.map(|own| own.get(i).ok_or_else(|| input!("body {body} has no collider {i}"))).transpose()?;
-            self.colliders[place] =
-                own.map_or_else(|| ColliderInfo { body, ..ColliderInfo::gone() }, |own| ColliderInfo::new(body, own));
-            self.cuboids[place] = CuboidPlace::of(&self.colliders[place]);
-        }
-        Ok(())
     }
 
     /// Takes the colliders of a body out. Their pairs end with the next detection, and their places are free then.

@@ -48,15 +48,8 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
             has_torques.store(true, Ordering::Relaxed);
         }
         let heap = if effort.is_in_heap(index) { 1.0 } else { 0.0 };
-        let i = b.mass.world_inverse_inertia(b.rotation);
-        MassRow {
-            inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
-            inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
-            inv_mass: 1.0 / b.mass.mass,
-            heap,
-            acceleration: (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array(),
-            ..MassRow::default()
-        }
+        let acceleration = (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
+        MassRow { heap, acceleration, ..mass_row(b) }
     };
     world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
     problem.torques.clear();
@@ -85,6 +78,17 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
             }
         };
         problem.inertias.extend(world.bodies.iter().enumerate().filter(|&(i, b)| turns(b) && !rests(i)).map(row));
+    }
+}
+
+/// How hard a body is to move that can be pushed.
+pub(super) fn mass_row(body: &Body) -> MassRow {
+    let i = body.mass.world_inverse_inertia(body.rotation);
+    MassRow {
+        inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
+        inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
+        inv_mass: 1.0 / body.mass.mass,
+        ..MassRow::default()
     }
 }
 

@@ -1,5 +1,7 @@
 //! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
 
+mod saved;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -44,15 +46,6 @@ pub struct ContactRows {
     pub carry: Carry,
 }
 
-crate::saved::fields!(ContactRows {
-    slots,
-    coloring,
-    patches,
-    computed,
-    jams,
-    classes,
-    materials,
-} scratch { graph, poses, new_bodies, carry });
 crate::saved::cloned!(ContactRows {
     slots,
     coloring,

@@ -2,6 +2,7 @@
 
 use super::StepProblem;
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
+use super::softness::HEAP_STIFFNESS;
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
 
@@ -19,6 +20,24 @@ pub struct StepScale {
 crate::saved::fields!(StepScale { substep, movable_compliance, fixed_compliance });
 
 impl StepScale {
+    /// The length of steps of so many substeps (s).
+    pub fn step(&self, substeps: u32) -> f32 {
+        self.substep * substeps as f32
+    }
+
+    /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m).
+    pub(super) fn yielding(&self, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
+        let of_heap = self.movable_compliance / HEAP_STIFFNESS;
+        pressed
+            * if in_heap {
+                of_heap
+            } else if both_movable {
+                self.movable_compliance
+            } else {
+                self.fixed_compliance
+            }
+    }
+
     /// That of steps of `dt` seconds.
     pub fn new(config: &SolverConfig, dt: f32) -> Self {
         let Substep { length, movable, fixed, .. } = Substep::new(config, dt / config.substeps as f32);

@@ -43,7 +43,7 @@ pub(super) struct Slot {
 
 crate::saved::fields!(Slot { world, pair, manifold, write, takes_part, size, need });
 
-const FREE: Slot =
+pub(super) const FREE: Slot =
     Slot { world: u32::MAX, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
 
 impl Slot {
@@ -59,12 +59,12 @@ pub(super) struct Slots {
     pub all: Vec<Slot>,
     /// The edges that the graph colors, one a slot.
     pub edges: Vec<Edge>,
-    free: Vec<u32>,
+    pub free: Vec<u32>,
     /// How many were taken since all were sorted.
-    taken: usize,
+    pub taken: usize,
 }
 
-crate::saved::state!(Slots { all, edges, free, taken });
+crate::saved::cloned!(Slots { all, edges, free, taken });
 
 impl Slots {
     /// Follows the detection: manifolds that began take a slot, those that ended leave theirs.
@@ -111,6 +111,14 @@ impl Slots {
             let edge = &mut self.edges[manifold.slot as usize];
             *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
         }
+    }
+
+    /// A slot and its edge as [`Self::follow`] leaves them for the manifold `k` of a pair, where nothing is to be written but separations.
+    pub fn settled(kinds: &[BodyKind], [world, i]: [u32; 2], pair: &Pair, k: u32) -> (Slot, Edge) {
+        let movable = |body: u32| if kinds[body as usize] == BodyKind::Dynamic { body } else { IMMOVABLE };
+        let slot = Slot { world, pair: i, manifold: k, takes_part: pair.takes_part, size: pair.size, ..FREE };
+        let rank = pair.rank() | u64::from(k);
+        (slot, Edge { a: movable(pair.body_a), b: movable(pair.body_b), color: None, rank })
     }
 
     fn take(&mut self) -> u32 {

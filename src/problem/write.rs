@@ -54,16 +54,16 @@ pub(super) struct SlotRows<'a> {
 }
 
 /// Slots that one task writes.
-const SLOTS_A_TASK: usize = 256;
+pub(super) const SLOTS_A_TASK: usize = 256;
 
 /// Some of the slots of a task, ascending.
-struct Chosen {
+pub(super) struct Chosen {
     slots: [u32; SLOTS_A_TASK],
     count: usize,
 }
 
 impl Chosen {
-    fn of(slots: &[Slot], is_wanted: impl Fn(&Slot) -> bool) -> Self {
+    pub fn of(slots: &[Slot], mut is_wanted: impl FnMut(&Slot) -> bool) -> Self {
         let mut chosen = Self { slots: [0; SLOTS_A_TASK], count: 0 };
         for (i, slot) in (0..).zip(slots) {
             chosen.slots[chosen.count] = i;
@@ -98,26 +98,11 @@ impl Writer<'_> {
         let stride = points_a_slot(self.patches);
         let written = Chosen::of(slots, |slot| slot.write != Write::Separations);
         let begun = Chosen::of(slots, |slot| slot.takes_part);
-        let mut follows = self.effort_changes;
-        for &i in written.all() {
-            let (slot, i) = (&slots[i as usize], i as usize);
-            rows.contacts[i].first_point = ((first + i) * stride) as u32;
-            self.write_slot(slot, i, &mut rows);
-            let contact = &rows.contacts[i];
-            let is_new = contact.substep_share == 0.0;
-            follows |= slot.takes_part && !is_new && self.share(contact) != contact.substep_share;
-        }
-        let what = What::Masses { tangents: self.carry.tangents, jams: self.may_jam };
-        self.prepare(&mut rows, written.all(), what);
-        if self.patches {
-            for &i in written.all() {
-                let contact = &rows.contacts[i as usize];
-                let inverse = [contact.body_a, contact.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
-                let own = &mut rows.points[i as usize * stride..][..stride];
-                let (points, patch) = own.split_at_mut(contact.point_count as usize);
-                patch[0] = patch_of(&EffectiveMass { inverse: &inverse, row: contact }, points);
-            }
-        }
+        self.write_rows(first, slots, &written, &mut rows);
+        let changes_share =
+            |contact: &ContactRow| contact.substep_share != 0.0 && self.share(contact) != contact.substep_share;
+        let follows = self.effort_changes
+            || written.all().iter().any(|&i| slots[i as usize].takes_part && changes_share(&rows.contacts[i as usize]));
         // Where the rows are on a device, the kernel begin_contacts does this.
         let loads = !self.carry.on_device;
         if !follows {
@@ -141,6 +126,27 @@ impl Writer<'_> {
                 let contact = &rows.contacts[i as usize];
                 let own = &mut rows.points[i as usize * stride..][..contact.point_count as usize];
                 own.iter_mut().for_each(|point| self.approach(contact, point));
+            }
+        }
+    }
+
+    /// Writes all of these slots that follows from their manifolds, materials and masses.
+    pub fn write_rows(&self, first: usize, slots: &[Slot], written: &Chosen, rows: &mut SlotRows) {
+        let stride = points_a_slot(self.patches);
+        for &i in written.all() {
+            let (slot, i) = (&slots[i as usize], i as usize);
+            rows.contacts[i].first_point = ((first + i) * stride) as u32;
+            self.write_slot(slot, i, rows);
+        }
+        let what = What::Masses { tangents: self.carry.tangents, jams: self.may_jam };
+        self.prepare(rows, written.all(), what);
+        if self.patches {
+            for &i in written.all() {
+                let contact = &rows.contacts[i as usize];
+                let inverse = [contact.body_a, contact.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
+                let own = &mut rows.points[i as usize * stride..][..stride];
+                let (points, patch) = own.split_at_mut(contact.point_count as usize);
+                patch[0] = patch_of(&EffectiveMass { inverse: &inverse, row: contact }, points);
             }
         }
     }

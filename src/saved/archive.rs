@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use glam::Vec3;
+
 use super::shapes::content;
 use crate::error::{Result, ensure, input};
 use crate::world::Shape;
@@ -26,6 +28,32 @@ pub(crate) trait Archive: Sized {
 
     /// Writes a shape, or reads it: what was one shape is one again.
     fn shape(&mut self, shape: &mut Shape) -> Result<()>;
+
+    /// Writes or reads what `walk` does. What has the same bytes as before takes a byte or two.
+    fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
+
+    /// Writes a number that is near a guess, or reads it: the nearer, the fewer bytes.
+    fn index(&mut self, value: &mut u32, guess: u32) -> Result<()> {
+        let apart = value.wrapping_sub(guess) as i32;
+        let mut folded = u64::from((apart << 1 ^ apart >> 31) as u32);
+        self.number(&mut folded)?;
+        let folded = u32::try_from(folded).map_err(|_| input!("the number {folded} is too large"))?;
+        *value = guess.wrapping_add((folded >> 1) ^ 0_u32.wrapping_sub(folded & 1));
+        Ok(())
+    }
+
+    /// The same by the bits.
+    fn near(&mut self, value: &mut f32, guess: f32) -> Result<()> {
+        let mut bits = value.to_bits();
+        self.index(&mut bits, guess.to_bits())?;
+        *value = f32::from_bits(bits);
+        Ok(())
+    }
+
+    /// The same of all components.
+    fn near_vector(&mut self, value: &mut Vec3, guess: Vec3) -> Result<()> {
+        (0..3).try_for_each(|k| self.near(&mut value[k], guess[k]))
+    }
 }
 
 /// Writes.
@@ -34,6 +62,17 @@ pub(crate) struct Writer {
     pub bytes: Vec<u8>,
     /// The shapes that are written, with their numbers, by their addresses: a shape that is kept keeps its address.
     shapes: HashMap<usize, (u64, Shape)>,
+    /// The numbers of bytes that were written once, the last such bytes, and memory for the next.
+    repeated: HashMap<Vec<u8>, u64>,
+    last: (Vec<u8>, u64),
+    scratch: Vec<u8>,
+}
+
+impl Writer {
+    /// Writes behind bytes of another one, in which its shapes stood.
+    pub fn behind(other: Self) -> Self {
+        Self { shapes: other.shapes, ..Self::default() }
+    }
 }
 
 impl Archive for Writer {
@@ -66,23 +105,45 @@ impl Archive for Writer {
         self.number(&mut number)?;
         if number == next { content(shape, self) } else { Ok(()) }
     }
+
+    /// New bytes are a 0 and themselves; others are by how many new ones they came before the next.
+    fn repeated(&mut self, mut walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()> {
+        self.scratch.clear();
+        std::mem::swap(&mut self.bytes, &mut self.scratch);
+        let walked = walk(self);
+        std::mem::swap(&mut self.bytes, &mut self.scratch);
+        walked?;
+        let next = self.repeated.len() as u64;
+        if next == 0 || self.last.0 != self.scratch {
+            self.last.1 = self.repeated.get(&self.scratch).copied().unwrap_or(next);
+            self.last.0.clone_from(&self.scratch);
+        }
+        let mut back = next - self.last.1;
+        self.number(&mut back)?;
+        if back == 0 {
+            self.bytes.extend_from_slice(&self.scratch);
+            self.repeated.insert(self.scratch.clone(), next);
+        }
+        Ok(())
+    }
 }
 
 /// Reads.
 pub(crate) struct Reader<'a> {
     rest: &'a [u8],
     shapes: Vec<Shape>,
+    repeated: Vec<&'a [u8]>,
 }
 
 impl<'a> Reader<'a> {
     /// Reads these bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, shapes: Vec::new() }
+        Self { rest: bytes, shapes: Vec::new(), repeated: Vec::new() }
     }
 
     /// Reads these bytes, behind others in which shapes stood.
     pub fn with_shapes(bytes: &'a [u8], shapes: Vec<Shape>) -> Self {
-        Self { rest: bytes, shapes }
+        Self { rest: bytes, shapes, repeated: Vec::new() }
     }
 
     /// All shapes that stood in them.
@@ -136,6 +197,23 @@ impl Archive for Reader<'_> {
         let known = self.shapes.get(number as usize);
         *shape = known.ok_or_else(|| input!("shape {number} of {}", self.shapes.len()))?.clone();
         Ok(())
+    }
+
+    fn repeated(&mut self, mut walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()> {
+        let mut back = 0;
+        self.number(&mut back)?;
+        if back == 0 {
+            let from = self.rest;
+            walk(self)?;
+            self.repeated.push(&from[..from.len() - self.rest.len()]);
+            return Ok(());
+        }
+        let number = (self.repeated.len() as u64).checked_sub(back);
+        let own = number.ok_or_else(|| input!("{back} back of {}", self.repeated.len()))?;
+        let rest = std::mem::replace(&mut self.rest, self.repeated[own as usize]);
+        let walked = walk(self);
+        self.rest = rest;
+        walked
     }
 }
 

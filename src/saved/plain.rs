@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{BuildHasher, Hash};
+use std::sync::LazyLock;
 
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::Aabb;
@@ -216,7 +217,8 @@ impl<K: Saved + Ord + Copy, V: Saved> Saved for BTreeMap<K, V> {
 
 impl Saved for Shape {
     fn blank() -> Self {
-        Self::ball(1.0)
+        static BLANK: LazyLock<Shape> = LazyLock::new(|| Shape::ball(1.0));
+        BLANK.clone()
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {

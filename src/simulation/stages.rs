@@ -56,7 +56,22 @@ struct Key {
     scale: Option<StepScale>,
 }
 
-crate::saved::state!(Key { config, surfaces, scale });
+crate::saved::cloned!(Key { config, surfaces, scale });
+
+impl Saved for Key {
+    fn blank() -> Self {
+        Self { config: SolverConfig::default(), surfaces: Vec::new(), scale: None }
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self { config, surfaces, scale } = self;
+        config.walk(archive)?;
+        let bodies = archive.count(surfaces.len())?;
+        surfaces.resize(bodies, (MassProperties::IMMOVABLE, Material::default()));
+        surfaces.iter_mut().try_for_each(|surface| archive.repeated(|archive| surface.walk(archive)))?;
+        scale.walk(archive)
+    }
+}
 
 /// The changes of the caller since the last step that concern state between steps.
 #[derive(Clone, Debug, Default)]
@@ -119,13 +134,14 @@ impl Stages {
             points: _,
             bytes_moved: _,
         } = self;
-        detector.walk(world, archive)?;
-        sleep.walk(archive)?;
-        effort.walk(archive)?;
         key.walk(archive)?;
-        contacts.walk(archive)?;
-        joints.walk(archive)?;
-        problem.walk(archive)
+        let step = key.scale.map_or(0.0, |scale| scale.step(key.config.substeps));
+        detector.walk(world, [key.config.speculative_margin, world.gravity.length() * step * step], archive)?;
+        sleep.walk(world, detector.kinds(), archive)?;
+        effort.walk(archive)?;
+        problem.walk(archive)?;
+        contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
+        joints.walk(archive)
     }
 
     /// The changes of the caller since the last step.

@@ -7,6 +7,7 @@ use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::{Shape, pose};
 use crate::error::{Result, ensure};
+use crate::saved::{Archive, Saved};
 
 /// How a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,7 +109,7 @@ pub struct Body {
     pub(super) applied_torque: Vec3,
 }
 
-crate::saved::state!(Body {
+crate::saved::cloned!(Body {
     name,
     kind,
     position,
@@ -126,6 +127,57 @@ crate::saved::state!(Body {
     applied_force,
     applied_torque,
 });
+
+impl Saved for Body {
+    fn blank() -> Self {
+        Self::new(BodyKind::Fixed)
+    }
+
+    /// Pose and velocity are each body's own; most bodies share the rest.
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self {
+            name,
+            kind,
+            position,
+            rotation,
+            linear_velocity,
+            angular_velocity,
+            force,
+            torque,
+            gravity_scale,
+            mass,
+            material,
+            groups,
+            colliders,
+            density,
+            applied_force,
+            applied_torque,
+        } = self;
+        let mut velocities = [*linear_velocity, *angular_velocity];
+        let mut moves = velocities.iter().flat_map(|v| v.to_array()).any(|x| x.to_bits() != 0);
+        archive.repeated(|archive| {
+            moves.walk(archive)?;
+            name.walk(archive)?;
+            kind.walk(archive)?;
+            for load in [&mut *force, &mut *torque, &mut *applied_force, &mut *applied_torque] {
+                load.walk(archive)?;
+            }
+            gravity_scale.walk(archive)?;
+            mass.walk(archive)?;
+            material.walk(archive)?;
+            groups.walk(archive)?;
+            colliders.walk(archive)?;
+            density.walk(archive)
+        })?;
+        position.walk(archive)?;
+        rotation.walk(archive)?;
+        if moves {
+            velocities.walk(archive)?;
+            [*linear_velocity, *angular_velocity] = velocities;
+        }
+        Ok(())
+    }
+}
 
 impl Body {
     /// A body of this kind, without shapes.
