@@ -118,6 +118,8 @@ struct Run {
     calls: usize,
     /// Of all bodies after each step.
     hashes: Vec<u64>,
+    /// What runs a simulation that was saved and loaded; none if nothing is saved.
+    reload: Option<fn() -> Box<dyn Backend>>,
 }
 
 impl Run {
@@ -130,7 +132,7 @@ impl Run {
             model.bodies.insert(body, kept(&world.bodies[body.index()], world.bodies.worlds()[body.index()] as usize));
         }
         let simulation = Simulation::new(world, config(), backend).expect("a good world");
-        Self { random: Random::new(seed), simulation, model, scenery, calls: 0, hashes: Vec::new() }
+        Self { random: Random::new(seed), simulation, model, scenery, calls: 0, hashes: Vec::new(), reload: None }
     }
 
     /// A body that is no scenery.
@@ -313,15 +315,34 @@ impl Run {
         }
     }
 
+    /// Saves and loads the run, or goes a step and back again: the steps that follow are the same.
+    fn save(&mut self) {
+        let (saves, goes_back) = (self.random.happens(0.1), self.random.happens(0.5));
+        let Some(reload) = self.reload.filter(|_| saves) else { return };
+        if goes_back {
+            let then = self.simulation.snapshot();
+            self.simulation.step(1.0 / 60.0).expect("a step");
+            self.simulation.restore(&then);
+        } else {
+            let saved = self.simulation.save();
+            self.simulation = Simulation::load(&saved, reload()).expect("what was saved");
+        }
+    }
+
     /// Makes random calls with steps between them.
     fn of_calls(seed: u64, calls: usize, backend: Box<dyn Backend>) -> Self {
-        let mut run = Self::new(seed, backend);
+        Self::new(seed, backend).go(calls)
+    }
+
+    fn go(self, calls: usize) -> Self {
+        let mut run = self;
         while run.calls < calls {
             let before = run.calls;
             for _ in 0..run.random.below(7) {
                 run.call();
             }
             let dt = if run.random.happens(0.1) { 1.0 / 120.0 } else { 1.0 / 60.0 };
+            run.save();
             run.step(dt);
             if run.calls > before {
                 run.check();
@@ -375,6 +396,14 @@ fn random_calls_give_the_same_world_on_any_backend_and_any_number_of_threads() {
     assert_same(&one, &run(3, || Box::new(Reference::<f32>::new())), "the reference");
 }
 
+/// All that lasts is saved: the tree, impulses, colors, effort, sleep, handles and vacancies.
+fn random_calls_give_the_same_world_where_the_run_is_saved_and_loaded_now_and_then() {
+    let calls = of_environment("DRYSTONE_CALLS", 2000) / 2;
+    let reload: fn() -> Box<dyn Backend> = || Box::new(Cpu::new());
+    let saved = Run { reload: Some(reload), ..Run::new(seed(), reload()) }.go(calls);
+    assert_same(&Run::of_calls(seed(), calls, reload()), &saved, "saved and loaded");
+}
+
 fn what_random_calls_leave_hardly_overlaps() {
     let mut run = Run::of_calls(seed(), of_environment("DRYSTONE_CALLS", 2000) / 2, Box::new(Cpu::new()));
     let before = run.simulation.penetration();
@@ -382,7 +411,8 @@ fn what_random_calls_leave_hardly_overlaps() {
     run.check();
     let after = run.simulation.penetration();
     measured!("overlap {before:?}, then {after:?}");
-    // Of eight seeds: 0.3 to 7.7 mm where something still rolls, and 0.2 mm.
+    // Of eight seeds with 1,000 calls: 0.3 to 7.7 mm. With 1,500 calls two of them leave a body asleep 12 and 16 mm deep: one that was pressed
+    // meters into the floor between bodies that do not give way, and comes up the last 40 mm at 5 mm/s, which is slow enough to sleep.
     assert!(after.max < 1e-2 && after.p95 < 1e-3, "{after:?}");
 }
 
@@ -398,6 +428,7 @@ fn random_calls_give_the_same_world_on_an_exact_gpu() {
 tests! {
     no_gpu {
         random_calls_give_the_same_world_on_any_backend_and_any_number_of_threads,
+        random_calls_give_the_same_world_where_the_run_is_saved_and_loaded_now_and_then,
         what_random_calls_leave_hardly_overlaps,
     }
     exact_gpu { random_calls_give_the_same_world_on_an_exact_gpu, }
