@@ -181,7 +181,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -191,6 +191,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
         contacts,
         points,
         impulses,
+        totals,
         sags,
         order,
         colors,
@@ -210,6 +211,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
         ("contacts", bytemuck::cast_slice(contacts)),
         ("points", bytemuck::cast_slice(points)),
         ("impulses", bytemuck::cast_slice(impulses)),
+        ("totals", bytemuck::cast_slice(totals)),
         ("sags", bytemuck::cast_slice(sags)),
         ("order", bytemuck::cast_slice(order)),
         ("colors", bytemuck::cast_slice(colors)),

@@ -1,5 +1,6 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod events;
 mod manifolds;
 mod stages;
 
@@ -12,10 +13,13 @@ use crate::metrics::Penetration;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
+#[cfg(doc)]
+use crate::world::Body;
 use crate::world::World;
 use stages::{Changes, Stages};
 
-pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use events::{ColliderOf, Event, Hit, Listen};
+pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 
 /// A world that moves.
 ///
@@ -71,6 +75,58 @@ impl Simulation {
         Ok(stats)
     }
 
+    /// Lets the steps from now on tell of contacts and hits, and add up impulses over their substeps. The first step after that tells of all
+    /// contacts that touch already.
+    ///
+    /// # Errors
+    /// The approach speed is no number, or below 0; what the simulation listens to is then as it was.
+    pub fn listen(&mut self, listen: Listen) -> Result<()> {
+        listen.check()?;
+        self.leave_device();
+        self.stages.events.listen(listen);
+        Ok(())
+    }
+
+    /// What the simulation listens to.
+    pub fn listening(&self) -> Listen {
+        self.stages.events.listen
+    }
+
+    /// The sensors of the world, each with the colliders that overlapped it after the last step: first the sensor, then the other one.
+    /// Ascending by the indices of both bodies.
+    pub fn overlaps(&self) -> &[[ColliderOf; 2]] {
+        self.stages.events.inside()
+    }
+
+    /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), each
+    /// ascending by the pairs of bodies. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
+    /// failed. The order and the numbers are the same for any backend with the same bits.
+    ///
+    /// Two colliders touch in a step where their surfaces press on each other in the course of the step, or overlap when it begins. A contact
+    /// that is only near does not touch. Bodies that sleep go on touching. Where a body goes, the next step tells that its contacts ended.
+    ///
+    /// ```
+    /// use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// let floor = world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.0, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.listen(Listen { contacts: true, hits_above: Some(1.0), ..Listen::default() })?;
+    /// let mut told = Vec::new();
+    /// for _ in 0..60 {
+    ///     simulation.step(1.0 / 60.0)?;
+    ///     told.extend_from_slice(simulation.events());
+    /// }
+    /// let [Event::Began { a, b }, Event::Hit(hit)] = told[..] else { panic!("{told:?}") };
+    /// assert_eq!((a.body, b.body), (floor, ball));
+    /// assert!((hit.speed - 3.13).abs() < 0.01, "{} m/s", hit.speed);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn events(&self) -> &[Event] {
+        &self.stages.events.all
+    }
+
     /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
     /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
     ///
@@ -112,6 +168,7 @@ impl Simulation {
 
     /// Assembles a step; false if there is nothing to do in it.
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
+        self.stages.events.all.clear();
         check_step_length(dt)?;
         let changes = timed(&mut stats.times.detect, || self.changes(dt))?;
         if changes.all_rows() || self.stages.contacts.are_unsorted() {

@@ -9,6 +9,7 @@ use super::collider::{BodyState, Margins};
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::report::{Change, DetectStats};
+use super::sensors::{Overlap, Visitors};
 use super::world_contacts::{ColliderRange, DetectionInput, WorldContacts, key};
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, Groups, World};
@@ -24,6 +25,8 @@ pub struct Detector {
     moving: Vec<BodyState>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
+    /// What sensors overlapped when that was last asked.
+    overlaps: Vec<Overlap>,
 }
 
 /// A body as the detector knows it.
@@ -51,6 +54,7 @@ impl Detector {
             groups: Vec::new(),
             moving: Vec::new(),
             jointed: jointed(world),
+            overlaps: Vec::new(),
         };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
         detector
@@ -105,6 +109,20 @@ impl Detector {
             self.jointed = jointed;
             self.worlds.iter_mut().for_each(WorldContacts::look_again);
         }
+    }
+
+    /// Whether any collider is a sensor.
+    pub fn has_sensors(&self) -> bool {
+        self.worlds.iter().any(WorldContacts::has_sensors)
+    }
+
+    /// The colliders that sensors overlap at the poses of `world`, in any order; after the detection of the step that left them.
+    pub fn sense(&mut self, world: &World, activity: &[Activity]) -> &[Overlap] {
+        let Self { worlds, kinds, groups, jointed, overlaps, .. } = self;
+        overlaps.clear();
+        let visitors = Visitors { bodies: &world.bodies, kinds, groups, activity, jointed };
+        worlds.iter_mut().for_each(|world| world.sense(&visitors, overlaps));
+        overlaps
     }
 
     /// The pairs whose boxes overlap, with the manifolds they touch with, world by world. The order is the same for any

@@ -19,6 +19,7 @@ mod pairs;
 mod query;
 mod report;
 mod reuse;
+mod sensors;
 mod solid;
 #[cfg(test)]
 mod testing;

@@ -23,6 +23,8 @@ pub struct Pair {
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
+    /// The colliders, by their indices among those of their bodies.
+    pub colliders: [u32; 2],
     /// Half of the smallest side of the thinner one (m).
     pub size: f32,
     /// Whether a body of it is awake, so that its manifolds are swept.
@@ -66,6 +68,7 @@ impl Pair {
             manifolds: Vec::new(),
             collider_a,
             collider_b,
+            colliders: [a.index, b.index],
             size: a.size.min(b.size),
             takes_part: true,
         }

@@ -40,6 +40,8 @@ pub struct ContactRows {
     materials: Option<Materials>,
     /// The bodies that lie still and touch nothing that they touched before.
     new_bodies: Vec<bool>,
+    /// Whether impulses are summed over the substeps of a step.
+    pub sums: bool,
     /// How the rows follow from those of the step before.
     pub carry: Carry,
 }
@@ -89,6 +91,21 @@ impl ContactRows {
         }
     }
 
+    /// The rows that a manifold has.
+    pub(super) fn taken(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free()).map(|(row, _)| row)
+    }
+
+    /// Whether the contact in a row is swept.
+    pub(super) fn takes_part(&self, row: usize) -> bool {
+        self.slots.all[row].takes_part
+    }
+
+    /// The colliders of the contact in a row, by their indices among those of its bodies a and b.
+    pub(super) fn colliders_of(&self, row: usize) -> [u32; 2] {
+        self.slots.colliders[row]
+    }
+
     /// Gives every manifold that takes part a color; one that has a color keeps it.
     pub fn color(&mut self, world: &World, max_colors: u32) {
         let members: Vec<u32> = self.slots.taking_part().collect();
@@ -115,6 +132,9 @@ impl ContactRows {
             (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
             problem.points = moved(&problem.points, &from, stride);
             problem.impulses = moved(&problem.impulses, &from, stride);
+            if !problem.totals.is_empty() {
+                problem.totals = moved(&problem.totals, &from, stride);
+            }
             problem.sags = moved(&problem.sags, &from, 1);
             self.computed = moved(&self.computed, &from, 1);
             self.jams = moved(&self.jams, &from, 1);
@@ -291,6 +311,11 @@ impl ContactRows {
         problem.sags.resize(count, 0.0);
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
+        if self.sums && problem.totals.is_empty() {
+            // Contacts that rest have no other sums than what they bear.
+            problem.totals.clone_from(&problem.impulses);
+        }
+        problem.totals.resize(if self.sums { count * stride } else { 0 }, ImpulseRow::default());
         self.computed.resize(count, ComputedRow::default());
         self.jams.resize(count, false);
     }

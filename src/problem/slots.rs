@@ -39,8 +39,18 @@ pub(super) struct Slot {
     pub need: f32,
 }
 
+/// The pair of a slot that is free.
+const NO_PAIR: u32 = u32::MAX;
+
 const FREE: Slot =
-    Slot { world: 0, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
+    Slot { world: 0, pair: NO_PAIR, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
+
+impl Slot {
+    /// Whether no manifold has it.
+    pub fn is_free(&self) -> bool {
+        self.pair == NO_PAIR
+    }
+}
 
 /// All slots, those that are free included.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +58,8 @@ pub(super) struct Slots {
     pub all: Vec<Slot>,
     /// The edges that the graph colors, one a slot.
     pub edges: Vec<Edge>,
+    /// The colliders of each slot, by their indices among those of their bodies a and b.
+    pub colliders: Vec<[u32; 2]>,
     free: Vec<u32>,
     /// How many were taken since all were sorted.
     taken: usize,
@@ -95,6 +107,7 @@ impl Slots {
                 size: pair.size,
                 need,
             };
+            self.colliders[manifold.slot as usize] = pair.colliders;
             let edge = &mut self.edges[manifold.slot as usize];
             *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
         }
@@ -106,6 +119,7 @@ impl Slots {
             return slot;
         }
         self.all.push(FREE);
+        self.colliders.push([0; 2]);
         self.edges.push(Edge { a: IMMOVABLE, b: IMMOVABLE, color: None, rank: 0 });
         self.all.len() as u32 - 1
     }
@@ -134,6 +148,7 @@ impl Slots {
         let from: Vec<u32> = order.iter().copied().chain(resting).collect();
         self.all = from.iter().map(|&slot| self.all[slot as usize]).collect();
         self.edges = from.iter().map(|&slot| self.edges[slot as usize]).collect();
+        self.colliders = from.iter().map(|&slot| self.colliders[slot as usize]).collect();
         for (i, slot) in (0..).zip(&self.all) {
             detector.pair_mut(slot.world, slot.pair).manifolds[slot.manifold as usize].slot = i;
         }

@@ -303,10 +303,13 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
     if vn >= 0.0 || e == 0.0 {
         return vn;
     }
-    let ahead = 0.5 * pull * h;
-    let approach = (vn + ahead).min(0.0);
-    let meeting = (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt();
-    -(meeting - ahead / e)
+    -(speed_at_impact(vn, pull, gap, h) - 0.5 * pull * h / e)
+}
+
+/// Speed with which surfaces meet, on the parabola of their positions (m/s); the numbers are those of [`velocity_at_impact`].
+pub(super) fn speed_at_impact(vn: f32, pull: f32, gap: f32, h: f32) -> f32 {
+    let approach = (vn + 0.5 * pull * h).min(0.0);
+    (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
 }
 
 /// The row that stands for the friction of all `points`, which learn how far from it they are.

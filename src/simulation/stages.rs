@@ -1,11 +1,12 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
+use super::events::{ColliderOf, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
+use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
 use crate::rest;
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
@@ -24,6 +25,7 @@ pub(super) struct Stages {
     pub joints: JointRows,
     pub problem: StepProblem,
     pub plan: StepPlan,
+    pub events: Events,
     /// The key of the plan; none if the next step has to make a plan.
     plan_key: Option<PlanKey>,
     /// Points of the contacts that take part, and bytes that the plan moves.
@@ -80,6 +82,7 @@ impl Stages {
             joints: JointRows::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
+            events: Events::default(),
             plan_key: None,
             points: 0,
             bytes_moved: 0,
@@ -209,10 +212,11 @@ impl Stages {
 
     /// Prepares and plans. `on_device`: the device goes on from its own rows.
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
+        let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
+            contacts.sums = events.listen.sums();
             contacts.write(world, detector, config, effort, dt, problem);
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
@@ -240,9 +244,41 @@ impl Stages {
         stats.bytes_moved = self.bytes_moved;
     }
 
+    /// Notes what the step did that ran; `world` is as the step found it.
+    fn note_events(&mut self, world: &World, dt: f32) {
+        let Self { contacts, problem, events, key, .. } = self;
+        let side = |side| collider_of(world, side);
+        if events.listen.contacts {
+            events.note_contacts(contacts.touching(problem).map(|pair| pair.map(side)));
+        }
+        if let Some(least) = events.listen.hits_above {
+            let substep = dt / key.config.substeps as f32;
+            let mut met = std::mem::take(&mut events.met);
+            met.clear();
+            let wanted = |pair: &ColliderPair, speed: f32| speed > least || events.waits_for(pair.map(side));
+            met.extend(contacts.approaches(world, problem, substep, wanted).map(|approach| {
+                let [a, b] = approach.pair.map(side);
+                let Approach { point, normal, speed, impulse, rest, .. } = approach;
+                Met { hit: Hit { a, b, point, normal, speed, impulse }, left: Some(rest / speed) }
+            }));
+            events.note_hits(met);
+        }
+    }
+
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
+        self.note_events(world, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
+        if self.detector.has_sensors() || !self.events.inside().is_empty() {
+            let overlaps = self.detector.sense(world, self.sleep.activity());
+            self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
+        }
         self.sleep.after_step(world, &self.detector, dt);
     }
+}
+
+/// A collider, by the index of its body and its own among those of its body.
+fn collider_of(world: &World, (body, collider): (u32, u32)) -> ColliderOf {
+    let body = world.bodies.handle(body as usize).expect("a collider has its body");
+    ColliderOf { body, collider: collider as usize }
 }

@@ -62,5 +62,6 @@ fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let contacts = if problem.contacts.is_empty() { 0 } else { 3 };
     let joints = if problem.joints.is_empty() { 0 } else { 2 };
     let colors = usize::from(contacts + joints > 0);
-    3 + contacts + joints + colors + usize::from(!problem.inertias.is_empty()) + usize::from(measured) > 8
+    let totals = usize::from(!problem.totals.is_empty());
+    3 + contacts + totals + joints + colors + usize::from(!problem.inertias.is_empty()) + usize::from(measured) > 8
 }
