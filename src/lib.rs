@@ -78,7 +78,9 @@ pub use glam;
 pub use plan::StepPlan;
 pub use problem::StepProblem;
 pub use scenes::Scene;
-pub use simulation::{ColliderOf, Event, Hit, Listen, Simulation, SolvedManifold, SolvedPoint, Summed};
+pub use simulation::{
+    ColliderOf, Contact, ContactPoint, Event, Hit, Listen, Simulation, SolvedManifold, SolvedPoint, Summed,
+};
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
 

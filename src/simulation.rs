@@ -1,5 +1,6 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod contacts;
 mod events;
 mod manifolds;
 mod stages;
@@ -15,9 +16,10 @@ use crate::problem::StepProblem;
 use crate::stats::{StepStats, timed};
 #[cfg(doc)]
 use crate::world::Body;
-use crate::world::World;
+use crate::world::{BodyHandle, World};
 use stages::{Changes, Stages};
 
+pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
 pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 
@@ -271,6 +273,40 @@ impl Simulation {
         self.fetch();
         let Stages { detector, contacts, problem, .. } = &self.stages;
         manifolds::of(detector, contacts, problem, self.stages.least_substeps())
+    }
+
+    /// The contacts that the last step found, near ones included, in no particular order that holds from step to step. No device is asked:
+    /// impulses are there where the simulation [listens](Self::listen). Those of bodies that went since are left out.
+    pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
+        self.stages.contacts.taken().filter_map(|row| contacts::contact(&self.stages, &self.world, row))
+    }
+
+    /// The contacts of a body, likewise; none if it is gone. Where the simulation listens, the cost is that of the contacts of the body, and
+    /// else that of all contacts.
+    ///
+    /// ```
+    /// use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+    /// for _ in 0..20 {
+    ///     simulation.step(1.0 / 60.0)?;
+    /// }
+    /// let borne: f32 = simulation.contacts_of(brick).map(|contact| contact.impulse.y).sum();
+    /// assert!((borne - 1000.0 * 9.81 / 60.0).abs() < 1.0, "{borne} N s");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn contacts_of(&self, body: BodyHandle) -> impl Iterator<Item = Contact> + '_ {
+        let is_there = self.world.bodies.contains(body);
+        let rows = self.stages.by_body.of(body.index());
+        let listed = rows.unwrap_or_default().iter().map(|&row| row as usize);
+        let all = self.stages.contacts.taken().filter(move |_| rows.is_none());
+        let own = listed.chain(all).filter(move |_| is_there);
+        let contacts = own.filter_map(|row| contacts::contact(&self.stages, &self.world, row));
+        contacts.filter(move |contact| contact.a.body == body || contact.b.body == body)
     }
 
     /// Overlap when the last step began, from the contacts that it went by.

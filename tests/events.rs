@@ -10,10 +10,15 @@ use drystone::{
     World,
 };
 
+/// The example, whose own check has to hold.
+#[path = "../examples/events.rs"]
+mod example;
+
 tests! {
     exact_gpu {
         a_ball_that_lands_begins_once_and_ends_once_when_it_is_lifted,
         a_ball_loses_the_summed_impulse_in_every_step,
+        contacts_of_a_device_have_their_impulses_without_asking_it,
         all_backends_tell_the_same,
     }
     any_gpu {
@@ -30,6 +35,8 @@ tests! {
         who_begins_to_listen_hears_of_what_touches_and_who_ends_hears_nothing,
         listening_changes_no_bit_of_the_motion,
         a_threshold_that_is_no_speed_is_refused,
+        the_contacts_of_a_body_are_those_of_all_that_name_it,
+        the_example_counts_five_balls,
         a_ball_falls_through_a_sensor_as_if_none_were_there,
         a_sensor_tells_of_overlap_to_the_step,
         a_moving_sensor_meets_what_sleeps_and_wakes_nothing,
@@ -555,4 +562,63 @@ fn a_sensor_has_no_mass_and_holds_nobody() {
         world
     });
     assert!(refused.is_err_and(|e| e.to_string().contains("no sensors")));
+}
+
+fn the_contacts_of_a_body_are_those_of_all_that_name_it() {
+    for listen in [Listen { impulses: true, ..Listen::default() }, Listen::default()] {
+        let mut simulation = simulation(&heap(), &SolverConfig::default().without_sleep(), cpu(), listen);
+        run(&mut simulation, 90);
+        let mut seen = 0;
+        for body in simulation.world.bodies.handles().collect::<Vec<_>>() {
+            let own: Vec<_> = simulation.contacts_of(body).collect();
+            let named = simulation.contacts().filter(|c| c.a.body == body || c.b.body == body);
+            assert_eq!(own, named.collect::<Vec<_>>(), "body {}", body.index());
+            seen += own.len();
+        }
+        assert!(seen > 40 && seen == 2 * simulation.contacts().count(), "{seen}");
+        let solved: Vec<_> = simulation.manifolds().collect();
+        assert_eq!(solved.len(), simulation.contacts().count());
+        for manifold in solved {
+            let same =
+                |c: &drystone::Contact| [c.a, c.b].map(|side| side.body.index()) == [manifold.body_a, manifold.body_b];
+            let contact = simulation.contacts().find(same).expect("the contact");
+            assert_eq!((contact.normal, contact.impulse), (manifold.normal, manifold.summed.unwrap_or_default()));
+            for (point, solved) in contact.points().iter().zip(manifold.points()) {
+                assert_eq!(point.separation, solved.separation);
+                let surface = |body: usize, anchor: Vec3| {
+                    let body = &simulation.world.bodies[body];
+                    body.position + body.rotation * anchor
+                };
+                let on_a = surface(manifold.body_a, solved.anchor_a);
+                let on_b = surface(manifold.body_b, solved.anchor_b);
+                assert!((0.5 * (on_a + on_b)).distance(point.position) < 1e-5, "{point:?}");
+            }
+        }
+        // Contacts of a body that went are not those of the body that came.
+        let gone = simulation.world.bodies.handle(1).expect("a ball");
+        assert!(simulation.contacts_of(gone).count() > 0);
+        simulation.world.remove(gone);
+        assert_eq!(simulation.contacts_of(gone).count(), 0);
+        let new = simulation.world.insert(ball(9.0));
+        assert_eq!((new.index(), simulation.contacts_of(new).count()), (1, 0));
+        assert!(simulation.contacts().all(|c| c.a.body != gone && c.b.body != gone));
+    }
+}
+
+fn contacts_of_a_device_have_their_impulses_without_asking_it() {
+    let listen = Listen { impulses: true, ..Listen::default() };
+    let of = |open: Open| {
+        let mut simulation = simulation(&heap(), &SolverConfig::default().without_sleep(), open(), listen);
+        run(&mut simulation, 60);
+        let body = simulation.world.bodies.handle(5).expect("a body");
+        let contacts: Vec<_> = simulation.contacts_of(body).collect();
+        (contacts, simulation.contacts().map(|c| c.impulse.length()).sum::<f32>())
+    };
+    let (ours, theirs) = (of(reference), of(exact));
+    assert!(ours.0.len() > 1 && ours.1 > 1000.0, "{} contacts, {} N s", ours.0.len(), ours.1);
+    assert_eq!(ours, theirs);
+}
+
+fn the_example_counts_five_balls() {
+    example::main().expect("a good world");
 }

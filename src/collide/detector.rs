@@ -111,6 +111,12 @@ impl Detector {
         }
     }
 
+    /// Whether the body at an index is the one that the last detection knew.
+    pub fn knows(&self, world: &World, body: usize) -> bool {
+        let now = world.bodies.generations().get(body);
+        !world.bodies.is_vacant(body) && self.known.get(body).map(|known| &known.generation) == now
+    }
+
     /// Whether any collider is a sensor.
     pub fn has_sensors(&self) -> bool {
         self.worlds.iter().any(WorldContacts::has_sensors)

@@ -12,7 +12,7 @@ use super::prepare::{ComputedRow, PoseRow};
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slot, Slots, Write};
 use super::write::{SlotRows, Writer, point_before};
-use crate::collide::{Detector, MAX_POINTS};
+use crate::collide::{Detector, MAX_POINTS, Manifold};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
@@ -92,8 +92,14 @@ impl ContactRows {
     }
 
     /// The rows that a manifold has.
-    pub(super) fn taken(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn taken(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free()).map(|(row, _)| row)
+    }
+
+    /// The manifold of a row.
+    pub fn manifold<'a>(&self, row: usize, detector: &'a Detector) -> &'a Manifold {
+        let slot = &self.slots.all[row];
+        &detector.pair(slot.world, slot.pair).manifolds[slot.manifold as usize]
     }
 
     /// Whether the contact in a row is swept.
@@ -102,7 +108,7 @@ impl ContactRows {
     }
 
     /// The colliders of the contact in a row, by their indices among those of its bodies a and b.
-    pub(super) fn colliders_of(&self, row: usize) -> [u32; 2] {
+    pub fn colliders_of(&self, row: usize) -> [u32; 2] {
         self.slots.colliders[row]
     }
 

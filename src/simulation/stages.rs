@@ -1,5 +1,6 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
+use super::contacts::ByBody;
 use super::events::{ColliderOf, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
@@ -26,6 +27,8 @@ pub(super) struct Stages {
     pub problem: StepProblem,
     pub plan: StepPlan,
     pub events: Events,
+    /// The contacts of each body, where somebody listens.
+    pub by_body: ByBody,
     /// The key of the plan; none if the next step has to make a plan.
     plan_key: Option<PlanKey>,
     /// Points of the contacts that take part, and bytes that the plan moves.
@@ -83,6 +86,7 @@ impl Stages {
             problem: StepProblem::default(),
             plan: StepPlan::default(),
             events: Events::default(),
+            by_body: ByBody::default(),
             plan_key: None,
             points: 0,
             bytes_moved: 0,
@@ -246,8 +250,14 @@ impl Stages {
 
     /// Notes what the step did that ran; `world` is as the step found it.
     fn note_events(&mut self, world: &World, dt: f32) {
-        let Self { contacts, problem, events, key, .. } = self;
+        let Self { contacts, problem, events, by_body, key, .. } = self;
         let side = |side| collider_of(world, side);
+        if events.listen.sums() {
+            let bodies_of = |row: usize| [problem.contacts[row].body_a, problem.contacts[row].body_b];
+            by_body.list(world.bodies.len(), contacts.taken().map(|row| (row, bodies_of(row))));
+        } else {
+            by_body.forget();
+        }
         if events.listen.contacts {
             events.note_contacts(contacts.touching(problem).map(|pair| pair.map(side)));
         }
@@ -278,7 +288,7 @@ impl Stages {
 }
 
 /// A collider, by the index of its body and its own among those of its body.
-fn collider_of(world: &World, (body, collider): (u32, u32)) -> ColliderOf {
+pub(super) fn collider_of(world: &World, (body, collider): (u32, u32)) -> ColliderOf {
     let body = world.bodies.handle(body as usize).expect("a collider has its body");
     ColliderOf { body, collider: collider as usize }
 }
