@@ -101,7 +101,7 @@ impl Simulation {
     }
 
     /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), each
-    /// ascending by the pairs of bodies. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
+    /// ascending by the pairs of bodies, then joints that broke, ascending. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
     /// failed. The order and the numbers are the same for any backend with the same bits.
     ///
     /// Two colliders touch in a step where their surfaces press on each other in the course of the step, or overlap when it begins. A contact
@@ -317,7 +317,7 @@ impl Simulation {
 
     /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        self.stages.problem.joint_impulses.iter().map(|row| row.linear.into()).collect()
+        (0..self.stages.problem.joint_impulses.len()).map(|joint| self.stages.joint_impulse(joint)).collect()
     }
 
     /// Changes the settings from the next step on.

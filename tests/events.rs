@@ -6,8 +6,8 @@ mod common;
 use common::{Open, gpu};
 use drystone::glam::{Quat, Vec3, Vec3Swizzles};
 use drystone::{
-    Backend, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Listen, Reference, Shape, Simulation, SolverConfig,
-    World,
+    Backend, BallJoint, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Listen, Reference, Shape, Simulation,
+    SolverConfig, World,
 };
 
 /// The example, whose own check has to hold.
@@ -20,6 +20,7 @@ tests! {
         a_ball_loses_the_summed_impulse_in_every_step,
         contacts_of_a_device_have_their_impulses_without_asking_it,
         all_backends_tell_the_same,
+        a_joint_breaks_at_its_force_and_is_gone,
     }
     any_gpu {
         plain_wgsl_sums_the_impulses_too,
@@ -621,4 +622,29 @@ fn contacts_of_a_device_have_their_impulses_without_asking_it() {
 
 fn the_example_counts_five_balls() {
     example::main().expect("a good world");
+}
+
+/// A cube of 1,000 kg hangs at 9,810 N; pulled down, it breaks its joint at 10,000 N.
+fn a_joint_breaks_at_its_force_and_is_gone() {
+    for open in EXACT {
+        let mut world = World::new();
+        let [held, torn] = [0.0, 5.0].map(|x| {
+            let cube = world.insert(cube(x, -0.5).rotation(Quat::IDENTITY));
+            let joint = BallJoint::to_world(cube.index(), 0.5 * Vec3::Y, Vec3::new(x, 0.0, 0.0));
+            (cube, world.insert_joint(joint.breaking_at(10_000.0)))
+        });
+        let mut simulation = hears_sensors(&world, open());
+        assert_eq!(run(&mut simulation, 60), []);
+        simulation.world.body_mut(torn.0).expect("the cube").force = Vec3::new(0.0, -1000.0, 0.0);
+        let told = run(&mut simulation, 60);
+        let [(step, Event::Broke { joint, force })] = told[..] else { panic!("{told:?}") };
+        assert!(step < 3 && joint == torn.1, "{told:?}");
+        // It may not bear all of the pull in the step in which it breaks.
+        assert!((10_000.0..10_900.0).contains(&force), "{force} N");
+        assert!(simulation.world.joint(torn.1).is_none() && simulation.world.joint(held.1).is_some());
+        assert!(simulation.world.body(torn.0).expect("the cube").position.y < -4.0);
+        assert!((simulation.world.body(held.0).expect("the cube").position.y + 0.5).abs() < 1e-3);
+        simulation.world.joint_mut(held.1).expect("the joint").break_force = 0.0;
+        assert!(simulation.step(DT).is_err_and(|e| e.to_string().contains("break_force")));
+    }
 }

@@ -83,7 +83,8 @@ fn approach(contact: &ContactRow, world: &World, problem: &StepProblem, substep:
         let u =
             (b.linear_velocity + b.angular_velocity.cross(r_b)) - (a.linear_velocity + a.angular_velocity.cross(r_a));
         let (vn, pull) = (u.dot(normal), (pull_b - pull_a).dot(normal));
-        let speed = speed_at_impact(vn, pull, point.separation, substep * contact.substep_share);
+        let ahead = 0.5 * pull * (substep * contact.substep_share);
+        let speed = speed_at_impact(vn, pull, point.separation, ahead);
         if fastest.is_none_or(|fastest| speed > fastest.speed) {
             let pair = ColliderPair::default();
             let velocity = |body: u32, r: Vec3| {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::error::{Result, ensure};
-use crate::world::BodyHandle;
+use crate::world::{BodyHandle, JointHandle};
 
 /// What a simulation listens to: [`Simulation::listen`](crate::Simulation::listen). Whatever is off costs nothing.
 ///
@@ -73,6 +73,13 @@ pub enum Event {
         sensor: ColliderOf,
         /// The other collider.
         visitor: ColliderOf,
+    },
+    /// A joint bore more than its [`break_force`](crate::BallJoint::break_force), and is gone from the world.
+    Broke {
+        /// The joint. The handle is stale.
+        joint: JointHandle,
+        /// What the joint bore in the last substep (N).
+        force: f32,
     },
 }
 

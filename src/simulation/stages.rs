@@ -1,7 +1,7 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
 use super::contacts::ByBody;
-use super::events::{ColliderOf, Events, Hit, Met};
+use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
@@ -11,7 +11,7 @@ use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, 
 use crate::rest;
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{MassProperties, Material, World};
+use crate::world::{BallJoint, BodyKind, MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 #[derive(Clone)]
@@ -275,6 +275,37 @@ impl Stages {
         }
     }
 
+    /// Impulse of a joint on its body b in the last substep, world axes (N s).
+    pub fn joint_impulse(&self, joint: usize) -> glam::Vec3 {
+        self.problem.joint_impulses[joint].linear.into()
+    }
+
+    /// What a joint bore in the last substep (N).
+    fn force_on_joint(&self, world: &World, joint: usize, dt: f32) -> f32 {
+        let BallJoint { body_a, body_b, .. } = world.joints[joint];
+        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+        let body = body_b.filter(|&b| moves(b) && !moves(body_a)).unwrap_or(body_a);
+        let substep = dt / (self.key.config.substeps << self.effort.class_of(body)) as f32;
+        self.joint_impulse(joint).length() / substep
+    }
+
+    /// Takes the joints out that bore more than they can.
+    fn break_joints(&mut self, world: &mut World, dt: f32) {
+        let first = self.events.all.len();
+        for joint in 0..world.joints.len() {
+            let most = world.joints[joint].break_force;
+            let force = if most < f32::INFINITY { self.force_on_joint(world, joint, dt) } else { 0.0 };
+            if force > most {
+                self.events.all.push(Event::Broke { joint: world.joints.handles()[joint], force });
+            }
+        }
+        for event in &self.events.all[first..] {
+            if let Event::Broke { joint, .. } = event {
+                world.remove_joint(*joint);
+            }
+        }
+    }
+
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
         self.note_events(world, dt);
@@ -283,6 +314,7 @@ impl Stages {
             let overlaps = self.detector.sense(world, self.sleep.activity());
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
         }
+        self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, dt);
     }
 }

@@ -75,8 +75,7 @@ impl<C: Constraint> LaneLayout<C> {
         (instructions, threads): (InstructionSet, &Threads),
     ) {
         let (rows, to) = C::impulses_mut(problem);
-        let work = Store { rows, groups: &self.groups, impulses, to: Shared::new(to) };
-        threads.spread(0..self.groups.len(), &|range| instructions.run(&work, range));
+        self.store_to(rows, impulses, to, (instructions, threads));
     }
 
     /// Takes over sums of impulses, sixteen side by side as the impulses are.
@@ -97,16 +96,15 @@ impl<C: Constraint> LaneLayout<C> {
         });
     }
 
-    /// Gives sums of impulses back.
-    pub fn store_sums(
+    /// Gives impulses, or their sums, back to the rows of the constraints `rows`.
+    pub fn store_to(
         &self,
         rows: &[C],
-        sums: &[[Wide; 4]],
-        to: &mut [ImpulseRow],
+        impulses: &[[Wide; 4]],
+        to: &mut [[f32; 4]],
         (instructions, threads): (InstructionSet, &Threads),
     ) {
-        let to = Shared::new(bytemuck::cast_slice_mut(to));
-        let work = Store { rows, groups: &self.groups, impulses: sums, to };
+        let work = Store { rows, groups: &self.groups, impulses, to: Shared::new(to) };
         threads.spread(0..self.groups.len(), &|range| instructions.run(&work, range));
     }
 

@@ -142,7 +142,8 @@ impl Cpu {
         let on = (self.instructions, threads);
         self.contacts.store(problem, &self.contact_impulses, on);
         if !problem.totals.is_empty() {
-            self.contacts.store_sums(&problem.contacts, &self.contact_totals, &mut problem.totals, on);
+            let totals = bytemuck::cast_slice_mut(&mut problem.totals);
+            self.contacts.store_to(&problem.contacts, &self.contact_totals, totals, on);
         }
         self.joints.store(problem, &self.joint_impulses, on);
         problem.convergence = self.convergence;
