@@ -26,6 +26,9 @@ pub fn content_hash(scene: &Scene) -> String {
         let _ = write!(sink, "{pose:?} {:?} {:?} {:?}", b.force, b.mass, b.material);
         for c in &b.colliders {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
+            if c.sensor {
+                let _ = write!(sink, " sensor");
+            }
         }
     }
     let _ = write!(sink, "{:?}", &*scene.world.joints);
