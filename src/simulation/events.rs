@@ -13,7 +13,7 @@ use crate::world::{BodyHandle, JointHandle};
 pub struct Listen {
     /// Whether steps tell of contacts that began or ended.
     pub contacts: bool,
-    /// The approach speed from which on steps tell of hits, 0 or more (m/s); none for no hits.
+    /// The approach speed above which steps tell of hits, 0 or more (m/s); none for no hits. What rests approaches at up to some mm/s.
     pub hits_above: Option<f32>,
     /// Whether impulses are added up for [`Simulation::contacts_of`](crate::Simulation::contacts_of), without any event.
     pub impulses: bool,

@@ -179,7 +179,9 @@ impl Stages {
     /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
     /// or a body lies where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
+        let Self { detector, sleep, effort, contacts, joints, problem, found, by_body, .. } = self;
+        // Rows may change their places; a step that fails makes no new lists.
+        by_body.forget();
         let times = &mut stats.times;
         // Decided before the detection, by what a device that has the rows was asked to leave for.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
