@@ -303,7 +303,8 @@ impl Simulation {
         let is_there = self.world.bodies.contains(body);
         let rows = self.stages.by_body.of(body.index());
         let listed = rows.unwrap_or_default().iter().map(|&row| row as usize);
-        let all = self.stages.contacts.taken().filter(move |_| rows.is_none());
+        let names = move |row: &usize| self.stages.problem.contacts.get(*row).is_some_and(|c| c.holds(body.index()));
+        let all = self.stages.contacts.taken().filter(move |row| rows.is_none() && names(row));
         let own = listed.chain(all).filter(move |_| is_there);
         let contacts = own.filter_map(|row| contacts::contact(&self.stages, &self.world, row));
         contacts.filter(move |contact| contact.a.body == body || contact.b.body == body)

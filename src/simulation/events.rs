@@ -109,15 +109,24 @@ pub(super) type Touch = [ColliderOf; 2];
 pub(super) struct Touches {
     now: Vec<Touch>,
     before: Vec<Touch>,
+    /// Those of this step as they came, and those of the step before.
+    found: Vec<Touch>,
+    found_before: Vec<Touch>,
 }
 
 impl Touches {
     /// Takes over the pairs of a step, in any order and as often as they come; calls `tell` on each that is new, and on each that is gone,
     /// ascending.
     pub fn follow(&mut self, pairs: impl Iterator<Item = Touch>, mut tell: impl FnMut(Touch, bool)) {
+        std::mem::swap(&mut self.found, &mut self.found_before);
+        self.found.clear();
+        self.found.extend(pairs);
+        // In a settled world the pairs are those of the step before, in the same order.
+        if self.found == self.found_before {
+            return;
+        }
         std::mem::swap(&mut self.now, &mut self.before);
-        self.now.clear();
-        self.now.extend(pairs);
+        self.now.clone_from(&self.found);
         rayon::slice::ParallelSliceMut::par_sort_unstable(&mut self.now[..]);
         self.now.dedup();
         let (mut now, mut before) = (self.now.iter().peekable(), self.before.iter().peekable());
@@ -138,6 +147,7 @@ impl Touches {
     /// Forgets all.
     pub fn forget(&mut self) {
         self.now.clear();
+        self.found.clear();
     }
 }
 
