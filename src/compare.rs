@@ -187,7 +187,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 23] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -198,6 +198,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
         contacts,
         points,
         impulses,
+        totals,
         sags,
         order,
         colors,
@@ -218,6 +219,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
         ("contacts", bytemuck::cast_slice(contacts)),
         ("points", bytemuck::cast_slice(points)),
         ("impulses", bytemuck::cast_slice(impulses)),
+        ("totals", bytemuck::cast_slice(totals)),
         ("sags", bytemuck::cast_slice(sags)),
         ("order", bytemuck::cast_slice(order)),
         ("colors", bytemuck::cast_slice(colors)),

@@ -25,6 +25,7 @@
 //! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
+//! | hear of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
 //! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
 //!
@@ -84,7 +85,10 @@ pub use plan::StepPlan;
 pub use problem::StepProblem;
 pub use recording::{Recorder, RecordingIntervals, Replay, ReplayDifference};
 pub use scenes::Scene;
-pub use simulation::{Rollback, Simulation, Snapshot, SolvedManifold, SolvedPoint};
+pub use simulation::{
+    ColliderOf, Contact, ContactPoint, Event, Hit, Listen, Rollback, Simulation, Snapshot, SolvedManifold, SolvedPoint,
+    Summed,
+};
 pub use stats::StepStats;
 pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
 

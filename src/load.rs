@@ -115,7 +115,7 @@ fn stress(
     config: &SolverConfig,
 ) -> f64 {
     let overlap = boxes[upper].overlap_from_above(&boxes[lower]);
-    let one_point = [upper, lower].iter().any(|&i| world.bodies[i].colliders.iter().all(|c| c.shape.is_ball()));
+    let one_point = [upper, lower].iter().any(|&i| world.bodies[i].solids().all(|c| c.shape.is_ball()));
     let at = if one_point { overlap.center() } else { overlap.high };
     let at = up.transpose() * DVec3::new(at.x, boxes[upper].low.y, at.z);
     let normal = up.transpose() * DVec3::Y;
@@ -167,7 +167,7 @@ fn upright_boxes(world: &World, up_of: impl Fn(usize) -> DMat3) -> Vec<Box3> {
     let of = |(i, b): (usize, &Body)| {
         let turn = up_of(i).as_mat3();
         let rotation = glam::Quat::from_mat3(&turn);
-        b.colliders.iter().fold(empty, |all, c| {
+        b.solids().fold(empty, |all, c| {
             let at = pose(turn * b.position, rotation * b.rotation) * pose(c.position, c.rotation);
             let (low, high) = if c.shape.is_half_space() {
                 (DVec3::NEG_INFINITY, DVec3::new(f64::INFINITY, at.translation.y.into(), f64::INFINITY))
@@ -258,6 +258,21 @@ mod tests {
         let parameters: Vec<String> = parameters.iter().map(|p| p.to_string()).collect();
         let scene = Scene::find(scene, &parameters).unwrap();
         (Load::heaviest(&scene.world, &SolverConfig::default()).expect("a load"), scene)
+    }
+
+    #[test]
+    fn a_few_bodies_behind_others_without_shapes_have_their_loads() {
+        for gone in 0..4 {
+            let mut world = World::new();
+            for _ in 0..gone {
+                world.insert(Body::fixed());
+            }
+            world.insert(Body::fixed().shape(crate::Shape::cuboid(5.0, 0.5, 5.0)));
+            assert!(Load::heaviest(&world, &SolverConfig::default()).is_none());
+            world.insert(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
+            let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
+            assert_eq!((load.upper, load.lower), (gone + 1, gone));
+        }
     }
 
     #[test]

@@ -66,7 +66,7 @@ pub fn half_height(body: &Body) -> f64 {
         (f64::from(low.y), f64::from(high.y))
     };
     let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    body.colliders.iter().map(bounds).reduce(both).map_or(0.0, |(low, high)| 0.5 * (high - low))
+    body.solids().map(bounds).reduce(both).map_or(0.0, |(low, high)| 0.5 * (high - low))
 }
 
 /// Whether the center of mass of a body moved by less than half of the height that the body had.

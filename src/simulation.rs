@@ -1,5 +1,7 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod contacts;
+mod events;
 mod hash;
 mod manifolds;
 mod rollback;
@@ -16,10 +18,14 @@ use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
 use crate::queries::Queries;
 use crate::stats::{StepStats, timed};
-use crate::world::World;
+#[cfg(doc)]
+use crate::world::Body;
+use crate::world::{BodyHandle, World};
 use stages::{Changes, Stages};
 
-pub use manifolds::{SolvedManifold, SolvedPoint};
+pub use contacts::{Contact, ContactPoint};
+pub use events::{ColliderOf, Event, Hit, Listen};
+pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
 
@@ -79,6 +85,58 @@ impl Simulation {
         Ok(stats)
     }
 
+    /// Lets the steps from now on tell of contacts and hits, and add up impulses over their substeps. The first step after that tells of all
+    /// contacts that touch already.
+    ///
+    /// # Errors
+    /// The approach speed is no number, or below 0; what the simulation listens to is then as it was.
+    pub fn listen(&mut self, listen: Listen) -> Result<()> {
+        listen.check()?;
+        self.leave_device();
+        self.stages.events.listen(listen);
+        Ok(())
+    }
+
+    /// What the simulation listens to.
+    pub fn listening(&self) -> Listen {
+        self.stages.events.listen
+    }
+
+    /// The sensors of the world, each with the colliders that overlapped it after the last step: first the sensor, then the other one.
+    /// Ascending by the indices of both bodies.
+    pub fn overlaps(&self) -> &[[ColliderOf; 2]] {
+        self.stages.events.inside()
+    }
+
+    /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), each
+    /// ascending by the pairs of bodies, then joints that broke, ascending. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
+    /// failed. The order and the numbers are the same for any backend with the same bits.
+    ///
+    /// Two colliders touch in a step where their surfaces press on each other in the course of the step, or overlap when it begins. A contact
+    /// that is only near does not touch. Bodies that sleep go on touching. Where a body goes, the next step tells that its contacts ended.
+    ///
+    /// ```
+    /// use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// let floor = world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.0, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.listen(Listen { contacts: true, hits_above: Some(1.0), ..Listen::default() })?;
+    /// let mut told = Vec::new();
+    /// for _ in 0..60 {
+    ///     simulation.step(1.0 / 60.0)?;
+    ///     told.extend_from_slice(simulation.events());
+    /// }
+    /// let [Event::Began { a, b }, Event::Hit(hit)] = told[..] else { panic!("{told:?}") };
+    /// assert_eq!((a.body, b.body), (floor, ball));
+    /// assert!((hit.speed - 3.13).abs() < 0.01, "{} m/s", hit.speed);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn events(&self) -> &[Event] {
+        &self.stages.events.all
+    }
+
     /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
     /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
     ///
@@ -125,6 +183,7 @@ impl Simulation {
 
     /// Assembles a step; false if there is nothing to do in it.
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
+        self.stages.events.all.clear();
         check_step_length(dt)?;
         let changes = timed(&mut stats.times.detect, || self.changes(dt))?;
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
@@ -260,6 +319,41 @@ impl Simulation {
         manifolds::of(detector, contacts, problem, self.stages.least_substeps())
     }
 
+    /// The contacts that the last step found, near ones included, in no particular order that holds from step to step. No device is asked:
+    /// impulses are there where the simulation [listens](Self::listen). Those of bodies that went since are left out.
+    pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
+        self.stages.contacts.taken().filter_map(|row| contacts::contact(&self.stages, &self.world, row))
+    }
+
+    /// The contacts of a body, likewise; none if it is gone. Where the simulation listens, the cost is that of the contacts of the body, and
+    /// else that of all contacts.
+    ///
+    /// ```
+    /// use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+    /// for _ in 0..20 {
+    ///     simulation.step(1.0 / 60.0)?;
+    /// }
+    /// let borne: f32 = simulation.contacts_of(brick).map(|contact| contact.impulse.y).sum();
+    /// assert!((borne - 1000.0 * 9.81 / 60.0).abs() < 1.0, "{borne} N s");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn contacts_of(&self, body: BodyHandle) -> impl Iterator<Item = Contact> + '_ {
+        let is_there = self.world.bodies.contains(body);
+        let rows = self.stages.by_body.of(body.index());
+        let listed = rows.unwrap_or_default().iter().map(|&row| row as usize);
+        let names = move |row: &usize| self.stages.problem.contacts.get(*row).is_some_and(|c| c.holds(body.index()));
+        let all = self.stages.contacts.taken().filter(move |row| rows.is_none() && names(row));
+        let own = listed.chain(all).filter(move |_| is_there);
+        let contacts = own.filter_map(|row| contacts::contact(&self.stages, &self.world, row));
+        contacts.filter(move |contact| contact.a.body == body || contact.b.body == body)
+    }
+
     /// Overlap when the last step began, from the contacts that it went by.
     pub fn solved_penetration(&mut self) -> Penetration {
         let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
@@ -268,7 +362,7 @@ impl Simulation {
 
     /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        self.stages.problem.joint_impulses.iter().map(|row| row.linear.into()).collect()
+        (0..self.stages.problem.joint_impulses.len()).map(|joint| self.stages.joint_impulse(joint)).collect()
     }
 
     /// Changes the settings from the next step on.

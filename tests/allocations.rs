@@ -3,7 +3,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use drystone::{Cpu, Scene, Simulation, SolverConfig};
+use drystone::{Body, Cpu, Listen, Scene, Shape, Simulation, SolverConfig};
 
 /// Counts what is asked of the system.
 struct Counting;
@@ -27,11 +27,19 @@ unsafe impl GlobalAlloc for Counting {
 static COUNTING: Counting = Counting;
 
 /// Allocations of the steps that compute no contact, and of the others, of a pile of 500 boxes on `threads` threads.
-fn allocations(threads: usize, config: SolverConfig) -> [usize; 2] {
+/// `listens`: to all that there is, and with a sensor around the pile.
+fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2] {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
-        let scene = Scene::find("pile", &["n=500".into()]).expect("the scene");
+        let mut scene = Scene::find("pile", &["n=500".into()]).expect("the scene");
+        if listens {
+            scene.world.add(Body::fixed().sensor(Shape::ball(3.0)));
+        }
         let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("good settings");
+        if listens {
+            let all = Listen { contacts: true, hits_above: Some(0.0), impulses: true };
+            simulation.listen(all).expect("a good threshold");
+        }
         for _ in 0..400 {
             simulation.step(scene.dt).expect("a step");
         }
@@ -52,8 +60,11 @@ fn allocations(threads: usize, config: SolverConfig) -> [usize; 2] {
 #[test]
 fn a_settled_step_allocates_nothing_and_one_that_computes_its_contacts_does() {
     for threads in [1, 2] {
-        assert_eq!(allocations(threads, SolverConfig::default().without_sleep())[0], 0, "{threads} threads");
+        for listens in [false, true] {
+            let asked = allocations(threads, SolverConfig::default().without_sleep(), listens);
+            assert_eq!(asked[0], 0, "{threads} threads, listens: {listens}");
+        }
     }
     let anew = SolverConfig::default().without_sleep().with(|c| c.recycle_distance = 0.0);
-    assert!(allocations(1, anew)[1] > 0, "the counter counts nothing");
+    assert!(allocations(1, anew, false)[1] > 0, "the counter counts nothing");
 }

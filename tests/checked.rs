@@ -284,6 +284,20 @@ fn a_pass_with_patches_over_rows_without_is_refused_and_the_other_way_round() {
     }
 }
 
+/// A backend would add to sums that are not there.
+#[test]
+fn sums_of_a_problem_without_room_for_them_are_refused() {
+    let (mut problem, _) = step(&[]);
+    let sums = Pass { kernel: Kernel::SumImpulses { first: false }, block: 0, colors: 0..1 };
+    let line = refusal(problem.clone(), std::slice::from_ref(&sums)).expect("refused");
+    assert_eq!(line, "pass 0, sum_impulses: totals: there are none");
+    problem.totals = problem.impulses.clone();
+    assert_eq!(refusal(problem.clone(), &[sums]), None);
+    problem.totals.pop();
+    let line = refusal(problem, &[]).expect("refused");
+    assert!(line.contains("totals: "), "{line}");
+}
+
 #[test]
 fn momentum_over_several_blocks_is_refused_and_so_is_a_pass_of_no_block() {
     let (mut problem, plan) = step(&["method=accelerated", "iterations=5"]);

@@ -50,7 +50,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 (contacts, Some(rules.patch))
             }
-            Kernel::ClearImpulses => (contacts, None),
+            Kernel::ClearImpulses | Kernel::SumImpulses { .. } => (contacts, None),
             Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (joints, None),
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
             Kernel::IntegrateVelocities { .. }
@@ -65,6 +65,9 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
             return refuse(format!("colors {colors:?}: there are {known:?}"));
+        }
+        if matches!(kernel, Kernel::SumImpulses { .. }) && problem.totals.is_empty() && !colors.is_empty() {
+            return refuse("totals: there are none".into());
         }
         if matches!(kernel, Kernel::Extrapolate { .. }) && problem.blocks.len() > 1 {
             return refuse("goes over all bodies: there is more than one block".into());

@@ -24,6 +24,8 @@ crate::saved::kinds!(Activity { Still, Moving, Awake });
 #[derive(Clone)]
 pub(super) struct ColliderInfo {
     pub body: u32,
+    /// Index among the colliders of the body.
+    pub index: u32,
     pub shape: SharedShape,
     /// Place in the body's frame.
     pub local: Pose,
@@ -35,29 +37,33 @@ pub(super) struct ColliderInfo {
     pub reach: f32,
     /// Half-spaces have no box to put into the tree.
     pub unbounded: bool,
+    /// Whether it meets others without contacts.
+    pub sensor: bool,
 }
 
 /// The body of a collider that is gone.
 const NO_BODY: u32 = u32::MAX;
 
 impl ColliderInfo {
-    /// The collider of a body.
-    pub fn new(body: u32, c: &Collider) -> Self {
+    /// The collider of a body with this index among those of the body.
+    pub fn new(body: u32, index: u32, c: &Collider) -> Self {
         Self {
             body,
+            index,
             shape: c.shape.0.clone(),
             local: Pose::from_parts(c.position, c.rotation),
             cuboid: c.shape.0.as_cuboid().map(|cuboid| cuboid.half_extents),
             size: c.shape.smallest_half_extent(),
             reach: c.position.length() + c.shape.bounding_radius(),
             unbounded: c.shape.is_half_space(),
+            sensor: c.sensor,
         }
     }
 
     /// A collider that is gone.
     pub fn gone() -> Self {
-        let collider = Collider { shape: Shape::ball(1.0), position: Vec3::ZERO, rotation: Quat::IDENTITY };
-        Self::new(NO_BODY, &collider)
+        let (position, rotation) = (Vec3::ZERO, Quat::IDENTITY);
+        Self::new(NO_BODY, 0, &Collider { shape: Shape::ball(1.0), position, rotation, sensor: false })
     }
 
     /// Marks a collider that is gone.
@@ -81,6 +87,7 @@ impl ColliderInfo {
     /// Whether this is still the collider of a body.
     pub fn is(&self, body: usize, collider: &Collider) -> bool {
         self.body as usize == body
+            && self.sensor == collider.sensor
             && std::sync::Arc::ptr_eq(&self.shape.0, &collider.shape.0.0)
             && self.local == Pose::from_parts(collider.position, collider.rotation)
     }

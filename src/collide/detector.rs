@@ -10,6 +10,7 @@ use super::pair::Pair;
 use super::pairs::Placed;
 use super::places::Places;
 use super::report::{Change, DetectStats};
+use super::sensors::{Overlap, Visitors};
 use super::teleport::{Left, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, PlacedBody, WorldContacts, key};
 use crate::config::SolverConfig;
@@ -31,9 +32,11 @@ pub struct Detector {
     falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     jointed: HashSet<(u32, u32)>,
+    /// What sensors overlapped when that was last asked.
+    overlaps: Vec<Overlap>,
 }
 
-crate::saved::cloned!(Detector { worlds, known, kinds, groups, left, jointed } scratch { moving, falls });
+crate::saved::cloned!(Detector { worlds, known, kinds, groups, left, jointed } scratch { moving, falls, overlaps });
 
 /// A body as the detector knows it.
 #[derive(Clone, Copy, Default)]
@@ -130,6 +133,7 @@ impl Detector {
             left: Vec::new(),
             falls: Vec::new(),
             jointed: jointed(world),
+            overlaps: Vec::new(),
         };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
         detector
@@ -198,6 +202,26 @@ impl Detector {
             self.jointed = jointed;
             self.worlds.iter_mut().for_each(WorldContacts::look_again);
         }
+    }
+
+    /// Whether the body at an index is the one that the last detection knew.
+    pub fn knows(&self, world: &World, body: usize) -> bool {
+        let now = world.bodies.generations().get(body);
+        !world.bodies.is_vacant(body) && self.known.get(body).map(|known| &known.generation) == now
+    }
+
+    /// Whether any collider is a sensor.
+    pub fn has_sensors(&self) -> bool {
+        self.worlds.iter().any(WorldContacts::has_sensors)
+    }
+
+    /// The colliders that sensors overlap at the poses of `world`, in any order; after the detection of the step that left them.
+    pub fn sense(&mut self, world: &World, activity: &[Activity]) -> &[Overlap] {
+        let Self { worlds, kinds, groups, jointed, overlaps, .. } = self;
+        overlaps.clear();
+        let visitors = Visitors { bodies: &world.bodies, kinds, groups, activity, jointed };
+        worlds.iter_mut().for_each(|world| world.sense(&visitors, overlaps));
+        overlaps
     }
 
     /// The pairs whose boxes overlap, with the manifolds they touch with, world by world. The order is the same for any

@@ -20,6 +20,7 @@ mod places;
 mod query;
 mod report;
 mod reuse;
+mod sensors;
 mod solid;
 mod teleport;
 #[cfg(test)]

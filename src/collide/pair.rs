@@ -23,13 +23,15 @@ pub struct Pair {
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
+    /// The colliders, by their indices among those of their bodies.
+    pub colliders: [u32; 2],
     /// Half of the smallest side of the thinner one (m).
     pub size: f32,
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
 }
 
-crate::saved::cloned!(Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part });
+crate::saved::cloned!(Pair { body_a, body_b, manifolds, colliders, collider_a, collider_b, size, takes_part });
 
 /// A collider, and where its body is.
 pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);
@@ -68,6 +70,7 @@ impl Pair {
             manifolds: Vec::new(),
             collider_a,
             collider_b,
+            colliders: [a.index, b.index],
             size: a.size.min(b.size),
             takes_part: true,
         }

@@ -204,6 +204,23 @@ impl Tree {
         }
     }
 
+    /// Calls `visit` on each box that overlaps another one, in an order that the boxes of all steps decide.
+    pub fn visit(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
+        if !self.order.is_empty() {
+            let one = Node::new([*aabb, NOWHERE, NOWHERE, NOWHERE], 0);
+            self.visit_node(self.levels.len() - 1, 0, &one, &mut visit);
+        }
+    }
+
+    fn visit_node(&self, level: usize, node: usize, one: &Node, visit: &mut impl FnMut(u32)) {
+        let mut hits = one.overlaps(&self.levels[level][node]) & 0xf;
+        while hits != 0 {
+            let below = WIDTH * node + hits.trailing_zeros() as usize;
+            hits &= hits - 1;
+            if level == 0 { visit(self.order[below]) } else { self.visit_node(level - 1, below, one, visit) }
+        }
+    }
+
     /// Finds all pairs of boxes that overlap, did not before, and that `accept` takes, in an order that depends on the number of threads.
     pub fn overlaps(&self, accept: &(impl Fn(u32, u32) -> bool + Sync)) -> Vec<(u32, u32)> {
         if self.order.is_empty() { Vec::new() } else { self.overlaps_of(self.levels.len() - 1, [0, 0], accept) }

@@ -49,7 +49,7 @@ impl ColliderRange {
 /// The colliders of one world, which meet no others.
 #[derive(Default)]
 pub(super) struct WorldContacts {
-    colliders: Vec<ColliderInfo>,
+    pub(super) colliders: Vec<ColliderInfo>,
     /// Those that left since the last detection; their pairs have not ended yet.
     leaving: Vec<ColliderRange>,
     /// The first of as many places side by side as a number says, without colliders; the last is taken first.
@@ -57,14 +57,18 @@ pub(super) struct WorldContacts {
     /// The same, of those that are cuboids.
     cuboids: Vec<CuboidPlace>,
     /// Fattened box of each collider.
-    fat: Vec<Aabb>,
+    pub(super) fat: Vec<Aabb>,
     /// Whether it is new in this detection; a half-space, whether it moved.
     moved: Vec<bool>,
     /// The box before, if it is new.
     before: Vec<Aabb>,
-    tree: Tree,
-    /// The half-spaces.
-    planes: Vec<Plane>,
+    pub(super) tree: Tree,
+    /// The half-spaces that are no sensors.
+    pub(super) planes: Vec<Plane>,
+    /// The sensors.
+    pub(super) sensors: Vec<u32>,
+    /// Memory of [`WorldContacts::sense`].
+    pub(super) strayed: Vec<u32>,
     /// The pairs whose boxes overlap.
     pub pairs: Pairs,
     /// The colliders of each, the smaller index first.
@@ -88,12 +92,13 @@ crate::saved::cloned!(WorldContacts {
     before,
     tree,
     planes,
+    sensors,
     pairs,
     keys,
     ended,
     changed,
     look_again,
-} scratch { found });
+} scratch { found, strayed });
 
 /// A pair, by its place, that is not as it was.
 #[derive(Clone, Copy)]
@@ -106,8 +111,8 @@ crate::saved::fields!(PairChange { pair, computed });
 
 /// A half-space, and where it was when its pairs were looked for.
 #[derive(Clone)]
-struct Plane {
-    collider: u32,
+pub(super) struct Plane {
+    pub(super) collider: u32,
     then: Option<Pose>,
 }
 
@@ -125,9 +130,11 @@ impl WorldContacts {
         }
         let vacant = self.vacant.get_mut(&count).and_then(Vec::pop);
         let range = ColliderRange { first: vacant.unwrap_or(self.colliders.len() as u32), count };
-        for (place, collider) in range.places().zip(colliders) {
-            let info = ColliderInfo::new(body, collider);
-            if info.unbounded {
+        for ((place, collider), index) in range.places().zip(colliders).zip(0..) {
+            let info = ColliderInfo::new(body, index, collider);
+            if info.sensor {
+                self.sensors.push(place as u32);
+            } else if info.unbounded {
                 self.planes.push(Plane { collider: place as u32, then: None });
             }
             let cuboid = CuboidPlace::of(&info);
@@ -149,6 +156,7 @@ impl WorldContacts {
         if range.count > 0 {
             self.colliders[range.places()].iter_mut().for_each(ColliderInfo::leave);
             self.planes.retain(|plane| !range.places().contains(&(plane.collider as usize)));
+            self.sensors.retain(|&sensor| !range.places().contains(&(sensor as usize)));
             self.leaving.push(range);
         }
     }
@@ -218,7 +226,7 @@ impl WorldContacts {
     fn fatten(&mut self, input: &DetectionInput) -> bool {
         let fatten = |((c, fat), (moved, before)): ((&ColliderInfo, &mut Aabb), (&mut bool, &mut Aabb))| {
             *moved = false;
-            if c.is_gone() {
+            if c.is_gone() || c.sensor {
                 return false;
             }
             let still = input.activity.get(c.body as usize) == Some(&Activity::Still);
@@ -270,7 +278,9 @@ impl WorldContacts {
             let plane = &colliders[*collider as usize];
             let now = pose_of(plane, input);
             let is_new = |c: u32| {
-                let looks = !colliders[c as usize].unbounded && (moved[c as usize] || moved[*collider as usize]);
+                let looks = !colliders[c as usize].unbounded
+                    && !colliders[c as usize].sensor
+                    && (moved[c as usize] || moved[*collider as usize]);
                 looks
                     && box_reaches_plane(plane, now, &fat[c as usize])
                     && !then.is_some_and(|then| box_reaches_plane(plane, then, box_before(c)))
@@ -358,7 +368,7 @@ fn pose_of(c: &ColliderInfo, input: &DetectionInput) -> Pose {
 }
 
 /// Whether a box reaches a half-space at `pose`, by its corner that lies deepest.
-fn box_reaches_plane(plane: &ColliderInfo, pose: Pose, aabb: &Aabb) -> bool {
+pub(super) fn box_reaches_plane(plane: &ColliderInfo, pose: Pose, aabb: &Aabb) -> bool {
     let Some(half_space) = plane.shape.as_halfspace() else { return false };
     let normal = pose.rotation * half_space.normal;
     let deepest = (aabb.center() - pose.translation).dot(normal) - aabb.half_extents().dot(normal.abs());

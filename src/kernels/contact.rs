@@ -1,5 +1,5 @@
 //! The sweeps of one manifold. Doubles of `shaders/lib/contact.wgsl` and of the kernels
-//! `clear_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
+//! `clear_impulses`, `sum_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
 //! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share
 //! the lanes of fuller ones. With friction per manifold the last of `points` and `impulses` is the patch.
@@ -90,6 +90,14 @@ fn solve_normal<L: Lane>(
 #[inline(always)]
 pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
     *impulse = Impulse { peak: impulse.peak, ..Impulse::default() };
+}
+
+/// Adds the impulse of one point in a substep to those of the substeps before; the first substep begins the sum. Kernel `sum_impulses`.
+#[inline(always)]
+pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Impulse<L>) {
+    let now = impulse.components();
+    total.set_components(if is_first { now } else { total.components() + now });
+    total.peak = L::constant(0.0);
 }
 
 /// Applies the impulses that a manifold already carries. Kernel `warm_start`.

@@ -23,6 +23,8 @@ pub struct KernelRows<S> {
     pub points: Vec<Point<S>>,
     /// Impulses of the points.
     pub impulses: Vec<Impulse<S>>,
+    /// Their sums over the substeps.
+    pub totals: Vec<Impulse<S>>,
     /// Joints.
     pub joints: Vec<Joint<S>>,
     /// Impulses of the joints.
@@ -46,6 +48,7 @@ impl<S: Scalar> KernelRows<S> {
         refill(&problem.contacts, &mut self.contacts, Contact::load);
         refill(&problem.points, &mut self.points, Point::load);
         refill(&problem.impulses, &mut self.impulses, Impulse::load);
+        refill(&problem.totals, &mut self.totals, Impulse::load);
         refill(&problem.joints, &mut self.joints, Joint::load);
         refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
         self.momentum = Momentum::load(&problem.momentum);
@@ -55,6 +58,7 @@ impl<S: Scalar> KernelRows<S> {
     pub fn store(&self, problem: &mut StepProblem) {
         problem.bodies.iter_mut().zip(&self.bodies).for_each(|(row, body)| *row = body.store());
         problem.impulses.iter_mut().zip(&self.impulses).for_each(|(row, impulse)| *row = impulse.store());
+        problem.totals.iter_mut().zip(&self.totals).for_each(|(row, total)| *row = total.store());
         let joints = problem.joint_impulses.iter_mut().zip(&self.joint_impulses);
         joints.for_each(|(row, impulse)| row.linear = impulse.store());
         problem.momentum = self.momentum.store();

@@ -66,9 +66,10 @@ impl Pass {
             }
             Kernel::SolveJoints(_) => rows.len() * (pair + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
             Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
-            Kernel::ClearImpulses => {
+            Kernel::ClearImpulses | Kernel::SumImpulses { .. } => {
                 let patches = if problem.has_patches() { rows.len() } else { 0 };
-                (points_of(&self.colors) + patches) * 2 * IMPULSE
+                let each = if self.kernel == (Kernel::SumImpulses { first: false }) { 3 } else { 2 };
+                (points_of(&self.colors) + patches) * each * IMPULSE
             }
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 let (contacts, points) = (rows.len(), points_of(&self.colors));

@@ -32,6 +32,11 @@ pub enum Kernel {
     },
     /// Forgets impulses; over contact colors, all at once.
     ClearImpulses,
+    /// Adds the impulses of a substep to those of the substeps before; over contact colors, all at once.
+    SumImpulses {
+        /// Whether no substep came before.
+        first: bool,
+    },
     /// Inertia of bodies that turned; over `turning`.
     TurnInertias,
     /// Factors the joints that are solved at once; over systems.
@@ -85,6 +90,7 @@ impl Kernel {
             Self::IntegrateTorques { .. } => "integrate_torques",
             Self::IntegrateGyroscopic { .. } => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
+            Self::SumImpulses { .. } => "sum_impulses",
             Self::TurnInertias => "turn_inertias",
             Self::FactorJoints => "factor_joints",
             Self::WarmStartJoints => "warm_start_joints",
@@ -172,6 +178,7 @@ impl fmt::Display for Kernel {
         write!(f, "{}", self.name())?;
         match self {
             Self::IntegrateVelocities { warm_start: true, .. } => write!(f, "(warm start)")?,
+            Self::SumImpulses { first: true } => write!(f, "(first)")?,
             _ if self.rules().is_none() && self.is_from_start() => write!(f, "(from start)")?,
             _ => {}
         }

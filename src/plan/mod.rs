@@ -61,12 +61,14 @@ crate::saved::cloned!(StepPlan { passes });
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
+    /// Whether impulses are summed over the substeps.
+    totals: bool,
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, isotropic, has_torques });
+crate::saved::cloned!(PlanKey { colors, blocks, totals, isotropic, has_torques });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -74,14 +76,15 @@ impl PlanKey {
         self.blocks == problem.blocks
             && self.colors == problem.colors
             && self.has_torques != problem.torques.is_empty()
+            && self.totals != problem.totals.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
-        let has_torques = !problem.torques.is_empty();
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic, has_torques }
+        let (has_torques, totals) = (!problem.torques.is_empty(), !problem.totals.is_empty());
+        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), totals, isotropic, has_torques }
     }
 }
 
@@ -133,6 +136,7 @@ impl StepPlan {
                 let groups = color_groups(&problem.colors, contact_colors, config.fuse_colors_below);
                 plan.over_colors(Kernel::ApplyRestitution(rules), block, &groups);
             }
+            plan.sum_impulses(problem, block, own.substeps - 1);
             if from_start {
                 plan.over_colors(Kernel::EndChanges, block, &[bodies]);
             }
@@ -140,7 +144,8 @@ impl StepPlan {
         plan
     }
 
-    /// The substeps of a block: in each velocities, warm start, biased sweeps, positions, relax sweeps.
+    /// The substeps of a block: in each velocities, warm start, biased sweeps, positions, relax sweeps, sums of impulses. Those of the last
+    /// substep wait for the bounces.
     fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
         let own = &problem.blocks[block as usize];
         let (substeps, from_start) = (own.substeps, shared.from_start);
@@ -196,6 +201,18 @@ impl StepPlan {
             self.over_colors(Kernel::TurnInertias, block, turning);
             self.over_colors(Kernel::FactorJoints, block, systems);
             self.sweeps(sweeps(config.relax), shared);
+            if substep + 1 < substeps {
+                self.sum_impulses(problem, block, substep);
+            }
+        }
+    }
+
+    /// Adds the impulses of a substep to those of the substeps before, where the problem has room for the sums.
+    fn sum_impulses(&mut self, problem: &StepProblem, block: u32, substep: u32) {
+        let colors = problem.blocks[block as usize].contacts;
+        let colors = colors[0]..colors[1];
+        if !problem.totals.is_empty() && !colors.is_empty() {
+            self.passes.push(Pass { kernel: Kernel::SumImpulses { first: substep == 0 }, block, colors });
         }
     }
 

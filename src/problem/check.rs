@@ -56,9 +56,11 @@ impl StepProblem {
 
     fn check_counts(&self) -> Result<()> {
         let params = &self.params;
+        let totals = if self.totals.is_empty() { 0 } else { self.points.len() };
         for (name, rows, wanted, of) in [
             ("masses", self.masses.len(), self.bodies.len(), "bodies"),
             ("impulses", self.impulses.len(), self.points.len(), "points"),
+            ("totals", self.totals.len(), totals, "points"),
             ("joint_impulses", self.joint_impulses.len(), self.joints.len(), "joints"),
             ("params.body_count", params.body_count as usize, self.bodies.len(), "bodies"),
             ("params.point_count", params.point_count as usize, self.points.len(), "points"),

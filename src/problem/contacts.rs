@@ -14,7 +14,7 @@ use super::prepare::{ComputedRow, PoseRow};
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slot, Slots, Write};
 use super::write::{SlotRows, Writer, point_before};
-use crate::collide::{Detector, MAX_POINTS};
+use crate::collide::{Detector, MAX_POINTS, Manifold};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
@@ -42,6 +42,8 @@ pub struct ContactRows {
     materials: Option<Materials>,
     /// The bodies that lie still and touch nothing that they touched before.
     new_bodies: Vec<bool>,
+    /// Whether impulses are summed over the substeps of a step.
+    pub sums: bool,
     /// How the rows follow from those of the step before.
     pub carry: Carry,
 }
@@ -54,6 +56,7 @@ crate::saved::cloned!(ContactRows {
     jams,
     classes,
     materials,
+    sums,
     carry,
 } scratch { graph, poses, new_bodies });
 
@@ -104,6 +107,27 @@ impl ContactRows {
         }
     }
 
+    /// The rows that a manifold has.
+    pub fn taken(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free()).map(|(row, _)| row)
+    }
+
+    /// The manifold of a row.
+    pub fn manifold<'a>(&self, row: usize, detector: &'a Detector) -> &'a Manifold {
+        let slot = &self.slots.all[row];
+        &detector.pair(slot.world, slot.pair).manifolds[slot.manifold as usize]
+    }
+
+    /// Whether the contact in a row is swept.
+    pub(super) fn takes_part(&self, row: usize) -> bool {
+        self.slots.all[row].takes_part
+    }
+
+    /// The colliders of the contact in a row, by their indices among those of its bodies a and b.
+    pub fn colliders_of(&self, row: usize) -> [u32; 2] {
+        self.slots.colliders[row]
+    }
+
     /// Gives every manifold that takes part a color; one that has a color keeps it.
     pub fn color(&mut self, world: &World, max_colors: u32) {
         let members: Vec<u32> = self.slots.taking_part().collect();
@@ -130,6 +154,9 @@ impl ContactRows {
             (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
             problem.points = moved(&problem.points, &from, stride);
             problem.impulses = moved(&problem.impulses, &from, stride);
+            if !problem.totals.is_empty() {
+                problem.totals = moved(&problem.totals, &from, stride);
+            }
             problem.sags = moved(&problem.sags, &from, 1);
             self.computed = moved(&self.computed, &from, 1);
             self.jams = moved(&self.jams, &from, 1);
@@ -306,6 +333,11 @@ impl ContactRows {
         problem.sags.resize(count, 0.0);
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
+        if self.sums && problem.totals.is_empty() {
+            // Contacts that rest have no other sums than what they bear.
+            problem.totals.clone_from(&problem.impulses);
+        }
+        problem.totals.resize(if self.sums { count * stride } else { 0 }, ImpulseRow::default());
         self.computed.resize(count, ComputedRow::default());
         self.jams.resize(count, false);
     }

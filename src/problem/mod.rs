@@ -18,6 +18,7 @@ mod rows;
 mod slots;
 pub mod softness;
 mod summary;
+mod touching;
 mod write;
 
 pub use arithmetic::{Mass, Sym3};
@@ -33,6 +34,7 @@ pub use rows::{
     MomentumRow, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
 };
 pub use summary::ContactSummary;
+pub use touching::{Approach, ColliderPair};
 
 use std::ops::Range;
 
@@ -40,7 +42,7 @@ use crate::error::Result;
 use crate::saved::{Archive, Saved};
 
 /// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
-/// `joint_impulses`, `convergence`, `momentum`).
+/// `totals`, `joint_impulses`, `convergence`, `momentum`).
 #[derive(Debug, Default, PartialEq)]
 pub struct StepProblem {
     /// The same for all.
@@ -59,6 +61,8 @@ pub struct StepProblem {
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
+    /// Their sums over the substeps of the step, without peaks; empty where nobody asks for them.
+    pub totals: Vec<ImpulseRow>,
     /// How deep the bodies of each manifold sag at rest under what it bore in the step before, face to face (m).
     pub sags: Vec<f32>,
     /// Ball joints. Only those in `order` take part.
@@ -91,6 +95,7 @@ crate::saved::cloned!(StepProblem {
     contacts,
     points,
     impulses,
+    totals,
     sags,
     joints,
     joint_impulses,
@@ -119,6 +124,7 @@ impl Saved for StepProblem {
             contacts: _,
             points: _,
             impulses: _,
+            totals: _,
             sags: _,
             joints: _,
             joint_impulses,

@@ -155,6 +155,11 @@ impl ContactRow {
         Self { normal: normal.to_array(), tangent: tangent.store(), ..Self::default() }
     }
 
+    /// Whether this is one of its bodies.
+    pub(crate) fn holds(&self, body: usize) -> bool {
+        self.body_a as usize == body || self.body_b as usize == body
+    }
+
     /// The two tangents; together with the normal a right-handed frame.
     pub fn tangents(&self) -> (Vec3, Vec3) {
         let tangent_1 = Vec3::from_array(self.tangent);

@@ -48,7 +48,7 @@ pub(super) const FREE: Slot =
 
 impl Slot {
     /// Whether no manifold has it.
-    fn is_free(&self) -> bool {
+    pub fn is_free(&self) -> bool {
         self.world == FREE.world
     }
 }
@@ -59,12 +59,14 @@ pub(super) struct Slots {
     pub all: Vec<Slot>,
     /// The edges that the graph colors, one a slot.
     pub edges: Vec<Edge>,
+    /// The colliders of each slot, by their indices among those of their bodies a and b.
+    pub colliders: Vec<[u32; 2]>,
     pub free: Vec<u32>,
     /// How many were taken since all were sorted.
     pub taken: usize,
 }
 
-crate::saved::cloned!(Slots { all, edges, free, taken });
+crate::saved::cloned!(Slots { all, edges, colliders, free, taken });
 
 impl Slots {
     /// Follows the detection: manifolds that began take a slot, those that ended leave theirs.
@@ -108,6 +110,7 @@ impl Slots {
                 size: pair.size,
                 need,
             };
+            self.colliders[manifold.slot as usize] = pair.colliders;
             let edge = &mut self.edges[manifold.slot as usize];
             *edge = Edge { a, b, color: edge.color, rank: rank | u64::from(k) };
         }
@@ -127,6 +130,7 @@ impl Slots {
             return slot;
         }
         self.all.push(FREE);
+        self.colliders.push([0; 2]);
         self.edges.push(Edge { a: IMMOVABLE, b: IMMOVABLE, color: None, rank: 0 });
         self.all.len() as u32 - 1
     }
@@ -155,6 +159,7 @@ impl Slots {
         let from: Vec<u32> = order.iter().copied().chain(resting).collect();
         self.all = from.iter().map(|&slot| self.all[slot as usize]).collect();
         self.edges = from.iter().map(|&slot| self.edges[slot as usize]).collect();
+        self.colliders = from.iter().map(|&slot| self.colliders[slot as usize]).collect();
         for (i, slot) in (0..).zip(&self.all) {
             detector.pair_mut(slot.world, slot.pair).manifolds[slot.manifold as usize].slot = i;
         }

@@ -310,9 +310,14 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
         return vn;
     }
     let ahead = 0.5 * pull * h;
+    -(speed_at_impact(vn, pull, gap, ahead) - ahead / e)
+}
+
+/// Speed with which surfaces meet, on the parabola of their positions, which velocities stand so much `ahead` of (m/s); the other numbers
+/// are those of [`velocity_at_impact`].
+pub(super) fn speed_at_impact(vn: f32, pull: f32, gap: f32, ahead: f32) -> f32 {
     let approach = (vn + ahead).min(0.0);
-    let meeting = (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt();
-    -(meeting - ahead / e)
+    (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
 }
 
 /// The row that stands for the friction of all `points`, which learn how far from it they are.

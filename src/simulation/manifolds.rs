@@ -22,6 +22,9 @@ pub struct SolvedManifold {
     pub twist_impulse: f32,
     /// Friction impulse on b in the last substep, with friction per manifold, world axes (N s).
     pub friction_impulse: Vec3,
+    /// Impulse on b of the whole step, normal and friction of all points, world axes (N s); none where the simulation does not
+    /// [`listen`](crate::Simulation::listen).
+    pub summed: Option<Vec3>,
     /// Substeps that the step had: an impulse over the length of one is a force.
     pub substeps: u32,
     points: [SolvedPoint; MAX_POINTS],
@@ -45,6 +48,17 @@ pub struct SolvedPoint {
     pub normal_impulse: f32,
     /// Friction impulse on b in the last substep, world axes (N s).
     pub friction_impulse: Vec3,
+    /// Impulses of the whole step; none where the simulation does not [`listen`](crate::Simulation::listen).
+    pub summed: Option<Summed>,
+}
+
+/// The impulses of a step, summed over its substeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summed {
+    /// Normal impulse on b (N s).
+    pub normal: f32,
+    /// Friction impulse on b, world axes (N s).
+    pub friction: Vec3,
 }
 
 impl SolvedManifold {
@@ -90,7 +104,18 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
             separation: row.separation,
             normal_impulse: impulse.normal,
             friction_impulse: friction(impulse),
+            summed: None,
         };
+    }
+    let mut summed = None;
+    if !problem.totals.is_empty() {
+        let totals = &problem.totals[first..first + count];
+        for (point, total) in points.iter_mut().zip(totals) {
+            point.summed = Some(Summed { normal: total.normal, friction: friction(total) });
+        }
+        let at_patch = if problem.has_patches() { friction(&problem.totals[first + count]) } else { Vec3::ZERO };
+        let at_points = totals.iter().map(|total| manifold.normal * total.normal + friction(total));
+        summed = Some(at_points.fold(at_patch, |sum, impulse| sum + impulse));
     }
     // With friction per manifold the row after the points is the patch's.
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
@@ -103,6 +128,7 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         preload: contact.preload,
         twist_impulse: patch.normal,
         friction_impulse: friction(&patch),
+        summed,
         points,
         count,
     }

@@ -1,16 +1,18 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
+use super::contacts::ByBody;
+use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::error::Result;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
+use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
 use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{MassProperties, Material, World};
+use crate::world::{BallJoint, BodyKind, MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
@@ -24,6 +26,9 @@ pub(super) struct Stages {
     pub joints: JointRows,
     pub problem: StepProblem,
     pub plan: StepPlan,
+    pub events: Events,
+    /// The contacts of each body, where somebody listens.
+    pub by_body: ByBody,
     /// The key of the plan; none if the next step has to make a plan.
     plan_key: Option<PlanKey>,
     /// Points of the contacts that take part, and bytes that the plan moves.
@@ -41,6 +46,8 @@ crate::saved::cloned!(Stages {
     joints,
     problem,
     plan,
+    events,
+    by_body,
     plan_key,
     points,
     bytes_moved,
@@ -111,6 +118,8 @@ impl Stages {
             joints: JointRows::default(),
             problem: StepProblem::default(),
             plan: StepPlan::default(),
+            events: Events::default(),
+            by_body: ByBody::default(),
             plan_key: None,
             points: 0,
             bytes_moved: 0,
@@ -130,6 +139,8 @@ impl Stages {
             joints,
             problem,
             plan: _,
+            events,
+            by_body: _,
             plan_key: _,
             points: _,
             bytes_moved: _,
@@ -141,7 +152,8 @@ impl Stages {
         effort.walk(archive)?;
         problem.walk(archive)?;
         contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
-        joints.walk(archive)
+        joints.walk(archive)?;
+        events.walk(archive)
     }
 
     /// The changes of the caller since the last step.
@@ -230,7 +242,9 @@ impl Stages {
     /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
     /// or a body lies where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
+        let Self { detector, sleep, effort, contacts, joints, problem, found, by_body, .. } = self;
+        // Rows may change their places; a step that fails makes no new lists.
+        by_body.forget();
         let times = &mut stats.times;
         // Decided before the detection, by what a device that has the rows was asked to leave for.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
@@ -268,10 +282,11 @@ impl Stages {
 
     /// Prepares and plans. `on_device`: the device goes on from its own rows.
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, .. } = self;
+        let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
+            contacts.sums = events.listen.sums();
             contacts.write(world, detector, config, effort, dt, problem);
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
@@ -299,10 +314,80 @@ impl Stages {
         stats.bytes_moved = self.bytes_moved;
     }
 
+    /// Notes what the step did that ran; `world` is as the step found it.
+    fn note_events(&mut self, world: &World, dt: f32) {
+        let Self { contacts, problem, events, by_body, key, .. } = self;
+        let side = |side| collider_of(world, side);
+        if events.listen.sums() {
+            let bodies_of = |row: usize| [problem.contacts[row].body_a, problem.contacts[row].body_b];
+            by_body.list(world.bodies.len(), contacts.taken().map(|row| (row, bodies_of(row))));
+        } else {
+            by_body.forget();
+        }
+        if events.listen.contacts {
+            events.note_contacts(contacts.touching(problem).map(|pair| pair.map(side)));
+        }
+        if let Some(least) = events.listen.hits_above {
+            let substep = dt / key.config.substeps as f32;
+            let mut met = std::mem::take(&mut events.met);
+            met.clear();
+            let wanted = |pair: &ColliderPair, speed: f32| speed > least || events.waits_for(pair.map(side));
+            met.extend(contacts.approaches(world, problem, substep, wanted).map(|approach| {
+                let [a, b] = approach.pair.map(side);
+                let Approach { point, normal, speed, impulse, rest, .. } = approach;
+                Met { hit: Hit { a, b, point, normal, speed, impulse }, left: Some(rest / speed) }
+            }));
+            events.note_hits(met);
+        }
+    }
+
+    /// Impulse of a joint on its body b in the last substep, world axes (N s).
+    pub fn joint_impulse(&self, joint: usize) -> glam::Vec3 {
+        self.problem.joint_impulses[joint].linear.into()
+    }
+
+    /// What a joint bore in the last substep (N).
+    fn force_on_joint(&self, world: &World, joint: usize, dt: f32) -> f32 {
+        let BallJoint { body_a, body_b, .. } = world.joints[joint];
+        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+        let body = body_b.filter(|&b| moves(b) && !moves(body_a)).unwrap_or(body_a);
+        let substep = dt / (self.key.config.substeps << self.effort.class_of(body)) as f32;
+        self.joint_impulse(joint).length() / substep
+    }
+
+    /// Takes the joints out that bore more than they can.
+    fn break_joints(&mut self, world: &mut World, dt: f32) {
+        let first = self.events.all.len();
+        for joint in 0..world.joints.len() {
+            let most = world.joints[joint].break_force;
+            let force = if most < f32::INFINITY { self.force_on_joint(world, joint, dt) } else { 0.0 };
+            if force > most {
+                self.events.all.push(Event::Broke { joint: world.joints.handles()[joint], force });
+            }
+        }
+        for event in &self.events.all[first..] {
+            if let Event::Broke { joint, .. } = event {
+                world.remove_joint(*joint);
+            }
+        }
+    }
+
     /// Brings poses and velocities to the world.
     pub fn store(&mut self, world: &mut World, dt: f32) {
+        self.note_events(world, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         self.detector.note_left(world);
+        if self.detector.has_sensors() || !self.events.inside().is_empty() {
+            let overlaps = self.detector.sense(world, self.sleep.activity());
+            self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
+        }
+        self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, dt);
     }
+}
+
+/// A collider, by the index of its body and its own among those of its body.
+pub(super) fn collider_of(world: &World, (body, collider): (u32, u32)) -> ColliderOf {
+    let body = world.bodies.handle(body as usize).expect("a collider has its body");
+    ColliderOf { body, collider: collider as usize }
 }

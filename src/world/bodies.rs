@@ -13,6 +13,8 @@ pub struct BodyHandle {
     generation: u32,
 }
 
+crate::saved::fields!(BodyHandle { index, generation });
+
 impl BodyHandle {
     /// The index of the body in [`World::bodies`](super::World::bodies).
     pub fn index(self) -> usize {

@@ -63,9 +63,11 @@ pub struct Collider {
     pub position: Vec3,
     /// Rotation in the body's frame.
     pub rotation: Quat,
+    /// Whether it is a sensor: it meets other colliders without touching them, and has no mass. See [`Body::sensor`].
+    pub sensor: bool,
 }
 
-crate::saved::fields!(Collider { shape, position, rotation });
+crate::saved::fields!(Collider { shape, position, rotation, sensor });
 
 /// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
 ///
@@ -224,9 +226,48 @@ impl Body {
 
     /// Adds a shape at a place in the body's frame.
     pub fn shape_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
-        self.colliders.push(Collider { shape, position, rotation });
+        self.colliders.push(Collider { shape, position, rotation, sensor: false });
         self.update_mass();
         self
+    }
+
+    /// Adds a sensor at the body's origin: a shape without mass that bodies pass through, and that tells which colliders overlap it
+    /// ([`Event::Entered`](crate::Event::Entered), [`Event::Left`](crate::Event::Left)).
+    ///
+    /// A sensor sees colliders of other bodies which the [`groups`](Body::groups) of its body meet, but no sensors. One of the two bodies has
+    /// to be dynamic or kinematic: a fixed sensor does not see the ground, and one on a body that moves does. Bodies that a joint keeps from
+    /// colliding do not see each other. A sensor wakes nobody, and sees bodies that sleep. Meshes and height fields have no inside: they
+    /// overlap what meets their surfaces.
+    ///
+    /// ```
+    /// use drystone::{Body, Event, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// let gate = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 0.1, 1.0)));
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.0, 1.0, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut told = Vec::new();
+    /// for _ in 0..60 {
+    ///     simulation.step(1.0 / 60.0)?;
+    ///     told.extend_from_slice(simulation.events());
+    /// }
+    /// let [Event::Entered { sensor, visitor }, Event::Left { .. }] = told[..] else { panic!("{told:?}") };
+    /// assert_eq!((sensor.body, visitor.body), (gate, ball));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn sensor(self, shape: Shape) -> Self {
+        self.sensor_at(shape, Vec3::ZERO, Quat::IDENTITY)
+    }
+
+    /// Adds a sensor at a place in the body's frame.
+    pub fn sensor_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
+        self.colliders.push(Collider { shape, position, rotation, sensor: true });
+        self
+    }
+
+    /// Its shapes that are no sensors.
+    pub(crate) fn solids(&self) -> impl Iterator<Item = &Collider> + Clone {
+        self.colliders.iter().filter(|c| !c.sensor)
     }
 
     /// Mass from density (kg/m³).
@@ -303,7 +344,7 @@ impl Body {
         if self.kind != BodyKind::Dynamic {
             return;
         }
-        let solids = self.colliders.iter().filter(|c| c.shape.has_volume()).map(|c| {
+        let solids = self.solids().filter(|c| c.shape.has_volume()).map(|c| {
             let own = c.shape.0.mass_properties(1.0);
             own.transform_by(&pose(c.position, c.rotation))
         });
@@ -338,8 +379,8 @@ impl Body {
     /// Whether another body has the same shapes, not only equal ones, at the same places.
     pub(super) fn has_same_colliders(&self, other: &Self) -> bool {
         let same = |(a, b): (&Collider, &Collider)| {
-            let Collider { shape, position, rotation } = a;
-            shape.is(&b.shape) && (position, rotation) == (&b.position, &b.rotation)
+            let Collider { shape, position, rotation, sensor } = a;
+            shape.is(&b.shape) && (position, rotation, sensor) == (&b.position, &b.rotation, &b.sensor)
         };
         self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
     }
@@ -349,14 +390,14 @@ impl Body {
         self.kind == BodyKind::Kinematic && (self.linear_velocity != Vec3::ZERO || self.angular_velocity != Vec3::ZERO)
     }
 
-    /// Radius around its origin that holds its shapes (m); 0 without shapes.
+    /// Radius around its origin that holds its shapes that are no sensors (m); 0 without.
     pub(crate) fn reach(&self) -> f32 {
-        self.colliders.iter().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max)
+        self.solids().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max)
     }
 
-    /// Half of the smallest side of the thinnest of its shapes (m); infinite without shapes.
+    /// Half of the smallest side of the thinnest of its shapes that are no sensors (m); infinite without.
     pub fn smallest_half_extent(&self) -> f32 {
-        self.colliders.iter().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)
+        self.solids().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)
     }
 
     /// Centre of mass in the world (m).
@@ -504,9 +545,9 @@ impl Body {
             c.shape.check()?;
             check_place("position", c.position)?;
             check_rotation("rotation", c.rotation)?;
-            let fits = self.kind != BodyKind::Kinematic || !c.shape.is_half_space();
-            ensure(fits, || "half-spaces are for fixed bodies".into())?;
-            let fits = self.kind != BodyKind::Dynamic || c.shape.has_volume();
+            let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
+            ensure(fits, || "half-spaces are for fixed bodies, and no sensors".into())?;
+            let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();
             ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
         };
         let mut shapes = self.colliders.iter().enumerate();

@@ -25,5 +25,5 @@ fn squared_levers(mass: &MassProperties, colliders: &[Collider]) -> Vec3 {
         let to_sphere = squared(sphere.center).map(f32::sqrt) + sphere.radius;
         in_box.min(to_sphere * to_sphere)
     };
-    colliders.iter().map(of_one).fold(Vec3::ZERO, Vec3::max)
+    colliders.iter().filter(|c| !c.sensor).map(of_one).fold(Vec3::ZERO, Vec3::max)
 }

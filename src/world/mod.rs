@@ -261,6 +261,8 @@ impl World {
             ensure(exist, || format!("joint {i}: names a body that is gone, or beyond the last of {bodies}"))?;
             let differ = joint.body_b != Some(joint.body_a);
             ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a))?;
+            let breaks = joint.break_force;
+            ensure(breaks > 0.0, || format!("joint {i}: break_force = {breaks}: must be above 0 N"))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
             ensure(are_places, || format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size"))?;
         }

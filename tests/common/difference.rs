@@ -6,9 +6,10 @@ use drystone::StepProblem;
 fn numbers(problem: &StepProblem) -> Vec<f32> {
     let c = &problem.convergence;
     let m = &problem.momentum;
-    let rows: [&[f32]; 3] = [
+    let rows: [&[f32]; 4] = [
         bytemuck::cast_slice(&problem.bodies),
         bytemuck::cast_slice(&problem.impulses),
+        bytemuck::cast_slice(&problem.totals),
         bytemuck::cast_slice(&problem.joint_impulses),
     ];
     let counts = [c.moving, c.done, c.sweeps, c.planned].map(|n| n as f32);

@@ -62,6 +62,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::IntegratePositions { from_start: false },
         Kernel::IntegratePositions { from_start: true },
         Kernel::ClearImpulses,
+        Kernel::SumImpulses { first: true },
+        Kernel::SumImpulses { first: false },
         Kernel::BeginSweep { first: true },
         Kernel::BeginSweep { first: false },
         Kernel::MeasureStep,
@@ -106,9 +108,11 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
         Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
         Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,
-        Kernel::ClearImpulses | Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-            contacts
-        }
+        Kernel::ClearImpulses
+        | Kernel::SumImpulses { .. }
+        | Kernel::WarmStart(_)
+        | Kernel::SolveContacts(_)
+        | Kernel::ApplyRestitution(_) => contacts,
         Kernel::IntegrateVelocities { .. }
         | Kernel::IntegrateTorques { .. }
         | Kernel::BeginChanges

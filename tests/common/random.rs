@@ -91,6 +91,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
             problem.impulses.push(impulse_row(random, row == point_count));
         }
     }
+    problem.totals = problem.impulses.iter().rev().copied().collect();
     let (joints, coloring) = colored(random, JOINTS);
     problem.colors.extend(coloring.offsets[1..].iter().map(|end| end + CONTACTS));
     problem.order.extend(coloring.order);
@@ -137,6 +138,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
     [&mut problem.params.slop, &mut problem.params.tolerance].into_iter().for_each(scale);
     problem
@@ -154,6 +156,7 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     }
     problem.points.iter_mut().flat_map(|row| [&mut row.normal_mass, &mut row.tangent_mass]).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
     problem
 }

@@ -34,6 +34,9 @@ pub fn content_hash(scene: &Scene) -> String {
         }
         for c in &b.colliders {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
+            if c.sensor {
+                let _ = write!(sink, " sensor");
+            }
         }
     }
     let _ = write!(sink, "{:?}", &*scene.world.joints);

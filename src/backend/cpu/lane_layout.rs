@@ -14,7 +14,7 @@ use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
 use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH, Wide};
 use crate::math::{Lane, Vec3, vec3};
-use crate::problem::StepProblem;
+use crate::problem::{ImpulseRow, StepProblem};
 
 /// The place of the impulse of a joint among the lanes.
 #[derive(Clone, Copy, Default)]
@@ -75,6 +75,35 @@ impl<C: Constraint> LaneLayout<C> {
         (instructions, threads): (InstructionSet, &Threads),
     ) {
         let (rows, to) = C::impulses_mut(problem);
+        self.store_to(rows, impulses, to, (instructions, threads));
+    }
+
+    /// Takes over sums of impulses, sixteen side by side as the impulses are.
+    pub fn load_sums(&self, problem: &StepProblem, from: &[ImpulseRow], sums: &mut Vec<[Wide; 4]>, threads: &Threads) {
+        sums.clear();
+        sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), [Wide::default(); 4]);
+        let (rows, from, sums): (_, &[[f32; 4]], _) = (C::rows(problem), bytemuck::cast_slice(from), Shared::new(sums));
+        threads.spread(0..self.groups.len(), &|range| {
+            for group in &self.groups[range] {
+                // SAFETY: `LaneLayout::make_groups` gives each group impulses of its own.
+                for (k, wide) in unsafe { sums.slice(group.impulses()) }.iter_mut().enumerate() {
+                    for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
+                        let sum = &from[rows[row as usize].first(row) as usize + k];
+                        wide.iter_mut().zip(sum).for_each(|(wide, number)| wide.0[lane] = *number);
+                    }
+                }
+            }
+        });
+    }
+
+    /// Gives impulses, or their sums, back to the rows of the constraints `rows`.
+    pub fn store_to(
+        &self,
+        rows: &[C],
+        impulses: &[[Wide; 4]],
+        to: &mut [[f32; 4]],
+        (instructions, threads): (InstructionSet, &Threads),
+    ) {
         let work = Store { rows, groups: &self.groups, impulses, to: Shared::new(to) };
         threads.spread(0..self.groups.len(), &|range| instructions.run(&work, range));
     }

@@ -61,6 +61,8 @@ pub struct Cpu {
     inertias: Vec<(usize, Inertia<f32>)>,
     contacts: LaneLayout<ContactRow>,
     contact_impulses: Vec<[Wide; 4]>,
+    /// Their sums over the substeps.
+    contact_totals: Vec<[Wide; 4]>,
     joints: LaneLayout<JointRow>,
     joint_impulses: Vec<[Wide; 4]>,
     /// Joints that are solved at once: their places, factors and corrections.
@@ -113,6 +115,10 @@ impl Cpu {
         }));
         let on = (self.instructions, threads);
         self.contacts.load(problem, &self.partition, &self.places, &mut self.contact_impulses, on);
+        self.contact_totals.clear();
+        if !problem.totals.is_empty() {
+            self.contacts.load_sums(problem, &problem.totals, &mut self.contact_totals, threads);
+        }
         self.joints.load(problem, &self.partition, &self.places, &mut self.joint_impulses, on);
         self.systems.load(problem, &self.partition, &self.joints);
         self.turning.clear();
@@ -135,6 +141,10 @@ impl Cpu {
         in_groups(slots.len() - 1, threads, &|range| store_bodies(&self.bodies, slots, range, &rows));
         let on = (self.instructions, threads);
         self.contacts.store(problem, &self.contact_impulses, on);
+        if !problem.totals.is_empty() {
+            let totals = bytemuck::cast_slice_mut(&mut problem.totals);
+            self.contacts.store_to(&problem.contacts, &self.contact_totals, totals, on);
+        }
         self.joints.store(problem, &self.joint_impulses, on);
         problem.convergence = self.convergence;
         problem.momentum = self.momentum.store();
@@ -172,6 +182,7 @@ impl Cpu {
             inertias: &self.inertias,
             contacts: &self.contacts,
             contact_impulses: Shared::new(&mut self.contact_impulses),
+            contact_totals: Shared::new(&mut self.contact_totals),
             joints: &self.joints,
             joint_impulses: Shared::new(&mut self.joint_impulses),
             problem,

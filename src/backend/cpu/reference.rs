@@ -3,7 +3,7 @@
 use super::super::{Backend, CheckedStep};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
-use crate::kernels::contact::clear_impulse;
+use crate::kernels::contact::{clear_impulse, sum_impulse};
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
@@ -110,6 +110,15 @@ impl<S: Scalar> Reference<S> {
                     let first = row.first_point as usize;
                     let own = &mut self.rows.impulses[first..first + row.point_count as usize + patch];
                     own.iter_mut().for_each(clear_impulse);
+                }
+            }
+            Kernel::SumImpulses { first } => {
+                let patch = usize::from(problem.has_patches());
+                for i in places(problem, pass) {
+                    let row = &problem.contacts[i];
+                    let own = row.first_point as usize..(row.first_point + row.point_count) as usize + patch;
+                    let totals = self.rows.totals[own.clone()].iter_mut();
+                    self.rows.impulses[own].iter().zip(totals).for_each(|(now, total)| sum_impulse(first, now, total));
                 }
             }
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),

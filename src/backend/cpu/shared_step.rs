@@ -8,7 +8,7 @@ use super::constraint::Constraint;
 use super::joint_systems::{SharedFactors, SystemLayout, SystemWork};
 use super::lane_layout::LaneLayout;
 use super::partition::Partition;
-use super::sweep::{Sweep, clear_impulses};
+use super::sweep::{Sums, Sweep, clear_impulses};
 use crate::kernels::Inertia;
 use crate::lanes::{InstructionSet, Row8, Shared, WIDTH, Wide};
 use crate::plan::{Kernel, Pass};
@@ -26,6 +26,7 @@ pub(super) struct SharedStep<'a> {
     pub inertias: &'a [(usize, Inertia<f32>)],
     pub contacts: &'a LaneLayout<ContactRow>,
     pub contact_impulses: Shared<'a, [Wide; 4]>,
+    pub contact_totals: Shared<'a, [Wide; 4]>,
     pub joints: &'a LaneLayout<JointRow>,
     pub joint_impulses: Shared<'a, [Wide; 4]>,
     pub problem: &'a StepProblem,
@@ -64,6 +65,14 @@ impl SharedStep<'_> {
                 for color in pass.colors.clone() {
                     let groups = self.contacts.ranges.of(part, color);
                     clear_impulses(&self.contact_impulses, self.contacts.impulses_of(groups));
+                }
+            }
+            Kernel::SumImpulses { first } => {
+                let (impulses, totals) = (self.contact_impulses, self.contact_totals);
+                let work = Sums { is_first: first, impulses, totals };
+                for color in pass.colors.clone() {
+                    let groups = self.contacts.ranges.of(part, color);
+                    spread(self.contacts.impulses_of(groups), &|range| self.instructions.run(&work, range));
                 }
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {

@@ -9,6 +9,7 @@ use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_layout::LaneLayout;
+use crate::kernels::contact::sum_impulse;
 use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
@@ -85,6 +86,25 @@ pub(super) fn clear_impulses(impulses: &Shared<[Wide; 4]>, range: Range<usize>) 
     // SAFETY: tasks have different parts, and `LaneLayout::impulses_of` gives each part impulses of its own.
     for impulse in unsafe { impulses.slice(range) } {
         impulse[..3].fill(Wide::default());
+    }
+}
+
+/// Adds some impulses to their sums.
+pub(super) struct Sums<'a> {
+    pub is_first: bool,
+    pub impulses: Shared<'a, [Wide; 4]>,
+    pub totals: Shared<'a, [Wide; 4]>,
+}
+
+impl Work for Sums<'_> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, range: Range<usize>) {
+        // SAFETY: tasks have different ranges, and no pass runs beside this one. `Impulse` is `repr(C)` and holds lanes only.
+        let (impulses, totals): (&[Impulse<L>], &mut [Impulse<L>]) =
+            unsafe { (as_lanes(self.impulses.slice(range.clone())), as_lanes_mut(self.totals.slice(range))) };
+        for (impulse, total) in impulses.iter().zip(totals) {
+            sum_impulse(self.is_first, impulse, total);
+        }
     }
 }
 

@@ -57,6 +57,8 @@ bindings! {
     Points "points": "array<Point>", ReadByPlans;
     /// Impulses of the points; read back when the simulation asks.
     Impulses "impulses": "array<Impulse>", Write;
+    /// Their sums over the substeps; read back where the problem has room for them.
+    Totals "totals": "array<Impulse>", Write;
     /// Where colors begin, and the rows in them.
     Colors "colors": "array<u32>", Read;
     /// Joints.

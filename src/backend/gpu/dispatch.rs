@@ -46,7 +46,8 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
     };
     let dispatch = |pass: &Pass| {
         // The order of the rows of some kernels does not matter.
-        let is_ordered = !matches!(pass.kernel, Kernel::ClearImpulses | Kernel::MeasureJoints(_));
+        let is_ordered =
+            !matches!(pass.kernel, Kernel::ClearImpulses | Kernel::SumImpulses { .. } | Kernel::MeasureJoints(_));
         let (program, rows) = if pass.colors.len() > 1 && is_ordered {
             // One workgroup.
             (Program::Fused(pass.kernel), 1)

@@ -241,11 +241,12 @@ impl Backend for Gpu {
         self.rows = None;
         self.send_all(problem, passes)?;
         let encoder = self.encoded(problem, Vec::new(), passes, false)?;
-        let mut impulses = std::mem::take(&mut problem.impulses);
+        let [mut impulses, mut totals] = [&mut problem.impulses, &mut problem.totals].map(std::mem::take);
         let mut wanted = rows::moved(problem);
         wanted.push((Binding::Impulses, bytemuck::cast_slice_mut(&mut impulses)));
+        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
         let finished = self.finish(encoder, &mut wanted);
-        problem.impulses = impulses;
+        (problem.impulses, problem.totals) = (impulses, totals);
         finished
     }
 
@@ -265,14 +266,15 @@ impl Backend for Gpu {
             }
         };
         let encoder = self.encoded(problem, first, passes, true)?;
-        let mut sags = std::mem::take(&mut problem.sags);
+        let (mut sags, mut totals) = (std::mem::take(&mut problem.sags), std::mem::take(&mut problem.totals));
         let mut wanted = rows::moved(problem);
+        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
         // Else the host computed them.
         if goes_on && !sags.is_empty() {
             wanted.push((Binding::Sags, bytemuck::cast_slice_mut(&mut sags)));
         }
         let finished = self.finish(encoder, &mut wanted);
-        problem.sags = sags;
+        (problem.sags, problem.totals) = (sags, totals);
         finished?;
         self.count_bytes(problem, passes);
         for (binding, bytes) in rows::moved(problem) {

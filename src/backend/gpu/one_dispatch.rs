@@ -62,6 +62,7 @@ fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let contacts = if problem.contacts.is_empty() { 0 } else { 3 };
     let joints = if problem.joints.is_empty() { 0 } else { 2 };
     let colors = usize::from(contacts + joints > 0);
+    let totals = usize::from(!problem.totals.is_empty());
     let of_bodies = [!problem.torques.is_empty(), !problem.inertias.is_empty()].map(usize::from);
-    3 + contacts + joints + colors + of_bodies[0] + of_bodies[1] + usize::from(measured) > 8
+    3 + contacts + totals + joints + colors + of_bodies[0] + of_bodies[1] + usize::from(measured) > 8
 }

@@ -19,7 +19,7 @@ const _: () = assert!(NO_POINT as usize == MAX_POINTS);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResidentRows {
     /// Bytes of the rows of contacts, in the order of `rows::of_contacts`.
-    sizes: [usize; 3],
+    sizes: [usize; 4],
     /// Whether the problem on the host has the same impulses and preloads.
     pub fetched: bool,
 }

@@ -53,11 +53,12 @@ pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'
 }
 
 /// Rows of the contacts: most of a problem.
-pub(super) fn of_contacts(problem: &StepProblem) -> [(Binding, &[u8]); 3] {
+pub(super) fn of_contacts(problem: &StepProblem) -> [(Binding, &[u8]); 4] {
     [
         (Binding::Contacts, bytemuck::cast_slice(&problem.contacts)),
         (Binding::Points, bytemuck::cast_slice(&problem.points)),
         (Binding::Impulses, bytemuck::cast_slice(&problem.impulses)),
+        (Binding::Totals, bytemuck::cast_slice(&problem.totals)),
     ]
 }
 

@@ -107,6 +107,7 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (&[part!("integrate_positions")], Over::Colors, format!("integrate_position({from_start}, row)"))
         }
         Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
+        Kernel::SumImpulses { first } => (&[part!("sum_impulses")], Over::Colors, format!("sum_contact({first}, row)")),
         Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
         Kernel::Extrapolate { first, measured } => {
             (&[part!("extrapolate")], Over::Own, format!("extrapolate({first}, {measured}, first, stride)"))

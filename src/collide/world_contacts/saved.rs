@@ -158,6 +158,8 @@ impl WorldContacts {
             before,
             tree: _,
             planes,
+            sensors,
+            strayed: _,
             pairs: _,
             keys: _,
             found: _,
@@ -176,6 +178,7 @@ impl WorldContacts {
         leaving.walk(archive)?;
         vacant.walk(archive)?;
         planes.walk(archive)?;
+        sensors.walk(archive)?;
         ended.walk(archive)?;
         changed.walk(archive)?;
         look_again.walk(archive)?;
@@ -185,7 +188,8 @@ impl WorldContacts {
             vacant.iter().flat_map(|(&count, all)| all.iter().map(move |&first| ColliderRange { first, count }));
         let all = vacancies.chain(leaving.iter().copied()).all(|range| exists(&range));
         let planes = planes.iter().all(|plane| (plane.collider as usize) < count);
-        ensure(all && planes, || format!("a place beyond the last of {count} colliders"))
+        let sensors = sensors.iter().all(|&sensor| (sensor as usize) < count);
+        ensure(all && planes && sensors, || format!("a place beyond the last of {count} colliders"))
     }
 
     /// The colliders, their boxes and their pairs.
@@ -207,7 +211,7 @@ impl WorldContacts {
             ensure(own.is_none_or(|own| own.1.len() == places.len()), || format!("body {index} has other colliders"))?;
             for (k, place) in places.enumerate() {
                 if A::READS {
-                    let info = own.map(|(_, own)| ColliderInfo::new(*index, &own[k]));
+                    let info = own.map(|(_, own)| ColliderInfo::new(*index, k as u32, &own[k]));
                     self.colliders[place] =
                         info.unwrap_or_else(|| ColliderInfo { body: *index, ..ColliderInfo::gone() });
                     self.cuboids[place] = CuboidPlace::of(&self.colliders[place]);
@@ -385,10 +389,10 @@ impl WorldContacts {
         let mut scratch = PairScratch::default();
         let mut again = self.pairs[first as usize].clone();
         let begin = |pair: &Pair, again: &mut Pair| {
-            let Pair { body_a, body_b, manifolds: _, collider_a, collider_b, size, takes_part } = *pair;
+            let Pair { body_a, body_b, manifolds: _, colliders, collider_a, collider_b, size, takes_part } = *pair;
             let mut manifolds = std::mem::take(&mut again.manifolds);
             manifolds.clear();
-            *again = Pair { body_a, body_b, manifolds, collider_a, collider_b, size, takes_part };
+            *again = Pair { body_a, body_b, manifolds, colliders, collider_a, collider_b, size, takes_part };
         };
         let mut states = Vec::with_capacity(2 * chunk.len());
         let mut cuboids = Vec::with_capacity(chunk.len());

@@ -85,6 +85,7 @@ impl ContactRows {
             classes,
             materials,
             new_bodies: _,
+            sums: _,
             carry: _,
         } = self;
         patches.walk(archive)?;
@@ -339,16 +340,20 @@ fn walk_impulses<A: Archive>(impulses: &mut [ImpulseRow], archive: &mut A) -> Re
 
 /// Slots and edges, which are those of the manifolds of the detector; whether each has one.
 fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, archive: &mut A) -> Result<Vec<bool>> {
-    let Slots { all, edges, free, taken } = slots;
+    let Slots { all, edges, colliders, free, taken } = slots;
     let count = archive.count(all.len())?;
     let kinds = detector.kinds();
     let none = (FREE, Edge { a: IMMOVABLE, b: IMMOVABLE, color: None, rank: 0 });
     let (mut settled, mut is_taken) = (vec![none; count], vec![false; count]);
+    if A::READS {
+        colliders.resize(count, [0; 2]);
+    }
     for (place, pair) in detector.placed_pairs() {
         for (k, manifold) in (0..).zip(&pair.manifolds).filter(|(_, manifold)| manifold.slot != NO_SLOT) {
             let i = manifold.slot as usize;
             ensure(is_taken.get(i) == Some(&false), || format!("two contacts in slot {i} of {count}"))?;
             (settled[i], is_taken[i]) = (Slots::settled(kinds, place, pair, k), true);
+            colliders[i] = pair.colliders;
         }
     }
     // What waits for the next step, and what the last one left otherwise.

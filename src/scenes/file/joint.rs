@@ -58,5 +58,5 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
         (None, Some([on_a, on_b])) => (lengths("anchors[0]", *on_a)?.into(), lengths("anchors[1]", *on_b)?.into()),
         _ => return Err(Error::input("anchor and anchors: give one of them")),
     };
-    Ok(BallJoint { body_a: a, body_b: b, anchor_a, anchor_b, collide: *collide })
+    Ok(BallJoint { body_b: b, collide: *collide, ..BallJoint::to_world(a, anchor_a, anchor_b) })
 }

@@ -1,0 +1,125 @@
+//! The contacts of the last step for callers to read while the simulation is borrowed: what the host knows without asking a device.
+
+use glam::Vec3;
+
+use super::events::ColliderOf;
+use super::stages::{Stages, collider_of};
+use crate::collide::MAX_POINTS;
+use crate::world::World;
+
+/// The contact of two colliders over one pair of convex parts, with the impulses of the whole step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// The collider that the normal points away from.
+    pub a: ColliderOf,
+    /// The collider that the normal points to.
+    pub b: ColliderOf,
+    /// Unit normal from a to b, world axes.
+    pub normal: Vec3,
+    /// Impulse on b of the whole step, normal and friction of all points (N s); zero unless the simulation
+    /// [listens](crate::Simulation::listen).
+    pub impulse: Vec3,
+    points: [ContactPoint; MAX_POINTS],
+    count: usize,
+}
+
+/// One point of a [`Contact`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactPoint {
+    /// Midway between the surfaces, where the bodies are now (m).
+    pub position: Vec3,
+    /// Distance along the normal when the step began, negative when overlapping (m).
+    pub separation: f32,
+    /// Normal impulse on b of the whole step (N s); zero unless the simulation listens.
+    pub impulse: f32,
+}
+
+impl Contact {
+    /// Its points, 1 to 4.
+    pub fn points(&self) -> &[ContactPoint] {
+        &self.points[..self.count]
+    }
+
+    /// Whether the bodies touch, by the rule of [`Simulation::events`](crate::Simulation::events), where the simulation listens.
+    pub fn touches(&self) -> bool {
+        self.points().iter().any(|point| point.impulse > 0.0 || point.separation <= 0.0)
+    }
+}
+
+/// The rows of the contacts of each body.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ByBody {
+    /// Where the rows of each body begin, and where those of the last end.
+    begins: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl ByBody {
+    /// Lists the contacts of `bodies` bodies: the rows, each with two bodies.
+    pub fn list(&mut self, bodies: usize, contacts: impl Iterator<Item = (usize, [u32; 2])> + Clone) {
+        self.begins.clear();
+        self.begins.resize(bodies + 2, 0);
+        for (_, pair) in contacts.clone() {
+            pair.iter().for_each(|&body| self.begins[body as usize + 2] += 1);
+        }
+        for i in 2..self.begins.len() {
+            self.begins[i] += self.begins[i - 1];
+        }
+        self.rows.clear();
+        self.rows.resize(self.begins.last().map_or(0, |&end| end as usize), 0);
+        // The entry after that of a body is where its next row goes, and in the end where its rows end.
+        for (row, pair) in contacts {
+            for body in pair {
+                let next = &mut self.begins[body as usize + 1];
+                self.rows[*next as usize] = row as u32;
+                *next += 1;
+            }
+        }
+    }
+
+    /// Forgets all.
+    pub fn forget(&mut self) {
+        self.begins.clear();
+        self.rows.clear();
+    }
+
+    /// The rows of the contacts of a body; none if no lists were made.
+    pub fn of(&self, body: usize) -> Option<&[u32]> {
+        if self.begins.is_empty() {
+            return None;
+        }
+        let ends = self.begins.get(body).zip(self.begins.get(body + 1));
+        Some(ends.map_or(&[], |(&begin, &end)| &self.rows[begin as usize..end as usize]))
+    }
+}
+
+/// The contact in a row; none where one of its bodies went since the step.
+pub(super) fn contact(stages: &Stages, world: &World, row: usize) -> Option<Contact> {
+    let Stages { detector, contacts, problem, .. } = stages;
+    let (from, [on_a, on_b]) = (problem.contacts.get(row)?, contacts.colliders_of(row));
+    let sides = [(from.body_a, on_a), (from.body_b, on_b)];
+    if !sides.iter().all(|side| detector.knows(world, side.0 as usize)) {
+        return None;
+    }
+    let manifold = contacts.manifold(row, detector);
+    let bodies = sides.map(|side| &world.bodies[side.0 as usize]);
+    let (first, count) = (from.first_point as usize, from.point_count as usize);
+    let mut points = [ContactPoint::default(); MAX_POINTS];
+    for (k, (point, found)) in points.iter_mut().zip(manifold.points()).enumerate() {
+        let [on_a, on_b] = [(bodies[0], found.anchor_a), (bodies[1], found.anchor_b)]
+            .map(|(body, anchor)| body.position + body.rotation * anchor);
+        let impulse = problem.totals.get(first + k).map_or(0.0, |total| total.normal);
+        *point =
+            ContactPoint { position: on_a.midpoint(on_b), separation: problem.points[first + k].separation, impulse };
+    }
+    let [a, b] = sides.map(|side| collider_of(world, side));
+    let (tangent_1, tangent_2) = from.tangents();
+    let friction = |i: usize| tangent_1 * problem.totals[i].tangent_1 + tangent_2 * problem.totals[i].tangent_2;
+    let mut impulse = Vec3::ZERO;
+    if !problem.totals.is_empty() {
+        let at_points = (first..first + count).map(|i| manifold.normal * problem.totals[i].normal + friction(i));
+        let at_patch = if problem.has_patches() { friction(first + count) } else { Vec3::ZERO };
+        impulse = at_points.fold(at_patch, |sum, impulse| sum + impulse);
+    }
+    Some(Contact { a, b, normal: manifold.normal, impulse, points, count })
+}
