@@ -12,7 +12,7 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::{BallJoint, BodyKind, Result, World};
+use drystone::{BallJoint, Result, World};
 
 /// Longest time of the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
@@ -76,6 +76,10 @@ impl Show for Live {
         Ok(())
     }
 
+    fn point(&mut self, pointer: &Pointer) {
+        self.pointer = Some(*pointer);
+    }
+
     fn key(&mut self, key: &Key, down: bool) -> Result<()> {
         if !down {
             return Ok(());
@@ -87,6 +91,8 @@ impl Show for Live {
                 self.step()?;
             }
             Key::Character("r") => self.restart()?,
+            Key::Character("b") => self.throw(),
+            Key::Character("x") | Key::Named(NamedKey::Delete) => self.delete(),
             Key::Character("c") => self.color = self.color.next(),
             Key::Character("1") => self.overlay.contacts = !self.overlay.contacts,
             Key::Character("2") => self.overlay.joints = !self.overlay.joints,
@@ -100,11 +106,8 @@ impl Show for Live {
 
     fn grab(&mut self, pointer: &Pointer) -> bool {
         let Pointer { origin, direction, .. } = *pointer;
+        let Some((distance, body)) = self.body_at(*pointer) else { return false };
         let world = &mut self.simulation.world;
-        let met = |(i, b): (usize, &drystone::world::Body)| Some((b.meets_ray(origin, direction)?, i));
-        // The mouse pulls dynamic bodies only, through other bodies if need be.
-        let dynamic = world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic);
-        let Some((distance, body)) = dynamic.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
         let target = origin + distance * direction;
         let pulled = &world.bodies[body];
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
