@@ -594,3 +594,23 @@ fn shapes_of_all_sizes_give_numbers() {
         assert!(met > 400, "size {size}: {met}");
     }
 }
+
+/// A sensor hangs in the way of a ray; only who asks for sensors meets it, in a world that is simulated and in one that is not.
+#[test]
+fn a_query_looks_at_sensors_if_it_is_told() {
+    let (mut world, ball, _) = ball_over_floor();
+    let gate = Body::kinematic().sensor(Shape::cuboid(0.5, 0.1, 0.5)).position(0.0, 20.0, 0.0);
+    let gate = world.insert(gate);
+    let mut simulation = simulation(world.clone());
+    simulation.step(DT).expect("a step");
+    for queries in [Queries::of(&world), simulation.queries()] {
+        let first = |filter: Filter| {
+            let hit = queries.ray(30.0 * Vec3::Y, Vec3::NEG_Y, 100.0, &filter).expect("something");
+            (hit.body, (hit.distance - 9.9).abs() < 1e-4)
+        };
+        assert_eq!(first(Filter::default()), (ball, false));
+        assert_eq!(first(Filter::default().with_sensors()), (gate, true));
+        assert!(queries.point(20.0 * Vec3::Y, &Filter::default()).is_empty());
+        assert_eq!(queries.point(20.0 * Vec3::Y, &Filter::default().with_sensors()), [(gate, 0)]);
+    }
+}

@@ -402,13 +402,16 @@ fn the_schema_describes_every_key() {
     assert_eq!(schema["type"], "object");
     assert_eq!(schema["required"], json!(["version", "bodies"]));
     assert_eq!(schema["additionalProperties"], false);
-    assert_eq!(keys(&schema), "bodies container dt gravity joints name steps version");
+    assert_eq!(keys(&schema), "bodies container dt gravity joints name spawners steps version");
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "angular_velocity density force friction kind linear_velocity mass mass_properties name position restitution rotation \
-         shapes"
+        "angular_velocity density force friction gravity_scale groups kind leaves linear_velocity mass mass_properties name \
+         position restitution rotation shapes torque"
     );
+    assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
+    assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");
+    assert_eq!(keys(&schema["$defs"]["Groups"]), "filter membership");
     assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
     let ball = &schema["$defs"]["JointFile"]["oneOf"][0];

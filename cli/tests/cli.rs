@@ -96,6 +96,30 @@ fn a_run_reports_on_itself_as_rows() {
 }
 
 #[test]
+fn a_run_writes_its_end_as_a_scene_file_that_can_be_run_again() {
+    let folder = Folder::new();
+    let ran = folder.json("run conveyor --steps 700 --out-scene later.json --json");
+    assert_eq!(folder.files(), ["later.json"]);
+    let written = std::fs::read_to_string(folder.path().join("later.json")).expect("the file");
+    let file: Value = serde_json::from_str(&written).expect("JSON");
+    let boxes = array(&file, "bodies").iter().filter(|body| body["name"] == "box").count();
+    // 6 boxes came, the sixth after 600 steps, and the first left after 490.
+    assert!((3..=5).contains(&boxes), "{boxes} boxes");
+    assert_eq!((&file["spawners"][0]["first"], &file["spawners"][0]["every"]), (&20.into(), &120.into()));
+    // What is written is what is there: without steps, it is written again.
+    folder.output("run later.json --steps 0 --out-scene again.json");
+    let again = std::fs::read_to_string(folder.path().join("again.json")).expect("the file");
+    let steps = |steps: u32| format!("\"steps\":{steps},");
+    assert_eq!(written.replace(&steps(700), ""), again.replace(&steps(0), ""));
+    let later = folder.json("run later.json --steps 100 --json");
+    assert!(later["penetration_max"].as_f64() < Some(5e-3) && ran["non_finite"] == 0);
+    let refused = folder.run(&["run", "tower", "--worlds", "2", "--steps", "1", "--out-scene", "two.json"]);
+    let line = text(&refused.stderr);
+    assert!(!refused.status.success() && line.contains("--out-scene: a scene file holds one world"), "{line}");
+    assert_eq!(folder.files(), ["again.json", "later.json"]);
+}
+
+#[test]
 fn every_kth_step_of_every_body_that_is_not_fixed_is_written_as_csv() {
     let folder = Folder::new();
     folder.output("run tower -p n=3 --steps 10 --every 4 --out motion.csv --dt 0.01");

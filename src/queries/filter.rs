@@ -28,6 +28,8 @@ pub struct Filter<'a> {
     pub except: Option<BodyHandle>,
     /// Leaves out the bodies for which it is false.
     pub only: Option<Predicate<'a>>,
+    /// Whether the query looks at sensors too; not unless told.
+    pub sensors: bool,
 }
 
 impl<'a> Filter<'a> {
@@ -44,6 +46,11 @@ impl<'a> Filter<'a> {
     /// Leaves out a body, for instance the one that asks.
     pub fn except(self, body: BodyHandle) -> Self {
         Self { except: Some(body), ..self }
+    }
+
+    /// Looks at sensors too.
+    pub fn with_sensors(self) -> Self {
+        Self { sensors: true, ..self }
     }
 
     /// Leaves out the bodies for which `only` is false.

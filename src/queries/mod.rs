@@ -269,7 +269,7 @@ impl<'a> Queries<'a> {
         if !filter.accepts(body, &self.world.bodies[body.index()]) {
             return None;
         }
-        let (collider, pose) = place.find(self.world)?;
+        let (collider, pose) = place.find(self.world).filter(|(collider, _)| filter.sensors || !collider.sensor)?;
         Some((body, collider, pose))
     }
 }

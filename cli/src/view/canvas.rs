@@ -47,6 +47,11 @@ impl Canvas {
         self.size.0 as f32 / self.size.1 as f32
     }
 
+    /// Takes over bodies that came or went since the last picture.
+    pub fn follow(&mut self, world: &World) {
+        self.renderer.follow(world);
+    }
+
     pub fn draw(&mut self, shot: &Shot) -> Result<Picture> {
         let view = self.texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.renderer.draw(&view, self.size, shot);

@@ -18,6 +18,8 @@ pub struct Frame {
     pub time: f64,
     pub poses: Vec<(Vec3, Quat)>,
     pub values: Vec<f32>,
+    /// The world at that time, in a scene whose bodies come and go.
+    world: Option<World>,
 }
 
 /// Angle of the camera around the scene, and elevation above the horizon (rad).
@@ -44,12 +46,19 @@ impl Film {
 
     pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
         let values = self.color.values(simulation);
-        self.frames.push(Frame { time, poses: poses(&simulation.world), values });
+        let comes_and_goes = !(self.scene.spawners.is_empty() && self.scene.leaving.is_empty());
+        let world = comes_and_goes.then(|| simulation.world.clone());
+        self.frames.push(Frame { time, poses: poses(&simulation.world), values, world });
     }
 
     /// Adds a world without contacts and sleep.
     fn add_world(&mut self, time: f64, world: &World) {
-        self.frames.push(Frame { time, poses: poses(world), values: self.color.values_of(world, &[], &[]) });
+        self.frames.push(Frame {
+            time,
+            poses: poses(world),
+            values: self.color.values_of(world, &[], &[]),
+            world: None,
+        });
     }
 
     pub fn frames(&self) -> &[Frame] {
@@ -105,7 +114,8 @@ impl Film {
     }
 
     pub fn bounds(&self) -> Bounds {
-        self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(bounds_at(&self.scene.world, &frame.poses)))
+        let of = |frame: &Frame| bounds_at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
+        self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(of(frame)))
     }
 
     /// Draws the frames in order from one camera, on a canvas for the film's world.
@@ -114,9 +124,15 @@ impl Film {
         let bounds = self.bounds();
         let up = -world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
         let camera = Camera::framing(&bounds, up, look.yaw, look.pitch, canvas.aspect());
-        let scale = self.frames.iter().map(|f| self.color.scale(world, &f.values)).fold(0.0, f32::max);
+        let scale = self
+            .frames
+            .iter()
+            .map(|f| self.color.scale(f.world.as_ref().unwrap_or(world), &f.values))
+            .fold(0.0, f32::max);
         let container = self.scene.container.map(|(low, high)| Bounds { low, high });
         for frame in &self.frames {
+            let world = frame.world.as_ref().unwrap_or(world);
+            canvas.follow(world);
             let colors = self.color.paint(world, &frame.values, scale);
             let ropes = ropes(world, &frame.poses);
             let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };

@@ -8,12 +8,16 @@ use super::camera::Bounds;
 use super::colors::ColorBy;
 use super::film::bounds;
 use super::overlay::Overlay;
+use super::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
+use drystone::queries::Filter;
 use drystone::scenes::Spawners;
-use drystone::{JointHandle, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Body, BodyKind, JointHandle, Result, Scene, Shape, Simulation, SolverConfig, StepStats};
 
 /// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
+/// Speed of a thrown cube over the radius of the scene (1/s).
+const THROW: f32 = 2.0;
 
 pub struct Live {
     pub(super) scene: Scene,
@@ -39,6 +43,8 @@ pub struct Live {
     /// Time of the steps before the last picture.
     pub(super) stepping: Duration,
     pub(super) grabbed: Option<Grabbed>,
+    /// Where the mouse points.
+    pub(super) pointer: Option<Pointer>,
     pub(super) bounds: Bounds,
     pub(super) light_end: f32,
 }
@@ -77,6 +83,7 @@ impl Live {
             owed: 0.0,
             stepping: Duration::ZERO,
             grabbed: None,
+            pointer: None,
             light_end: 0.0,
             scene,
         })
@@ -94,6 +101,34 @@ impl Live {
         self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
         Ok(())
+    }
+
+    /// Throws a cube from the eye to where the mouse points.
+    pub(super) fn throw(&mut self) {
+        let Some(Pointer { origin, direction, .. }) = self.pointer else { return };
+        let size = 0.02 * self.bounds.radius();
+        let cube = Body::dynamic().named("thrown").shape(Shape::cuboid(size, size, size));
+        let [x, y, z] = (origin + 4.0 * size * direction).to_array();
+        self.simulation
+            .world
+            .insert(cube.position(x, y, z).velocity(THROW * self.bounds.radius() * direction, Vec3::ZERO));
+    }
+
+    /// The dynamic body under the mouse, through other bodies if need be, and how far from the eye (m).
+    pub(super) fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
+        let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
+        let filter = Filter::default().only(&is_dynamic);
+        let hit = self.simulation.queries().ray(origin, direction, f32::INFINITY, &filter)?;
+        Some((hit.distance, hit.body.index()))
+    }
+
+    /// Takes out the dynamic body under the mouse.
+    pub(super) fn delete(&mut self) {
+        let under = self.pointer.and_then(|pointer| self.body_at(pointer));
+        let world = &mut self.simulation.world;
+        if let Some(body) = under.and_then(|(_, i)| world.bodies.handle(i)) {
+            world.remove(body);
+        }
     }
 
     pub(super) fn set_config(&mut self, config: SolverConfig) {
@@ -114,6 +149,8 @@ impl Live {
         let dt = self.scene.dt;
         self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
+        // A body that went took its joint along.
+        self.grabbed = self.grabbed.take().filter(|grabbed| world.joint(grabbed.joint).is_some());
         if let Some(grabbed) = &self.grabbed {
             let body = &world.bodies[grabbed.body];
             let at = body.position + body.rotation * grabbed.anchor;

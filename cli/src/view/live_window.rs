@@ -12,8 +12,7 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::queries::Filter;
-use drystone::{BallJoint, Body, BodyKind, Result, World};
+use drystone::{BallJoint, Result, World};
 
 /// Longest time of the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
@@ -77,6 +76,10 @@ impl Show for Live {
         Ok(())
     }
 
+    fn point(&mut self, pointer: &Pointer) {
+        self.pointer = Some(*pointer);
+    }
+
     fn key(&mut self, key: &Key, down: bool) -> Result<()> {
         if !down {
             return Ok(());
@@ -88,6 +91,8 @@ impl Show for Live {
                 self.step()?;
             }
             Key::Character("r") => self.restart()?,
+            Key::Character("b") => self.throw(),
+            Key::Character("x") | Key::Named(NamedKey::Delete) => self.delete(),
             Key::Character("c") => self.color = self.color.next(),
             Key::Character("1") => self.overlay.contacts = !self.overlay.contacts,
             Key::Character("2") => self.overlay.joints = !self.overlay.joints,
@@ -101,12 +106,9 @@ impl Show for Live {
 
     fn grab(&mut self, pointer: &Pointer) -> bool {
         let Pointer { origin, direction, .. } = *pointer;
-        // The mouse pulls dynamic bodies only, through other bodies if need be.
-        let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
-        let filter = Filter::default().only(&is_dynamic);
-        let Some(hit) = self.simulation.queries().ray(origin, direction, f32::INFINITY, &filter) else { return false };
-        let (body, distance, target) = (hit.body.index(), hit.distance, hit.point);
+        let Some((distance, body)) = self.body_at(*pointer) else { return false };
         let world = &mut self.simulation.world;
+        let target = origin + distance * direction;
         let pulled = &world.bodies[body];
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
         let joint = world.insert_joint(BallJoint::to_world(body, anchor, target));

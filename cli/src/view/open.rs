@@ -123,7 +123,8 @@ impl Open {
         self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
     }
 
-    pub(super) fn key(&mut self, key: &Key, down: bool, show: &dyn Show) {
+    pub(super) fn key(&mut self, key: &Key, down: bool, show: &mut dyn Show) {
+        show.point(&self.pointer());
         match key.as_ref() {
             Key::Character("f") if down => self.frame_scene(show),
             Key::Character("h") if down => self.panel = !self.panel,
@@ -192,6 +193,7 @@ impl Open {
             lines: &lines,
         };
         let size = (self.surface_config.width, self.surface_config.height);
+        self.renderer.follow(show.world());
         self.renderer.draw(&view, size, &shot);
         self.draw_panel(&view, show);
         self.window.pre_present_notify();

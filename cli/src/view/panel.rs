@@ -16,6 +16,7 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
     ui.collapsing("keys and mouse", |ui| {
         for line in [
             "space pause, n one step, r restart, + - speed",
+            "b throw a cube, x delete the body under the mouse",
             "c color, 1 contacts, 2 joints, 3 boxes",
             "f whole scene, h panel, esc close",
             "left: pull a body, or turn the view",

@@ -11,7 +11,7 @@ use super::colors::Rgba;
 use super::mesh::{Instance, Meshes, Poses, Vertex};
 use super::overlay::LineEnd;
 use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
-use drystone::World;
+use drystone::{BodyHandle, World};
 
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
@@ -42,6 +42,8 @@ pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
     meshes: Meshes,
+    /// The bodies that the meshes are of.
+    drawn: Vec<BodyHandle>,
     vertices: wgpu::Buffer,
     view: wgpu::Buffer,
     shadow_map: wgpu::TextureView,
@@ -72,11 +74,7 @@ impl Renderer {
         world: &World,
     ) -> Self {
         let meshes = Meshes::new(world);
-        let vertices = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("vertices"),
-            contents: if meshes.vertices.is_empty() { &[0; 24] } else { bytemuck::cast_slice(&meshes.vertices) },
-            usage: wgpu::BufferUsages::VERTEX,
-        });
+        let vertices = vertex_buffer(device, &meshes);
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("view"),
             size: size_of::<View>() as u64,
@@ -139,6 +137,7 @@ impl Renderer {
             device: device.clone(),
             queue: queue.clone(),
             meshes,
+            drawn: world.bodies.handles().collect(),
             vertices,
             view,
             shadow_map,
@@ -147,6 +146,15 @@ impl Renderer {
             format,
             quality,
             targets: None,
+        }
+    }
+
+    /// Takes over bodies that came or went since the last picture.
+    pub fn follow(&mut self, world: &World) {
+        if !world.bodies.handles().eq(self.drawn.iter().copied()) {
+            self.meshes = Meshes::new(world);
+            self.drawn = world.bodies.handles().collect();
+            self.vertices = vertex_buffer(&self.device, &self.meshes);
         }
     }
 
@@ -246,5 +254,13 @@ fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
         let above = eye[k] > container.high[k] && b.low[k] > container.high[k] - slack;
         let below = eye[k] < container.low[k] && b.high[k] < container.low[k] + slack;
         (above || below) && is_wide((k + 1) % 3) && is_wide((k + 2) % 3)
+    })
+}
+
+fn vertex_buffer(device: &wgpu::Device, meshes: &Meshes) -> wgpu::Buffer {
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("vertices"),
+        contents: if meshes.vertices.is_empty() { &[0; 24] } else { bytemuck::cast_slice(&meshes.vertices) },
+        usage: wgpu::BufferUsages::VERTEX,
     })
 }

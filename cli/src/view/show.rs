@@ -19,7 +19,7 @@ pub struct Pointer {
 
 pub trait Show {
     fn title(&self) -> String;
-    /// The world, whose bodies and shapes must not change.
+    /// The world. Bodies may come and go; the shapes of a body must not change.
     fn world(&self) -> &World;
     /// Bounds of the bodies that cast shadows.
     fn bounds(&self) -> Bounds;
@@ -34,6 +34,8 @@ pub trait Show {
         Vec::new()
     }
     fn advance(&mut self, seconds: f32) -> Result<()>;
+    /// Notes where the mouse points, before a key.
+    fn point(&mut self, _pointer: &Pointer) {}
     fn key(&mut self, key: &Key, down: bool) -> Result<()>;
     /// Handles a press of the left button; returns whether drags go here instead of to the camera.
     fn grab(&mut self, pointer: &Pointer) -> bool;

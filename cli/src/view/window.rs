@@ -57,7 +57,7 @@ impl ApplicationHandler for App {
                     return events.exit();
                 }
                 if !repeat {
-                    open.key(&logical_key, down, &*self.show);
+                    open.key(&logical_key, down, &mut *self.show);
                     let result = self.show.key(&logical_key, down);
                     self.end(events, result);
                 }
