@@ -206,11 +206,15 @@ impl ContactRows {
             let points = &mut points[i * stride..(i + 1) * stride];
             let pair = detector.pair(slot.world, slot.pair);
             let usual_share = effort.share(if movable(pair.body_a) { pair.body_a } else { pair.body_b } as usize);
-            let has = [contact.preload, *sag, slot.need].map(|x| x.to_bits() != 0);
-            let has = [has[0], has[1], has[2], contact.substep_share != usual_share];
-            let mut bits = (0..).zip(has).fold(kinds[i] as u8, |bits, (k, has)| bits | u8::from(has) << (2 + k));
+            // The preload of a heap ends as -0.
+            const PRELOAD: [u32; 2] = [0, (-0.0_f32).to_bits()];
+            let preload = PRELOAD.iter().position(|&bits| bits == contact.preload.to_bits()).unwrap_or(2);
+            let has = [sag.to_bits() != 0, slot.need.to_bits() != 0, contact.substep_share != usual_share];
+            let mut bits =
+                (2..).zip(has).fold(kinds[i] as u8 | (preload as u8) << 5, |bits, (k, has)| bits | u8::from(has) << k);
             bits.walk(archive)?;
-            let has = [2, 3, 4, 5].map(|k| bits >> k & 1 == 1);
+            let [has_sag, has_need, has_share] = [2, 3, 4].map(|k| bits >> k & 1 == 1);
+            let preload = PRELOAD.get(usize::from(bits >> 5 & 3));
             let rows = bits & 3;
             if rows == Rows::Masses as u8 {
                 let count = contact.point_count as usize + usize::from(*patches);
@@ -235,16 +239,17 @@ impl ContactRows {
             let impulses = &mut impulses[i * stride..][..count + usize::from(*patches)];
             walk_impulses(impulses, archive)?;
             if A::READS {
-                (contact.preload, *sag, slot.need, contact.substep_share) = (0.0, 0.0, 0.0, usual_share);
+                (*sag, slot.need, contact.substep_share) = (0.0, 0.0, usual_share);
             }
-            if has[0] {
-                contact.preload.walk(archive)?;
+            match preload {
+                Some(&bits) => contact.preload = f32::from_bits(bits),
+                None => contact.preload.walk(archive)?,
             }
-            if has[3] {
+            if has_share {
                 contact.substep_share.walk(archive)?;
             }
             let share = contact.substep_share;
-            if has[1] {
+            if has_sag {
                 let pressed = impulses[..count].iter().map(|impulse| impulse.normal).sum();
                 let bodies = [contact.body_a, contact.body_b].map(|body| body as usize);
                 let [a, b] = bodies.map(|body| masses.get(body).map_or(0.0, |mass| mass.inv_mass));
@@ -252,7 +257,7 @@ impl ContactRows {
                 let yields = scale.map_or(0.0, |scale| scale.yielding(a > 0.0 && b > 0.0, in_heap, pressed));
                 archive.near(sag, yields * share * (a + b))?;
             }
-            if has[2] {
+            if has_need {
                 archive.near(&mut slot.need, *sag / (share * share * config.promised_sag(slot.size)))?;
             }
         }
