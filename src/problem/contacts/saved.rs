@@ -206,7 +206,7 @@ impl ContactRows {
             let points = &mut points[i * stride..(i + 1) * stride];
             let pair = detector.pair(slot.world, slot.pair);
             let usual_share = effort.share(if movable(pair.body_a) { pair.body_a } else { pair.body_b } as usize);
-            // The preload of a heap ends as -0.
+            // Most preloads of a heap are 0.
             const PRELOAD: [u32; 2] = [0, (-0.0_f32).to_bits()];
             let preload = PRELOAD.iter().position(|&bits| bits == contact.preload.to_bits()).unwrap_or(2);
             let has = [sag.to_bits() != 0, slot.need.to_bits() != 0, contact.substep_share != usual_share];
