@@ -315,28 +315,29 @@ fn walk_same<T: Saved + PartialEq, A: Archive>(
     Ok(())
 }
 
-/// Impulses, two bits each for those that are zero and those without friction. How large they were within a step ends with it.
+/// Impulses, three bits each for those that are zero, whose friction has either sign. How large they were within a step ends with it.
 fn walk_impulses<A: Archive>(impulses: &mut [ImpulseRow], archive: &mut A) -> Result<()> {
-    for own in impulses.chunks_mut(4) {
-        let mut bits = 0_u8;
-        for (k, impulse) in own.iter().enumerate() {
-            let [normal, tangent_1, tangent_2] =
-                [impulse.normal, impulse.tangent_1, impulse.tangent_2].map(f32::to_bits);
-            bits |= if tangent_1 | tangent_2 != 0 { 2 } else { u8::from(normal != 0) } << (2 * k);
+    const LOADED: u64 = 4;
+    let signed = |bit: u64| if bit == 0 { 0.0_f32 } else { -0.0 };
+    let empty = |kind: u64| ImpulseRow {
+        tangent_1: signed(kind & 1),
+        tangent_2: signed(kind >> 1 & 1),
+        ..ImpulseRow::default()
+    };
+    let bits_of = |impulse: &ImpulseRow| [impulse.normal, impulse.tangent_1, impulse.tangent_2].map(f32::to_bits);
+    let kind =
+        |impulse: &ImpulseRow| (0..LOADED).find(|&kind| bits_of(&empty(kind)) == bits_of(impulse)).unwrap_or(LOADED);
+    let mut kinds = impulses.iter().rev().fold(0, |kinds, impulse| kinds << 3 | kind(impulse));
+    archive.number(&mut kinds)?;
+    for (k, impulse) in impulses.iter_mut().enumerate() {
+        let kind = kinds >> (3 * k) & 7;
+        if A::READS {
+            *impulse = empty(kind);
         }
-        bits.walk(archive)?;
-        for (k, impulse) in own.iter_mut().enumerate() {
-            let kind = bits >> (2 * k) & 3;
-            if A::READS {
-                *impulse = ImpulseRow::default();
-            }
-            if kind > 0 {
-                impulse.normal.walk(archive)?;
-            }
-            if kind > 1 {
-                impulse.tangent_1.walk(archive)?;
-                impulse.tangent_2.walk(archive)?;
-            }
+        if kind >= LOADED {
+            impulse.normal.walk(archive)?;
+            impulse.tangent_1.walk(archive)?;
+            impulse.tangent_2.walk(archive)?;
         }
     }
     Ok(())
