@@ -22,6 +22,7 @@ tests! {
         islands_fall_asleep_and_wake_with_their_impulses,
         an_island_with_another_class_begins_from_the_rows_of_the_device,
         a_backend_that_takes_over_goes_on_from_the_rows_of_the_device,
+        a_run_that_is_saved_or_goes_back_takes_the_rows_of_the_device_along,
         impulses_at_the_wrong_points_are_found,
         rows_that_are_not_there_are_refused,
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
@@ -199,6 +200,30 @@ fn a_backend_that_takes_over_goes_on_from_the_rows_of_the_device() {
         both.iter_mut().for_each(|s| drop(s.step(scene.dt).expect("a step")));
     }
     assert_same(&mut both, "at the end");
+}
+
+fn a_run_that_is_saved_or_goes_back_takes_the_rows_of_the_device_along() {
+    let scene = pile(60);
+    let [mut ours, mut theirs] = both(&scene, &SolverConfig::default());
+    for _ in 0..40 {
+        [&mut ours, &mut theirs].into_iter().for_each(|s| drop(s.step(scene.dt).expect("a step")));
+    }
+    let bytes = theirs.save();
+    assert!(bytes == ours.save(), "the device has another state");
+    let snapshot = theirs.snapshot();
+    let on_device = Simulation::load(&bytes, Box::new(gpu::exact())).expect("the bytes of a run");
+    let at_home = Simulation::load(&bytes, Box::new(Reference::<f32>::new())).expect("the bytes of a run");
+    let forked = theirs.fork(Box::new(gpu::exact()));
+    (0..5).for_each(|_| drop(theirs.step(scene.dt).expect("a step")));
+    theirs.restore(&snapshot);
+    let mut all = [theirs, on_device, at_home, forked];
+    for step in 0..30 {
+        ours.step(scene.dt).expect("a step");
+        for (which, simulation) in all.iter_mut().enumerate() {
+            simulation.step(scene.dt).expect("a step");
+            assert_eq!(simulation.hash(), ours.hash(), "run {which}, step {step}");
+        }
+    }
 }
 
 /// A GPU that is told wrong things of the rows that were written again.

@@ -288,3 +288,49 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     assert!(line.contains("version 2") && line.contains("reads 1"), "{line}");
     assert!(refusal(b"a file of another program").contains("these bytes are none"));
 }
+
+/// A hash that follows a known definition: FNV-1a over the bytes of one ball.
+#[test]
+fn a_hash_is_what_its_definition_says() {
+    let mut world = World::new();
+    world.add(Body::fixed());
+    let gone = world.insert(Body::fixed());
+    world.remove(gone);
+    world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1.0, -0.0, 3.0).velocity(Vec3::X, Vec3::Y));
+    assert_eq!(world.bodies.len(), 2);
+    let simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");
+    let numbers = |index: u32, generation: u32, floats: [f32; 13]| {
+        [index, generation].into_iter().chain(floats.map(f32::to_bits)).collect::<Vec<_>>()
+    };
+    let mut all = numbers(0, 0, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    all.extend(numbers(1, 2, [1.0, -0.0, 3.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]));
+    let bytes = all.into_iter().flat_map(u32::to_le_bytes);
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |h, byte| (h ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+    assert_eq!(simulation.hash(), hash);
+}
+
+/// What was measured is 409 bytes a body for 1,000 boxes; rows and manifolds as they are would take 3,500.
+#[test]
+fn a_pile_at_rest_takes_few_bytes_a_body() {
+    let mut simulation =
+        Simulation::new(scene("pile", &["n=200"]), SolverConfig::default(), cpu()).expect("a good world");
+    (0..400).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    assert_eq!((0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count(), 200);
+    let bytes = simulation.save().len() / 200;
+    assert!(bytes < 450, "{bytes} bytes a body");
+}
+
+/// The world is replaced between two steps, by a smaller one and by a larger one.
+#[test]
+fn a_world_that_was_replaced_is_saved_before_the_next_step() {
+    for other in [scene("tower", &["n=4"]), scene("pile", &["n=80"])] {
+        let mut one = Simulation::new(scene("pile", &["n=40"]), SolverConfig::default(), cpu()).expect("a good world");
+        (0..60).for_each(|_| drop(one.step(DT).expect("a step")));
+        one.world = other;
+        let mut loaded = Simulation::load(&one.save(), reference()).expect("the bytes of a run");
+        for step in 0..30 {
+            [&mut one, &mut loaded].into_iter().for_each(|s| drop(s.step(DT).expect("a step")));
+            assert_eq!(one.hash(), loaded.hash(), "step {step}");
+        }
+    }
+}

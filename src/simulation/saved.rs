@@ -85,10 +85,11 @@ impl Simulation {
     }
 
     /// The state between two steps as bytes, for [`Simulation::load`]: the same on every machine. They begin with a version and a hash of
-    /// what follows.
+    /// what follows, which finds damage; it does not find what someone forged, who knows how it is made.
     ///
     /// A run that goes on from them has the bits of one that was not interrupted. Until its first step,
-    /// [`Simulation::problem`] and [`Simulation::plan`] of it lack what each step writes anew.
+    /// [`Simulation::problem`] and [`Simulation::plan`] of it lack what each step writes anew, and [`Simulation::manifolds`] says how far points
+    /// were apart when their manifolds were computed.
     pub fn save(&mut self) -> Vec<u8> {
         self.fetch();
         let mut writer = Writer::default();
@@ -143,6 +144,11 @@ impl Simulation {
         let Self { world, config, backend: _, stages, on_device: _, restored: _ } = self;
         world.walk(archive)?;
         config.walk(archive)?;
+        if A::READS {
+            let are_consistent = world.bodies.are_consistent() && world.joints.are_consistent();
+            ensure(are_consistent, || "a body or a joint has no place".to_owned())?;
+            config.check()?;
+        }
         stages.walk(world, archive)
     }
 }

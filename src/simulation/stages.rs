@@ -5,7 +5,7 @@ use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
-use crate::error::Result;
+use crate::error::{Result, ensure};
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
 use crate::rest;
@@ -153,7 +153,13 @@ impl Stages {
         problem.walk(archive)?;
         contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
         joints.walk(archive)?;
-        events.walk(archive)
+
+        events.walk(archive)?;
+        let bodies = detector.kinds().len();
+        let of_effort = effort.classes().len();
+        ensure(key.surfaces.len() == bodies && (of_effort == 0 || of_effort == bodies), || {
+            format!("classes of {of_effort} and surfaces of {} bodies, and not of {bodies}", key.surfaces.len())
+        })
     }
 
     /// The changes of the caller since the last step.

@@ -127,6 +127,17 @@ impl Bodies {
         &self.worlds
     }
 
+    /// Whether all indices are there that name one.
+    pub(crate) fn are_consistent(&self) -> bool {
+        let Self { all, generations, worlds, vacant } = self;
+        let is_vacant = |&i: &u32| generations.get(i as usize).is_some_and(|generation| generation % 2 == 1);
+        let fits = |&world: &u32| (world as usize) < vacant.len();
+        generations.len() == all.len()
+            && worlds.len() == all.len()
+            && worlds.iter().all(fits)
+            && vacant.iter().flatten().all(is_vacant)
+    }
+
     /// The generation of each index, which changes with every body that comes or goes there.
     pub(crate) fn generations(&self) -> &[u32] {
         &self.generations

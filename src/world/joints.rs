@@ -53,6 +53,15 @@ impl Joints {
         Some(joint)
     }
 
+    /// Whether every joint has its number.
+    pub(crate) fn are_consistent(&self) -> bool {
+        let Self { all, handles, numbers, free } = self;
+        let is_free = |&number: &u32| numbers.get(number as usize).is_some_and(|number| number.1.is_none());
+        handles.len() == all.len()
+            && handles.iter().enumerate().all(|(i, &handle)| self.index(handle) == Some(i))
+            && free.iter().all(is_free)
+    }
+
     /// Keeps the joints that `keep` takes.
     pub fn retain(&mut self, mut keep: impl FnMut(&BallJoint) -> bool) {
         let mut kept = 0;

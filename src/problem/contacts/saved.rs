@@ -207,11 +207,15 @@ impl ContactRows {
             let points = &mut points[i * stride..(i + 1) * stride];
             let pair = detector.pair(slot.world, slot.pair);
             let usual_share = effort.share(if movable(pair.body_a) { pair.body_a } else { pair.body_b } as usize);
-            let has = [contact.preload, *sag, slot.need].map(|x| x.to_bits() != 0);
-            let has = [has[0], has[1], has[2], contact.substep_share != usual_share];
-            let mut bits = (0..).zip(has).fold(kinds[i] as u8, |bits, (k, has)| bits | u8::from(has) << (2 + k));
+            // Most preloads of a heap are 0.
+            const PRELOAD: [u32; 2] = [0, (-0.0_f32).to_bits()];
+            let preload = PRELOAD.iter().position(|&bits| bits == contact.preload.to_bits()).unwrap_or(2);
+            let has = [sag.to_bits() != 0, slot.need.to_bits() != 0, contact.substep_share != usual_share];
+            let mut bits =
+                (2..).zip(has).fold(kinds[i] as u8 | (preload as u8) << 5, |bits, (k, has)| bits | u8::from(has) << k);
             bits.walk(archive)?;
-            let has = [2, 3, 4, 5].map(|k| bits >> k & 1 == 1);
+            let [has_sag, has_need, has_share] = [2, 3, 4].map(|k| bits >> k & 1 == 1);
+            let preload = PRELOAD.get(usize::from(bits >> 5 & 3));
             let rows = bits & 3;
             if rows == Rows::Masses as u8 {
                 let count = contact.point_count as usize + usize::from(*patches);
@@ -236,16 +240,17 @@ impl ContactRows {
             let impulses = &mut impulses[i * stride..][..count + usize::from(*patches)];
             walk_impulses(impulses, archive)?;
             if A::READS {
-                (contact.preload, *sag, slot.need, contact.substep_share) = (0.0, 0.0, 0.0, usual_share);
+                (*sag, slot.need, contact.substep_share) = (0.0, 0.0, usual_share);
             }
-            if has[0] {
-                contact.preload.walk(archive)?;
+            match preload {
+                Some(&bits) => contact.preload = f32::from_bits(bits),
+                None => contact.preload.walk(archive)?,
             }
-            if has[3] {
+            if has_share {
                 contact.substep_share.walk(archive)?;
             }
             let share = contact.substep_share;
-            if has[1] {
+            if has_sag {
                 let pressed = impulses[..count].iter().map(|impulse| impulse.normal).sum();
                 let bodies = [contact.body_a, contact.body_b].map(|body| body as usize);
                 let [a, b] = bodies.map(|body| masses.get(body).map_or(0.0, |mass| mass.inv_mass));
@@ -253,7 +258,7 @@ impl ContactRows {
                 let yields = scale.map_or(0.0, |scale| scale.yielding(a > 0.0 && b > 0.0, in_heap, pressed));
                 archive.near(sag, yields * share * (a + b))?;
             }
-            if has[2] {
+            if has_need {
                 archive.near(&mut slot.need, *sag / (share * share * config.promised_sag(slot.size)))?;
             }
         }
@@ -311,28 +316,29 @@ fn walk_same<T: Saved + PartialEq, A: Archive>(
     Ok(())
 }
 
-/// Impulses, two bits each for those that are zero and those without friction. How large they were within a step ends with it.
+/// Impulses, three bits each for those that are zero, whose friction has either sign. How large they were within a step ends with it.
 fn walk_impulses<A: Archive>(impulses: &mut [ImpulseRow], archive: &mut A) -> Result<()> {
-    for own in impulses.chunks_mut(4) {
-        let mut bits = 0_u8;
-        for (k, impulse) in own.iter().enumerate() {
-            let [normal, tangent_1, tangent_2] =
-                [impulse.normal, impulse.tangent_1, impulse.tangent_2].map(f32::to_bits);
-            bits |= if tangent_1 | tangent_2 != 0 { 2 } else { u8::from(normal != 0) } << (2 * k);
+    const LOADED: u64 = 4;
+    let signed = |bit: u64| if bit == 0 { 0.0_f32 } else { -0.0 };
+    let empty = |kind: u64| ImpulseRow {
+        tangent_1: signed(kind & 1),
+        tangent_2: signed(kind >> 1 & 1),
+        ..ImpulseRow::default()
+    };
+    let bits_of = |impulse: &ImpulseRow| [impulse.normal, impulse.tangent_1, impulse.tangent_2].map(f32::to_bits);
+    let kind =
+        |impulse: &ImpulseRow| (0..LOADED).find(|&kind| bits_of(&empty(kind)) == bits_of(impulse)).unwrap_or(LOADED);
+    let mut kinds = impulses.iter().rev().fold(0, |kinds, impulse| kinds << 3 | kind(impulse));
+    archive.number(&mut kinds)?;
+    for (k, impulse) in impulses.iter_mut().enumerate() {
+        let kind = kinds >> (3 * k) & 7;
+        if A::READS {
+            *impulse = empty(kind);
         }
-        bits.walk(archive)?;
-        for (k, impulse) in own.iter_mut().enumerate() {
-            let kind = bits >> (2 * k) & 3;
-            if A::READS {
-                *impulse = ImpulseRow::default();
-            }
-            if kind > 0 {
-                impulse.normal.walk(archive)?;
-            }
-            if kind > 1 {
-                impulse.tangent_1.walk(archive)?;
-                impulse.tangent_2.walk(archive)?;
-            }
+        if kind >= LOADED {
+            impulse.normal.walk(archive)?;
+            impulse.tangent_1.walk(archive)?;
+            impulse.tangent_2.walk(archive)?;
         }
     }
     Ok(())
