@@ -181,7 +181,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 22] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -198,6 +198,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
         systems: JointSystems { begins, softness, nodes, blocks: system_blocks, terms },
         turning,
         joints,
+        axes,
         joint_impulses,
         convergence,
         momentum,
@@ -221,6 +222,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 21] {
         ("systems.terms", bytemuck::cast_slice(terms)),
         ("turning", bytemuck::cast_slice(turning)),
         ("joints", bytemuck::cast_slice(joints)),
+        ("axes", bytemuck::cast_slice(axes)),
         ("joint_impulses", bytemuck::cast_slice(joint_impulses)),
         ("convergence", bytemuck::bytes_of(convergence)),
         ("momentum", bytemuck::bytes_of(momentum)),

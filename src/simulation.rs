@@ -224,7 +224,16 @@ impl Simulation {
 
     /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        self.stages.problem.joint_impulses.iter().map(|row| row.linear.into()).collect()
+        let problem = &self.stages.problem;
+        let of_anchors = |i: usize| glam::Vec3::from(problem.joint_impulses[i].linear);
+        (0..problem.joints.len()).map(|i| of_anchors(i) + problem.axis_impulse(i, true)).collect()
+    }
+
+    /// Angular impulse of each joint of the world on its body b about the anchor, in the last of the substeps, world axes (N m s): that of
+    /// locks, limits, motors and springs of angles. A torque (N m) is that over the length of the substep.
+    pub fn joint_angular_impulses(&self) -> Vec<glam::Vec3> {
+        let problem = &self.stages.problem;
+        (0..problem.joints.len()).map(|i| problem.axis_impulse(i, false)).collect()
     }
 
     /// Changes the settings from the next step on.

@@ -18,7 +18,7 @@ use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
-    Backend, BallJoint, Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+    Backend, Body, Cpu, Error, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
 use settings::set;
 
@@ -106,8 +106,8 @@ fn mixture() -> Scene {
         let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.1)).position(10.0, 8.0 - 0.5 * i as f32, 0.0);
         let link = scene.world.add(link.velocity(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
         scene.world.join(match above {
-            None => BallJoint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
-            Some(above) => BallJoint::new(above, -end, link, end),
+            None => Joint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
+            Some(above) => Joint::new(above, -end, link, end),
         });
         above = Some(link);
     }

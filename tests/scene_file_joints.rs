@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::scenes::SceneFile;
-use drystone::{BallJoint, Error, Scene};
+use drystone::{Error, Joint, Scene};
 use serde_json::{Value, json};
 
 /// The scene with this joint and four bodies: a fixed `wall`, two dynamic balls `a` and `twin`, a kinematic `twin`.
@@ -18,7 +18,7 @@ fn read(joint: &Value) -> Result<Scene, Error> {
     SceneFile::parse(&text.to_string())?.into_scene("unnamed")
 }
 
-fn one_joint(joint: Value) -> BallJoint {
+fn one_joint(joint: Value) -> Joint {
     read(&joint).expect("a good scene").world.joints[0]
 }
 
@@ -32,9 +32,9 @@ fn refusal(joint: Value) -> String {
 #[test]
 fn a_body_is_named_by_name_or_by_index() {
     let joint = one_joint(json!({"type": "ball", "bodies": ["a", 2], "anchors": [[1, 0, 0], [0, 1, 0]]}));
-    assert_eq!(joint, BallJoint::new(1, Vec3::X, 2, Vec3::Y));
+    assert_eq!(joint, Joint::new(1, Vec3::X, 2, Vec3::Y));
     let joint = one_joint(json!({"type": "ball", "bodies": ["a"], "anchors": [[1, 0, 0], [4, 5, 6]]}));
-    assert_eq!(joint, BallJoint::to_world(1, Vec3::X, Vec3::new(4.0, 5.0, 6.0)));
+    assert_eq!(joint, Joint::to_world(1, Vec3::X, Vec3::new(4.0, 5.0, 6.0)));
 }
 
 #[test]

@@ -61,6 +61,8 @@ pub(crate) struct PlanKey {
     blocks: Vec<Block>,
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
+    /// Whether joints have axes.
+    axes: bool,
 }
 
 impl PlanKey {
@@ -68,13 +70,19 @@ impl PlanKey {
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         self.blocks == problem.blocks
             && self.colors == problem.colors
+            && self.axes != problem.axes.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), isotropic }
+        Self {
+            colors: problem.colors.clone(),
+            blocks: problem.blocks.clone(),
+            isotropic,
+            axes: !problem.axes.is_empty(),
+        }
     }
 }
 
@@ -109,6 +117,7 @@ impl StepPlan {
             biased: false,
             from_start: false,
             isotropic: false,
+            axes: !problem.axes.is_empty(),
         };
         let bounces = contacts.restitution;
         let mut plan = Self::default();
@@ -172,8 +181,8 @@ impl StepPlan {
             let warm_start = carried && substep > 0;
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
-            self.over_colors(Kernel::WarmStartJoints, block, &joints);
-            self.over_colors(Kernel::WarmStartJoints, block, &direct);
+            self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
+            self.over_colors(Kernel::WarmStartJoints { axes: false }, block, &direct);
             if warm_start {
                 // Done already.
             } else if shared.accumulated {
@@ -199,6 +208,7 @@ impl StepPlan {
             friction: if friction { FrictionRule::Disc } else { FrictionRule::None },
             driven: driven && friction,
             passes,
+            axes: !problem.axes.is_empty(),
             ..Rules::default()
         };
         let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
@@ -240,13 +250,14 @@ impl StepPlan {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
             if let [first, ..] = sweeps.direct {
-                let rules = rules.of_joints();
+                let rules = Rules { axes: false, ..rules.of_joints() };
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
                 self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
                 self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
             }
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
+            let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);

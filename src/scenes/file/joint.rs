@@ -5,7 +5,7 @@ use std::fmt;
 use super::numbers::lengths;
 use super::schema::{BodyRef, JointFile};
 use crate::error::{Error, Result, ensure, input};
-use crate::world::{BallJoint, BodyKind, World};
+use crate::world::{BodyKind, Joint, World};
 
 impl fmt::Display for BodyRef {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -38,7 +38,7 @@ impl BodyRef {
 }
 
 /// The joint that `file` describes, between bodies of `world`.
-pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
+pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     let JointFile::Ball { bodies, anchor, anchors, collide } = file;
     let (a, b) = match &bodies[..] {
         [a] => (a.find(world)?, None),
@@ -58,5 +58,5 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
         (None, Some([on_a, on_b])) => (lengths("anchors[0]", *on_a)?.into(), lengths("anchors[1]", *on_b)?.into()),
         _ => return Err(Error::input("anchor and anchors: give one of them")),
     };
-    Ok(BallJoint { body_a: a, body_b: b, anchor_a, anchor_b, collide: *collide })
+    Ok(Joint { body_b: b, collide: *collide, ..Joint::to_world(a, anchor_a, anchor_b) })
 }
