@@ -8,5 +8,8 @@ mod scene;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 #[cfg(feature = "serde")]
-pub use file::{BodyFile, BodyRef, Geometry, JointFile, MassFile, SceneFile, ShapeFile, load, schema};
+pub use file::{
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, MassFile, MotorFile, SceneFile, ShapeFile, SpringFile,
+    load, schema,
+};
 pub use scene::{Group, Scene};

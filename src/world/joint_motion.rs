@@ -99,7 +99,7 @@ fn angles(q: Quat) -> [f32; 3] {
 
 impl Joint {
     /// Refuses frames that are no rotations, and limits and drives out of range.
-    pub(super) fn check_axes(&self) -> Result<()> {
+    pub(crate) fn check_axes(&self) -> Result<()> {
         check_rotation("frame_a", self.frame_a)?;
         check_rotation("frame_b", self.frame_b)?;
         match &self.linear {

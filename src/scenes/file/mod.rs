@@ -5,7 +5,9 @@ mod joint;
 mod numbers;
 mod schema;
 
-pub use schema::{BodyFile, BodyRef, Geometry, JointFile, MassFile, SceneFile, ShapeFile};
+pub use schema::{
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, MassFile, MotorFile, SceneFile, ShapeFile, SpringFile,
+};
 
 use std::path::Path;
 

@@ -190,25 +190,120 @@ pub enum Geometry {
     },
 }
 
-/// A joint of a scene file.
+/// A joint of a scene file. Needs an anchor or anchors.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(title = "Joint", extend("unevaluatedProperties" = false))]
+pub struct JointFile {
+    /// One body, which is tied to the world, or two; at least one of them dynamic. Places, angles and speeds of a joint are those of the first
+    /// against the second.
+    #[schemars(length(min = 1, max = 2))]
+    pub bodies: Vec<BodyRef>,
+    /// The point where the bodies are tied as they stand, in the world (m).
+    pub anchor: Option<[f64; 3]>,
+    /// The point in the frame of each body (m); with one body, the second is in the world.
+    pub anchors: Option<[[f64; 3]; 2]>,
+    /// Whether the two bodies still collide with each other.
+    #[serde(default)]
+    pub collide: bool,
+    /// The kind of joint. Refuses the keys that are unknown to both.
+    #[serde(flatten)]
+    pub kind: JointKind,
+}
+
+/// What a joint leaves free. Angles are zero as the bodies stand.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-#[schemars(title = "Joint")]
+#[schemars(title = "Kind of joint")]
 #[non_exhaustive]
-pub enum JointFile {
-    /// Keeps a point of one body together with a point of another, or of the world. Needs an anchor or anchors.
-    Ball {
-        /// One body, which is tied to the world, or two; at least one of them dynamic.
-        #[schemars(length(min = 1, max = 2))]
-        bodies: Vec<BodyRef>,
-        /// The point where the bodies are tied as they stand, in the world (m).
-        anchor: Option<[f64; 3]>,
-        /// The point in the frame of each body (m); with one body, the second is in the world.
-        anchors: Option<[[f64; 3]; 2]>,
-        /// Whether the two bodies still collide with each other.
-        #[serde(default)]
-        collide: bool,
+pub enum JointKind {
+    /// Keeps the points together.
+    Ball {},
+    /// Nothing.
+    Fixed {},
+    /// Turning about an axis.
+    Hinge {
+        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        axis: [f64; 3],
+        /// Least and largest angle (rad), -pi to pi.
+        limits: Option<[f64; 2]>,
+        /// A motor about the axis (rad/s, N m), instead of a spring.
+        motor: Option<MotorFile>,
+        /// A spring about the axis (rad, N m).
+        spring: Option<SpringFile>,
     },
+    /// Shifting along an axis.
+    Slider {
+        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        axis: [f64; 3],
+        /// Least and largest place (m).
+        limits: Option<[f64; 2]>,
+        /// A motor along the axis (m/s, N), instead of a spring.
+        motor: Option<MotorFile>,
+        /// A spring along the axis (m, N).
+        spring: Option<SpringFile>,
+    },
+    /// All but the distance of the points: a rope, a rod or a spring.
+    Distance {
+        /// Least and largest distance (m), the same of a rod.
+        limits: Option<[f64; 2]>,
+        /// A winch (m/s, N), instead of a spring.
+        motor: Option<MotorFile>,
+        /// A spring (m, N).
+        spring: Option<SpringFile>,
+    },
+    /// What each of the axes says.
+    Generic {
+        /// Rotation from the axes of the joint to the world, as the bodies stand: a quaternion x, y, z, w of length 1 within 0.001.
+        #[serde(default = "defaults::rotation")]
+        frame: [f64; 4],
+        /// Shifts along the three axes (m).
+        linear: [AxisFile; 3],
+        /// Turns about the three axes (rad).
+        angular: [AxisFile; 3],
+    },
+}
+
+/// One axis of a generic joint; free if it says nothing.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(title = "Axis")]
+pub struct AxisFile {
+    /// Whether it is held at zero; limits are then not given.
+    pub locked: bool,
+    /// Least and largest place (m) or angle (rad).
+    pub limits: Option<[f64; 2]>,
+    /// A motor, instead of a spring.
+    pub motor: Option<MotorFile>,
+    /// A spring.
+    pub spring: Option<SpringFile>,
+}
+
+/// A motor of a joint.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Motor")]
+pub struct MotorFile {
+    /// The speed that it holds (m/s, rad/s). 0 makes dry friction.
+    pub speed: f64,
+    /// The most that it pushes or pulls (N, N m).
+    pub max_load: f64,
+}
+
+/// A spring and damper of a joint.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Spring")]
+pub struct SpringFile {
+    /// Where it is at rest (m, rad).
+    #[serde(default)]
+    pub target: f64,
+    /// How often a second what it moves swings without damper (Hz), more than 0.
+    pub frequency: f64,
+    /// 0 without damping, 1 where it no longer swings.
+    #[serde(default = "defaults::damping_ratio")]
+    pub damping_ratio: f64,
+    /// The most that it pushes or pulls (N, N m); any if left out.
+    pub max_load: Option<f64>,
 }
 
 /// Which body of the scene.
@@ -232,6 +327,10 @@ mod defaults {
 
     pub(super) fn steps() -> u32 {
         600
+    }
+
+    pub(super) fn damping_ratio() -> f64 {
+        1.0
     }
 
     pub(super) fn rotation() -> [f64; 4] {
