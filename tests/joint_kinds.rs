@@ -6,7 +6,7 @@ mod common;
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, Joint, Linear, Shape, Simulation, SolverConfig, World};
+use drystone::{Axis, Body, Joint, Linear, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
 
 use common::Open;
 
@@ -14,6 +14,9 @@ const G: f32 = 9.81;
 const DT: f32 = 1.0 / 240.0;
 
 tests! {
+    no_gpu {
+        impulses_of_axes_follow_their_joint_and_its_substeps,
+    }
     every_backend {
         a_damped_spring_loses_the_share_that_its_ratio_says,
         a_fixed_cantilever_keeps_its_angle,
@@ -322,4 +325,36 @@ fn bodies_on_a_sliding_joint_keep_their_momentum(open: Open) {
     assert!(world.linear_momentum().distance(linear) < 1e-3 * linear.length(), "{}", world.linear_momentum());
     assert!(world.angular_momentum().distance(angular) < 5e-3 * angular.length(), "{}", world.angular_momentum());
     assert!(world.joint_gap() < 2e-3, "{}", world.joint_gap());
+}
+
+/// Two rods that rest on their limits; the joint of the first goes.
+fn impulses_of_axes_follow_their_joint_and_its_substeps() {
+    let mut world = World::new();
+    let mut joints = Vec::new();
+    for z in [0.0, 2.0] {
+        let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.02)).total_mass(2.0).position(0.5, 0.0, z);
+        let rod = world.add(rod);
+        let hinge = Joint::to_world(rod, -0.5 * Vec3::X, z * Vec3::Z).hinge(Vec3::Z);
+        joints.push(world.insert_joint(hinge.limited(0.0, 1.0)));
+    }
+    let mut simulation = simulate(world, || Box::new(Reference::<f32>::new()));
+    steps(&mut simulation, 0.5, |_, _| {});
+    let held = simulation.joint_angular_impulses()[1];
+    let weight = 2.0 * G * 0.5 * DT / simulation.config().substeps as f32;
+    assert!((held.z.abs() / weight - 1.0).abs() < 0.01, "{held} N m s of {weight}");
+    simulation.world.remove_joint(joints[0]).expect("a joint");
+    let of_limit = |problem: &StepProblem| {
+        let axis = problem.axes.iter().position(|axis| axis.range > 0.0).expect("a limit");
+        assert_eq!((problem.joints.len(), problem.axes.len()), (1, 3));
+        problem.joint_impulses[1 + axis].linear[0].abs()
+    };
+    let (problem, _) = simulation.next_problem(DT).unwrap();
+    assert_eq!(of_limit(&problem), held.z.abs());
+    // Half as long substeps bear the force with half of the impulse.
+    let (problem, _) = simulation.next_problem(0.5 * DT).unwrap();
+    assert_eq!(of_limit(&problem), 0.5 * held.z.abs());
+    // With a motor it has another list of axes.
+    simulation.world.joints[0] = simulation.world.joints[0].motor(0.0, 1.0);
+    let (problem, _) = simulation.next_problem(DT).unwrap();
+    assert!(problem.joint_impulses[1..].iter().all(|row| row.linear[0] == 0.0));
 }
