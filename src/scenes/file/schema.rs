@@ -257,9 +257,9 @@ pub enum JointKind {
         #[serde(default = "defaults::rotation")]
         frame: [f64; 4],
         /// Shifts along the three axes (m).
-        linear: [AxisFile; 3],
+        linear: Box<[AxisFile; 3]>,
         /// Turns about the three axes (rad).
-        angular: [AxisFile; 3],
+        angular: Box<[AxisFile; 3]>,
     },
 }
 
