@@ -1,5 +1,5 @@
 // extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction of the last sweeps. Before the first
-// sweep the kernel only notes them. In impulse_steps joints follow the points.
+// sweep the kernel only notes them. In impulse_steps joints follow the points, and their axes follow the joints.
 // Reads momentum, or sets it before the first sweep. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
 // Double: src/kernels/momentum.rs.
 
@@ -29,7 +29,7 @@ fn extrapolate(is_first: bool, measured: bool, first: u32, stride: u32) {
         let r = extrapolated_impulse(is_first, i, vec3f(impulse.normal, impulse.tangent_1, impulse.tangent_2));
         impulses[i] = Impulse(r.x, r.y, r.z, impulse.peak);
     }
-    for (var i = first; i < params.joint_count; i += stride) {
+    for (var i = first; i < params.joint_count + params.axis_count; i += stride) {
         joint_impulses[i].linear = extrapolated_impulse(is_first, params.point_count + i, joint_impulses[i].linear);
     }
 }

@@ -15,7 +15,7 @@ fn step_length(i: u32) -> vec2f {
 }
 
 fn measure_step(thread: u32, group: u32, groups: u32) {
-    let count = params.point_count + params.joint_count;
+    let count = params.point_count + params.joint_count + params.axis_count;
     for (var first = group * IMPULSES_PER_CHUNK; first < count; first += groups * IMPULSES_PER_CHUNK) {
         var own = vec2f();
         for (var i = first + thread; i < min(first + IMPULSES_PER_CHUNK, count); i += WORKGROUP) { own += step_length(i); }

@@ -1,5 +1,5 @@
 // solve_joints: one thread sweeps one joint of one color.
-// Reads joints, masses. Writes joint_impulses, and bodies that can move.
+// Reads joints, axes, masses. Writes joint_impulses, and bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/joint.rs.
 
@@ -7,6 +7,7 @@ fn solve_joint(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
+    solve_axes(rules, &pair, joint);
     let anchors = current_anchors(&pair, joint);
     let x = joint_column(&pair, anchors, vec3f(1.0, 0.0, 0.0));
     let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0));
@@ -23,7 +24,7 @@ fn solve_joint(rules: Rules, i: u32) {
         impulse_scale = pass_row.joint.impulse_scale;
     }
     let correction = solve_block(x, y, z, wanted) * mass_scale + before * impulse_scale;
-    let change = correction * -params.relaxation;
+    let change = of_anchors(joint, correction * -params.relaxation);
     joint_impulses[i].linear = before + change;
     note_correction(rules.measured, change.x, reciprocal(x.x));
     note_correction(rules.measured, change.y, reciprocal(y.y));

@@ -4,7 +4,7 @@
 
 fn update_momentum(thread: u32) {
     var own = vec2f();
-    let count = (params.point_count + params.joint_count + IMPULSES_PER_CHUNK - 1u) / IMPULSES_PER_CHUNK;
+    let count = (params.point_count + params.joint_count + params.axis_count + IMPULSES_PER_CHUNK - 1u) / IMPULSES_PER_CHUNK;
     for (var i = thread; i < count; i += WORKGROUP) { own += lengths[i]; }
     let sum = workgroup_sum(thread, own);
     if thread == 0u {

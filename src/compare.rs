@@ -187,7 +187,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 23] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 24] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -206,6 +206,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 23] {
         systems: JointSystems { begins, softness, nodes, blocks: system_blocks, terms },
         turning,
         joints,
+        axes,
         joint_impulses,
         convergence,
         momentum,
@@ -231,6 +232,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 23] {
         ("systems.terms", bytemuck::cast_slice(terms)),
         ("turning", bytemuck::cast_slice(turning)),
         ("joints", bytemuck::cast_slice(joints)),
+        ("axes", bytemuck::cast_slice(axes)),
         ("joint_impulses", bytemuck::cast_slice(joint_impulses)),
         ("convergence", bytemuck::bytes_of(convergence)),
         ("momentum", bytemuck::bytes_of(momentum)),

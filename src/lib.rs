@@ -18,7 +18,7 @@
 //!
 //! | To | call |
 //! |---|---|
-//! | build a world | [`World`], [`Body`], [`Shape`], [`BallJoint`]; or find a [`Scene`] of the catalogue or a file |
+//! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a [`Scene`] of the catalogue or a file |
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
 //! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
@@ -90,7 +90,10 @@ pub use simulation::{
     Summed,
 };
 pub use stats::StepStats;
-pub use world::{BallJoint, Body, BodyHandle, BodyKind, Groups, JointHandle, MassProperties, Material, Shape, World};
+pub use world::{
+    Axis, Body, BodyHandle, BodyKind, Bounds, Drive, Groups, Joint, JointHandle, JointMotion, Linear, MassProperties,
+    Material, Shape, World,
+};
 
 /// The example of the README, compiled and run with the other documentation tests.
 #[cfg(doctest)]

@@ -232,6 +232,14 @@ impl<L: Lane> Mul<L> for Vec3<L> {
     }
 }
 
+impl<L: Lane> Neg for Vec3<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        vec3(-self.x, -self.y, -self.z)
+    }
+}
+
 impl<S: Scalar> Vec3<S> {
     /// From storage.
     #[inline(always)]

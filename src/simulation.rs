@@ -362,7 +362,14 @@ impl Simulation {
 
     /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        (0..self.stages.problem.joint_impulses.len()).map(|joint| self.stages.joint_impulse(joint)).collect()
+        (0..self.stages.problem.joints.len()).map(|joint| self.stages.joint_impulse(joint)).collect()
+    }
+
+    /// Angular impulse of each joint of the world on its body b about the anchor, in the last of the substeps, world axes (N m s): that of
+    /// locks, limits, motors and springs of angles. A torque (N m) is that over the length of the substep.
+    pub fn joint_angular_impulses(&self) -> Vec<glam::Vec3> {
+        let problem = &self.stages.problem;
+        (0..problem.joints.len()).map(|i| problem.axis_impulse(i, false)).collect()
     }
 
     /// Changes the settings from the next step on.

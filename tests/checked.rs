@@ -5,7 +5,7 @@ mod settings;
 
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::{InertiaRow, TorqueRow};
+use drystone::stages::problem::{AxisRow, InertiaRow, JointImpulseRow, TorqueRow};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 use settings::set;
 
@@ -115,13 +115,22 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 38] = [
+    let cases: [(&str, Break); 42] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
         ("params.body_count: ", |p, _| p.params.body_count += 1),
         ("params.point_count: ", |p, _| p.params.point_count += 1),
         ("params.joint_count: ", |p, _| p.params.joint_count += 1),
+        ("params.axis_count: ", |p, _| p.params.axis_count += 1),
+        ("joints[0].axis_count = 13", |p, _| p.joints[0].axis_count = 13),
+        ("joints[0].first_axis = 0", |p, _| p.joints[0].axis_count = 1),
+        ("joints[1].first_axis = 0: axes of joints", |p, _| {
+            p.axes.push(AxisRow::default());
+            p.joint_impulses.push(JointImpulseRow::default());
+            p.params.axis_count = 1;
+            (p.joints[0].axis_count, p.joints[1].axis_count) = (1, 1);
+        }),
         ("order: ", |p, _| p.inertias.push(p.inertias[0])),
         ("order: ", |p, _| {
             let bodies = p.blocks[0].bodies as usize;

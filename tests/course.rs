@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, PI};
 
 use drystone::config::Friction;
 use drystone::glam::{Quat, Vec3};
-use drystone::{BallJoint, Body, MassProperties, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 
 use common::Open;
 
@@ -221,7 +221,7 @@ fn a_heavy_top_precesses_at_the_rate_of_its_spin(open: Open) {
     });
     let top = top.position(center.x, center.y, center.z).rotation(turn);
     let top = world.add(top.velocity(angular.cross(center), angular));
-    world.join(BallJoint::to_world(top, Vec3::new(0.0, -(l as f32), 0.0), Vec3::ZERO));
+    world.join(Joint::to_world(top, Vec3::new(0.0, -(l as f32), 0.0), Vec3::ZERO));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep(), open);
     let (mut turned, mut before) = (0.0_f64, f64::from(center.z).atan2(f64::from(center.x)));
     let seconds = 2.0;

@@ -5,7 +5,7 @@ mod common;
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::{BallJoint, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
 use common::Open;
 
@@ -53,8 +53,8 @@ fn chain(links: usize, ratio: f32) -> World {
         let body = if is_end { ball() } else { bar.clone() };
         let index = world.add(body.position(0.5 * k as f32 + half, 0.0, 0.0));
         world.join(match k {
-            0 => BallJoint::to_world(index, -half * Vec3::X, Vec3::ZERO),
-            _ => BallJoint::new(index - 1, 0.25 * Vec3::X, index, -half * Vec3::X),
+            0 => Joint::to_world(index, -half * Vec3::X, Vec3::ZERO),
+            _ => Joint::new(index - 1, 0.25 * Vec3::X, index, -half * Vec3::X),
         });
     }
     world
@@ -111,17 +111,17 @@ fn polygon(corners: &[Vec3], closes: bool) -> World {
         let bar = Body::dynamic().shape(Shape::cuboid(half, 0.05, 0.05)).rotation(turn);
         let index = world.add(bar.position(middle.x, middle.y, middle.z));
         match k {
-            0 => world.join(BallJoint::to_world(index, -half * Vec3::X, from)),
+            0 => world.join(Joint::to_world(index, -half * Vec3::X, from)),
             _ => {
                 let before = 0.5 * corners[k - 1].distance(from);
-                world.join(BallJoint::new(index - 1, before * Vec3::X, index, -half * Vec3::X))
+                world.join(Joint::new(index - 1, before * Vec3::X, index, -half * Vec3::X))
             }
         };
         if k + 1 == count {
             if closes {
-                world.join(BallJoint::new(index, half * Vec3::X, 0, -0.5 * corners[0].distance(corners[1]) * Vec3::X));
+                world.join(Joint::new(index, half * Vec3::X, 0, -0.5 * corners[0].distance(corners[1]) * Vec3::X));
             } else {
-                world.join(BallJoint::to_world(index, half * Vec3::X, to));
+                world.join(Joint::to_world(index, half * Vec3::X, to));
             }
         }
     }
@@ -160,10 +160,10 @@ fn a_tree_with_branches_stays_together() {
         let mass = if depth == 4 { 500.0 } else { 1.0 } * bar.mass.mass;
         let index = world.add(bar.total_mass(mass).position(x, -(depth as f32), 0.0));
         world.join(match k.checked_sub(1) {
-            None => BallJoint::to_world(index, 0.5 * Vec3::Y, Vec3::new(x, 0.5, 0.0)),
+            None => Joint::to_world(index, 0.5 * Vec3::Y, Vec3::new(x, 0.5, 0.0)),
             Some(k) => {
                 let above = world.bodies[k / 2].position;
-                BallJoint::new(k / 2, Vec3::new(x - above.x, -0.5, 0.0), index, 0.5 * Vec3::Y)
+                Joint::new(k / 2, Vec3::new(x - above.x, -0.5, 0.0), index, 0.5 * Vec3::Y)
             }
         });
         world.bodies[index].linear_velocity = Vec3::new(0.0, 0.0, 0.2 * depth as f32);
@@ -184,13 +184,13 @@ fn a_sheet_in_a_plane_stays_together_though_its_loops_hold_it_twice() {
         let place = 0.5 * Vec3::new(column as f32, 0.0, row as f32);
         world.add(Body::dynamic().shape(Shape::ball(0.2)).position(place.x, place.y, place.z));
         if column > 0 {
-            world.join(BallJoint::new(i - 1, 0.25 * Vec3::X, i, -0.25 * Vec3::X));
+            world.join(Joint::new(i - 1, 0.25 * Vec3::X, i, -0.25 * Vec3::X));
         }
         if row > 0 {
-            world.join(BallJoint::new(i - n, 0.25 * Vec3::Z, i, -0.25 * Vec3::Z));
+            world.join(Joint::new(i - n, 0.25 * Vec3::Z, i, -0.25 * Vec3::Z));
         }
         if [0, n - 1].contains(&column) && [0, n - 1].contains(&row) {
-            world.join(BallJoint::to_world(i, Vec3::ZERO, place));
+            world.join(Joint::to_world(i, Vec3::ZERO, place));
         }
     }
     let middle = n * n / 2 + n / 2;
@@ -206,7 +206,7 @@ fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
     let mut world = chain(5, 10.0);
     let end = world.bodies[5].position;
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.001)).position(end.x + 1.0, end.y, end.z));
-    world.join(BallJoint::new(5, Vec3::ZERO, ball, -Vec3::X));
+    world.join(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
     let mut simulation = simulation(world, JointSolver::Direct);
     let gap = largest_gap(&mut simulation, 600);
     println!("{gap} m");
@@ -260,8 +260,8 @@ fn the_setting_chooses_and_the_statistics_tell() {
     for &joint in &chain(5, 1000.0).joints {
         let (a, b) = (joint.body_a + 6, joint.body_b.map(|b| b + 6));
         both.join(match b {
-            None => BallJoint::to_world(a, joint.anchor_a, Vec3::new(0.0, 0.0, 5.0)),
-            Some(b) => BallJoint::new(a, joint.anchor_a, b, joint.anchor_b),
+            None => Joint::to_world(a, joint.anchor_a, Vec3::new(0.0, 0.0, 5.0)),
+            Some(b) => Joint::new(a, joint.anchor_a, b, joint.anchor_b),
         });
     }
     assert_eq!(stats(both, JointSolver::Auto), (6, 12));
@@ -278,10 +278,8 @@ fn lanes_and_threads_have_the_bits_of_the_reference() {
         }
         for &joint in &own.joints {
             world.join(match joint.body_b {
-                None => {
-                    BallJoint::to_world(first + joint.body_a, joint.anchor_a, Vec3::new(0.0, 0.0, 3.0 * lane as f32))
-                }
-                Some(b) => BallJoint::new(first + joint.body_a, joint.anchor_a, first + b, joint.anchor_b),
+                None => Joint::to_world(first + joint.body_a, joint.anchor_a, Vec3::new(0.0, 0.0, 3.0 * lane as f32)),
+                Some(b) => Joint::new(first + joint.body_a, joint.anchor_a, first + b, joint.anchor_b),
             });
         }
     }

@@ -9,9 +9,7 @@ use drystone::config::{Method, Stabilization};
 use drystone::glam::Vec3;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::compare;
-use drystone::{
-    Backend, BallJoint, Body, BodyKind, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem,
-};
+use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -256,7 +254,7 @@ fn a_plate_that_moves_ties_what_hangs_from_it() {
     let at = scene.world.bodies[0].position + Vec3::new(0.0, -3.0, 0.0);
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z);
     let rod = scene.world.add(rod);
-    scene.world.join(BallJoint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
+    scene.world.join(Joint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 10);
     assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(0));
@@ -276,7 +274,7 @@ fn several_efforts_keep_what_backends_rely_on() {
     let at = scene.world.bodies[top].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y + 0.3, at.z);
     let rod = scene.world.add(rod);
-    scene.world.join(BallJoint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
+    scene.world.join(Joint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     for step in 0..5 {
         run(&mut simulation, 1);
@@ -337,7 +335,7 @@ fn the_impulse_of_a_joint_follows_the_class() {
     let at = scene.world.bodies[5].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z + 2.0);
     let rod = scene.world.add(rod);
-    scene.world.join(BallJoint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
+    scene.world.join(Joint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 60);
     let (before, substeps) = (simulation.joint_impulses()[0], most_substeps(&simulation));

@@ -6,7 +6,7 @@ mod common;
 use common::{Open, gpu};
 use drystone::glam::{Quat, Vec3, Vec3Swizzles};
 use drystone::{
-    Backend, BallJoint, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Listen, Reference, Shape, Simulation,
+    Backend, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Joint, Listen, Reference, Shape, Simulation,
     SolverConfig, World,
 };
 
@@ -630,7 +630,7 @@ fn a_joint_breaks_at_its_force_and_is_gone() {
         let mut world = World::new();
         let [held, torn] = [0.0, 5.0].map(|x| {
             let cube = world.insert(cube(x, -0.5).rotation(Quat::IDENTITY));
-            let joint = BallJoint::to_world(cube.index(), 0.5 * Vec3::Y, Vec3::new(x, 0.0, 0.0));
+            let joint = Joint::to_world(cube.index(), 0.5 * Vec3::Y, Vec3::new(x, 0.0, 0.0));
             (cube, world.insert_joint(joint.breaking_at(10_000.0)))
         });
         let mut simulation = hears_sensors(&world, open());

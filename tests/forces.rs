@@ -5,7 +5,7 @@ mod common;
 
 use common::{Open, gpu};
 use drystone::glam::{Quat, Vec3};
-use drystone::{BallJoint, Body, Cpu, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
@@ -224,7 +224,7 @@ fn mixture() -> World {
         world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).position(3.0, 2.0, 0.0).gravity_scale(-0.1));
         world.add(Body::dynamic().shape(Shape::ball(0.3)).position(3.0, 4.0, 0.0));
         world.bodies[5].torque = Vec3::ONE * 0.3 * torque;
-        world.join(BallJoint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
+        world.join(Joint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
         world
     };
     let mut all = world(Vec3::Y * -9.81, 0.0);
@@ -286,7 +286,7 @@ fn a_world_is_the_same_alone_and_beside_one_of_other_gravity() {
             alone.add(all.bodies[i].clone());
         }
         let first = own[0];
-        alone.join(BallJoint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
+        alone.join(Joint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
         let mut simulation = simulation(alone, reference);
         run(&mut simulation, 40);
         assert_eq!(bits(&simulation.world, 0..own.len()), bits(&beside, own), "world {part} from {first} on");
@@ -411,9 +411,9 @@ fn joints_bear_the_gravity_that_their_bodies_feel() {
         for k in 0..3 {
             world.add(cube().position(0.0, -2.0 * k as f32, 0.0).gravity_scale(scale));
         }
-        world.join(BallJoint::to_world(0, Vec3::Y, Vec3::Y));
-        world.join(BallJoint::new(0, Vec3::NEG_Y, 1, Vec3::Y));
-        world.join(BallJoint::new(1, Vec3::NEG_Y, 2, Vec3::Y));
+        world.join(Joint::to_world(0, Vec3::Y, Vec3::Y));
+        world.join(Joint::new(0, Vec3::NEG_Y, 1, Vec3::Y));
+        world.join(Joint::new(1, Vec3::NEG_Y, 2, Vec3::Y));
         let mut simulation = simulation(world, reference);
         let first = simulation.step(DT).expect("a step").swept_joint_gap;
         // A change between steps counts as well.

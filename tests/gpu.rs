@@ -10,6 +10,7 @@ mod settings;
 use common::difference::of_velocities;
 use common::gpu;
 use common::tolerance;
+use drystone::config::Method;
 use drystone::glam::Vec3;
 use drystone::stages::backend::{CheckedStep, crossover};
 use drystone::stages::compare::{Difference, compare};
@@ -18,7 +19,7 @@ use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
-    Backend, BallJoint, Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+    Backend, Body, Cpu, Error, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
 use settings::set;
 
@@ -30,6 +31,7 @@ tests! {
         several_efforts_have_the_bits_of_the_reference_in_exact_mode,
         friction_per_manifold_without_friction_has_the_bits_of_the_reference,
         a_small_world_in_one_dispatch_has_the_bits_of_the_reference,
+        joints_with_axes_have_the_bits_of_the_reference,
     }
     exact_and_timed_gpu {
         kernels_that_are_timed_have_the_bits_of_the_reference,
@@ -106,8 +108,8 @@ fn mixture() -> Scene {
         let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.1)).position(10.0, 8.0 - 0.5 * i as f32, 0.0);
         let link = scene.world.add(link.velocity(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
         scene.world.join(match above {
-            None => BallJoint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
-            Some(above) => BallJoint::new(above, -end, link, end),
+            None => Joint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
+            Some(above) => Joint::new(above, -end, link, end),
         });
         above = Some(link);
     }
@@ -286,6 +288,20 @@ fn a_small_world_in_one_dispatch_has_the_bits_of_the_reference() {
         let scene = Scene::find(name, &[]).expect("a scene of the catalogue");
         assert_same(&scene, &SolverConfig::default().without_sleep(), 30, name);
     }
+}
+
+/// Hinges, ropes with winches, springs, limits and motors; with contacts, and in sweeps that end early or gain momentum.
+fn joints_with_axes_have_the_bits_of_the_reference() {
+    let config = SolverConfig::default().without_sleep();
+    for name in ["four-bar", "drawbridge", "car", "ragdoll"] {
+        let scene = Scene::find(name, &[]).expect("a scene of the catalogue");
+        assert_same(&scene, &config, 40, name);
+    }
+    let scene = Scene::find("ragdoll", &["n=3".into()]).expect("a scene of the catalogue");
+    let accelerated = config.clone().with(|c| (c.method, c.iterations, c.relax) = (Method::Accelerated, 4, 4));
+    assert_same(&scene, &accelerated, 15, "ragdolls with momentum");
+    let measured = config.with(|c| (c.tolerance, c.iterations) = (1e-3, 6));
+    assert_same(&scene, &measured, 15, "ragdolls with a tolerance");
 }
 
 /// The kernels of the mixture, each in dispatches of its own because they are timed.

@@ -5,7 +5,7 @@ mod common;
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::{BallJoint, Body, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
 
 use common::Open;
 
@@ -32,7 +32,7 @@ fn rod_period(dt: f32, open: Open) -> f64 {
     let rod = Body::dynamic().shape(Shape::cuboid(0.01, 0.5, 0.01)).rotation(turn);
     let center = turn * Vec3::new(0.0, -0.5, 0.0);
     let rod = world.add(rod.position(center.x, center.y, center.z));
-    world.join(BallJoint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    world.join(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
     let (mut crossings, mut before) = (Vec::new(), center.x);
     for step in 1.. {
@@ -69,8 +69,8 @@ fn every_joint_of_a_hanging_chain_carries_what_hangs_on_it(open: Open) {
         let link = world.add(link.position(0.0, -0.25 - 0.5 * i as f32, 0.0));
         let top = Vec3::new(0.0, 0.25, 0.0);
         match above {
-            None => world.join(BallJoint::to_world(link, top, Vec3::ZERO)),
-            Some(a) => world.join(BallJoint::new(a, -top, link, top)),
+            None => world.join(Joint::to_world(link, top, Vec3::ZERO)),
+            Some(a) => world.join(Joint::new(a, -top, link, top)),
         };
         above = Some(link);
     }
@@ -102,7 +102,7 @@ fn tied_bodies_pass_through_each_other_unless_asked_not_to(open: Open) {
         let cube = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
         let a = world.add(cube());
         let b = world.add(cube().position(0.9, 0.0, 0.0));
-        let mut joint = BallJoint::new(a, Vec3::new(0.45, 0.0, 0.0), b, Vec3::new(-0.45, 0.0, 0.0));
+        let mut joint = Joint::new(a, Vec3::new(0.45, 0.0, 0.0), b, Vec3::new(-0.45, 0.0, 0.0));
         joint.collide = collide;
         world.join(joint);
         let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);

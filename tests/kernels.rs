@@ -47,6 +47,7 @@ const MEASURED: Rules = Rules {
     measured: true,
     from_start: false,
     isotropic: false,
+    axes: false,
 };
 
 const SEEDS: std::ops::Range<u64> = 0..2;

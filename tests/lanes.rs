@@ -127,7 +127,8 @@ fn joints_have_the_same_bits() {
     for settings in settings {
         for backend in each() {
             same_bits(&against_reference(&backend, "joint-grid", settings, 10, 2));
-            same_bits(&against_reference(backend, "chain", settings, 40, 1));
+            same_bits(&against_reference(&backend, "chain", settings, 40, 1));
+            same_bits(&against_reference(backend, "ragdoll:n=9", settings, 10, 2));
         }
     }
 }
@@ -139,7 +140,7 @@ fn worlds_in_parts_have_the_same_bits() {
         // More worlds than a part holds, one island that is too large for any, joints, driven bodies, spins.
         same_bits(&against_reference(in_parts, "pile:n=20,worlds=300", &[], 40, threads));
         same_bits(&against_reference(in_parts, "pyramid:base=110", &[], 2, threads));
-        for scene in ["chain", "joint-grid", "drum", "drop", "bridge"] {
+        for scene in ["chain", "joint-grid", "drum", "drop", "bridge", "car"] {
             same_bits(&against_reference(in_parts, &format!("{scene}:worlds=30"), &[], 10, threads));
         }
     }

@@ -5,7 +5,7 @@ mod common;
 
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Groups, Reference, Shape, Simulation, SolverConfig, World,
+    Backend, Body, BodyHandle, BodyKind, Cpu, Groups, Joint, Reference, Shape, Simulation, SolverConfig, World,
 };
 
 use common::Open;
@@ -187,9 +187,9 @@ fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(op
     let link = |y: f32| Body::dynamic().shape(Shape::cuboid(0.1, 0.25, 0.1)).position(0.0, y, 0.0);
     let end = 0.25 * Vec3::Y;
     let links: Vec<_> = (0..4).map(|k| world.insert(link(-0.25 - 0.5 * k as f32))).collect();
-    world.join(BallJoint::to_world(links[0].index(), end, Vec3::ZERO));
+    world.join(Joint::to_world(links[0].index(), end, Vec3::ZERO));
     let joints: Vec<_> =
-        links.windows(2).map(|w| world.insert_joint(BallJoint::new(w[0].index(), -end, w[1].index(), end))).collect();
+        links.windows(2).map(|w| world.insert_joint(Joint::new(w[0].index(), -end, w[1].index(), end))).collect();
     let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), open);
     run(&mut simulation, 120);
     let weight = simulation.joint_impulses()[0].y;
@@ -200,7 +200,7 @@ fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(op
     // Two links of four are left on the first joint.
     assert!((simulation.joint_impulses()[0].y / weight - 0.5).abs() < 0.01);
     let new = simulation.world.insert(link(-1.25));
-    simulation.world.join(BallJoint::new(links[1].index(), -end, new.index(), end));
+    simulation.world.join(Joint::new(links[1].index(), -end, new.index(), end));
     run(&mut simulation, 120);
     assert!((simulation.joint_impulses()[0].y / weight - 0.75).abs() < 0.01);
     assert!(simulation.world.joint_gap() < 1e-3);
@@ -295,7 +295,7 @@ fn what_comes_and_goes_has_the_same_bits_everywhere() {
                 3 => world.body_mut(chosen).expect("a cube").kind = BodyKind::Fixed,
                 4 => {
                     let at = world.bodies[chosen.index()].position;
-                    world.join(BallJoint::to_world(chosen.index(), Vec3::ZERO, at + 0.1 * Vec3::X));
+                    world.join(Joint::to_world(chosen.index(), Vec3::ZERO, at + 0.1 * Vec3::X));
                 }
                 _ => world.body_mut(chosen).expect("a cube").groups = Groups { membership: 2, filter: 3 },
             }

@@ -11,7 +11,7 @@ use common::random::Random;
 use drystone::glam::{Quat, Vec3};
 use drystone::queries::Filter;
 use drystone::{
-    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Groups, JointHandle, Material, Reference, Shape, Simulation,
+    Backend, Body, BodyHandle, BodyKind, Cpu, Groups, Joint, JointHandle, Material, Reference, Shape, Simulation,
     SolverConfig, World,
 };
 
@@ -244,7 +244,7 @@ impl Run {
         let place = near.point;
         let other = self.simulation.world.body(near.body).expect("a body");
         let anchor = |body: &Body| body.rotation.inverse() * (place - body.position);
-        let joint = BallJoint::new(handle.index(), anchor(body), near.body.index(), anchor(other));
+        let joint = Joint::new(handle.index(), anchor(body), near.body.index(), anchor(other));
         let joint = self.simulation.world.insert_joint(joint);
         assert!(!self.model.gone_joints.contains(&joint), "{joint:?} was another joint before");
         assert!(self.model.joints.insert(joint, [handle, near.body]).is_none(), "{joint:?} is another joint");

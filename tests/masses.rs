@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use common::Open;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Backend, BallJoint, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
 const G: f64 = 9.81;
 /// [kg]
@@ -39,7 +39,7 @@ fn pendulums(angle: f32) -> World {
         let center = pivot - turn * Vec3::Y;
         let ball = Body::dynamic().shape(Shape::ball(0.1)).total_mass(mass).rotation(turn);
         let ball = world.add(ball.position(center.x, center.y, center.z));
-        world.join(BallJoint::to_world(ball, Vec3::Y, pivot));
+        world.join(Joint::to_world(ball, Vec3::Y, pivot));
     }
     world
 }
@@ -82,8 +82,8 @@ fn a_light_ball_hangs_on_a_heavy_one(open: Open) {
             let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(masses[i]);
             world.add(ball.position(5.0 * k as f32, -0.5 - i as f32, 0.0))
         });
-        world.join(BallJoint::to_world(upper, 0.5 * Vec3::Y, 5.0 * k as f32 * Vec3::X));
-        world.join(BallJoint::new(upper, -0.5 * Vec3::Y, lower, 0.5 * Vec3::Y));
+        world.join(Joint::to_world(upper, 0.5 * Vec3::Y, 5.0 * k as f32 * Vec3::X));
+        world.join(Joint::new(upper, -0.5 * Vec3::Y, lower, 0.5 * Vec3::Y));
     }
     let config = SolverConfig::default();
     let substep = 1.0 / 60.0 / f64::from(config.substeps as f32);
@@ -112,7 +112,7 @@ fn small_balls_swing_at_the_end_of_long_arms(open: Open) {
         let center = -(turn * Vec3::Y);
         let ball = Body::dynamic().shape(Shape::ball(radius)).total_mass(1.0).rotation(turn);
         let ball = world.add(ball.position(center.x, center.y, center.z));
-        world.join(BallJoint::to_world(ball, Vec3::Y, Vec3::ZERO));
+        world.join(Joint::to_world(ball, Vec3::Y, Vec3::ZERO));
         let energy = |world: &World| world.kinetic_energy() + world.potential_energy();
         let before = energy(&world);
         let mut simulation = simulate(world, SolverConfig::default(), open);
@@ -133,9 +133,9 @@ fn a_joint_of_bodies_that_nothing_moves_carries_nothing(open: Open) {
     let board = world.add(Body::kinematic().shape(Shape::ball(0.5)));
     let wall = world.add(Body::fixed().shape(Shape::ball(0.5)).position(3.0, 0.0, 0.0));
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, -1.5, 0.0));
-    world.join(BallJoint::new(board, Vec3::ZERO, wall, Vec3::ZERO));
-    world.join(BallJoint::to_world(board, Vec3::ZERO, Vec3::X));
-    world.join(BallJoint::new(board, Vec3::ZERO, ball, 1.5 * Vec3::Y));
+    world.join(Joint::new(board, Vec3::ZERO, wall, Vec3::ZERO));
+    world.join(Joint::to_world(board, Vec3::ZERO, Vec3::X));
+    world.join(Joint::new(board, Vec3::ZERO, ball, 1.5 * Vec3::Y));
     let mut simulation = simulate(world, SolverConfig::default(), open);
     for _ in 0..3 {
         simulation.step(1.0 / 60.0).expect("a step");

@@ -2,7 +2,7 @@
 
 use drystone::stages::plan::Kernel;
 use drystone::stages::problem::ContactSummary;
-use drystone::{Backend, BallJoint, Body, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
+use drystone::{Backend, Body, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
 use glam::Vec3;
 
 /// The plan of a world's next step and the bytes that its kernels move, and the simulation for what else is of interest.
@@ -162,7 +162,7 @@ fn a_pile_needs_no_more_colors_than_there_are() {
 fn joints_are_swept_before_contacts() {
     use drystone::config::JointSolver;
     let mut world = row(&cube(), 0.5, 0.0);
-    world.join(drystone::BallJoint::new(1, Vec3::X, 2, -Vec3::X));
+    world.join(drystone::Joint::new(1, Vec3::X, 2, -Vec3::X));
     let config = SolverConfig::default().with(|c| {
         c.substeps = 1;
         c.iterations = 2;
@@ -313,8 +313,8 @@ fn one_lies_and_one_hangs() -> World {
     let mut world = row(&cube(), 0.5, 0.0);
     let hung = world.add(Body::dynamic().shape(cube()).position(0.0, 20.0, 0.0));
     let load = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1e8).position(0.0, 17.0, 0.0));
-    world.join(BallJoint::to_world(hung, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, 20.5, 0.0)));
-    world.join(BallJoint::new(hung, Vec3::new(0.0, -0.5, 0.0), load, Vec3::new(0.0, 2.5, 0.0)));
+    world.join(Joint::to_world(hung, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, 20.5, 0.0)));
+    world.join(Joint::new(hung, Vec3::new(0.0, -0.5, 0.0), load, Vec3::new(0.0, 2.5, 0.0)));
     world
 }
 

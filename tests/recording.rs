@@ -3,8 +3,8 @@
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::{
-    Backend, BallJoint, Body, BodyKind, Cpu, Groups, Recorder, RecordingIntervals, Reference, Replay, Result, Scene,
-    Shape, Simulation, SolverConfig, World,
+    Backend, Body, BodyKind, Cpu, Groups, Joint, Recorder, RecordingIntervals, Reference, Replay, Result, Scene, Shape,
+    Simulation, SolverConfig, World,
 };
 
 const DT: f32 = 1.0 / 60.0;
@@ -46,7 +46,7 @@ fn recorded() -> (Vec<u8>, Simulation) {
             15 => world.bodies[7].linear_velocity = Vec3::new(2.0, 1.0, 0.0),
             20 => world.bodies[8].kind = BodyKind::Fixed,
             25 => world.gravity = Vec3::new(1.0, -8.0, 0.0),
-            30 => drop(world.join(BallJoint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
+            30 => drop(world.join(Joint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
             35 => world.bodies[12].groups = Groups { membership: 2, filter: 3 },
             40 => world.bodies[13].colliders[0].shape = Shape::ball(0.5),
             45 => world.bodies[14].force = Vec3::new(0.0, 5e3, 0.0),

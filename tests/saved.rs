@@ -3,7 +3,7 @@
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, BallJoint, Body, BodyHandle, BodyKind, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, StepStats,
+    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepStats,
     World,
 };
 
@@ -184,7 +184,7 @@ fn come_and_go(step: u32, world: &mut World) {
         30 => dynamic_mut(world, 2).colliders[0].shape = Shape::ball(0.45),
         40 => {
             let (a, b) = (world.insert(cube(4.0)), world.insert(cube(5.5)));
-            world.join(BallJoint::new(a.index(), 0.75 * Vec3::X, b.index(), -0.75 * Vec3::X));
+            world.join(Joint::new(a.index(), 0.75 * Vec3::X, b.index(), -0.75 * Vec3::X));
         }
         50 => drop(world.remove(world.bodies.handle(world.joints[0].body_a).expect("a body"))),
         55 => dynamic_mut(world, 3).material.friction = 0.9,
@@ -241,7 +241,7 @@ fn handles_name_the_same_bodies_and_joints_after_loading() {
     let cube = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
     let bodies: Vec<_> =
         (0..4).map(|i| world.insert(cube().position(2.0 * i as f32, 0.0, 0.0).named(format!("cube {i}")))).collect();
-    let joints = [0, 1].map(|i| world.insert_joint(BallJoint::new(i, Vec3::X, i + 1, -Vec3::X)));
+    let joints = [0, 1].map(|i| world.insert_joint(Joint::new(i, Vec3::X, i + 1, -Vec3::X)));
     world.remove_joint(joints[0]);
     world.remove(bodies[3]);
     let mut simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");

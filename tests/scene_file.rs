@@ -414,9 +414,12 @@ fn the_schema_describes_every_key() {
     assert_eq!(keys(&schema["$defs"]["Groups"]), "filter membership");
     assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
-    let ball = &schema["$defs"]["JointFile"]["oneOf"][0];
-    assert_eq!(keys(ball), "anchor anchors bodies collide type");
-    assert_eq!((&ball["required"], &ball["additionalProperties"]), (&json!(["type", "bodies"]), &json!(false)));
+    let joint = &schema["$defs"]["JointFile"];
+    assert_eq!(keys(joint), "anchor anchors bodies collide");
+    assert_eq!((&joint["required"], &joint["unevaluatedProperties"]), (&json!(["bodies"]), &json!(false)));
+    let kinds = joint["oneOf"].as_array().expect("kinds").iter();
+    let kinds: Vec<_> = kinds.map(|kind| kind["properties"]["type"]["const"].clone()).collect();
+    assert_eq!(kinds, ["ball", "fixed", "hinge", "slider", "distance", "generic"]);
     let types: Vec<_> = every_shape().iter().map(|s| s["type"].clone()).collect();
     let described: Vec<_> = schema["$defs"]["ShapeFile"]["oneOf"].as_array().expect("shapes").iter().collect();
     assert_eq!(described.iter().map(|s| s["properties"]["type"]["const"].clone()).collect::<Vec<_>>(), types);

@@ -25,12 +25,14 @@ fn parsed(source: &str) -> naga::Module {
 }
 
 /// Kernels whose colors are swept one after another.
-fn swept() -> [Kernel; 5] {
+fn swept() -> [Kernel; 7] {
     [
         Kernel::SolveContacts(Rules::default()),
         Kernel::SolveJoints(Rules::default()),
         Kernel::WarmStart(Rules::default()),
-        Kernel::WarmStartJoints,
+        Kernel::SolveJoints(Rules { axes: true, ..Rules::default() }),
+        Kernel::WarmStartJoints { axes: false },
+        Kernel::WarmStartJoints { axes: true },
         Kernel::ApplyRestitution(Rules::default()),
     ]
 }

@@ -1,6 +1,6 @@
 //! What lies still sleeps, stays where it is, costs nothing, and wakes when it is disturbed.
 
-use drystone::{BallJoint, Body, Cpu, Scene, Shape, Simulation, SolverConfig, StepStats, World};
+use drystone::{Body, Cpu, Joint, Scene, Shape, Simulation, SolverConfig, StepStats, World};
 use glam::{Quat, Vec3};
 
 const DT: f32 = 1.0 / 60.0;
@@ -171,11 +171,11 @@ fn a_chain_sleeps_and_wakes_as_a_whole() {
     let mut world = World::new();
     let link = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, 0.0);
     let first = world.add(link(-0.5));
-    world.join(BallJoint::to_world(first, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    world.join(Joint::to_world(first, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let mut last = first;
     for k in 1..4 {
         let next = world.add(link(-0.5 - k as f32));
-        world.join(BallJoint::new(last, Vec3::new(0.0, -0.5, 0.0), next, Vec3::new(0.0, 0.5, 0.0)));
+        world.join(Joint::new(last, Vec3::new(0.0, -0.5, 0.0), next, Vec3::new(0.0, 0.5, 0.0)));
         last = next;
     }
     // Beside it a body that stays awake, so that steps go on.

@@ -1,7 +1,7 @@
 //! Worlds that no step can be made of are refused, by name and in one line.
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{BallJoint, Body, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
 fn cube() -> Body {
     Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).named("cube")
@@ -83,11 +83,11 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             w.add(Body::kinematic().shape(Shape::half_space(Vec3::Y)));
         }),
         ("joint 0: names", |w| {
-            w.join(BallJoint::new(1, Vec3::ZERO, 0, Vec3::ZERO));
+            w.join(Joint::new(1, Vec3::ZERO, 0, Vec3::ZERO));
             w.joints[0].body_b = Some(7);
         }),
         ("joint 0: ties", |w| {
-            w.join(BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
+            w.join(Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
         }),
     ];
     for (start, change) in cases {

@@ -27,7 +27,13 @@ struct Point {
     tangent_mass: f32, approach_velocity: f32, slip_1: f32, slip_2: f32,
 }
 
-struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f }
+struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f, is_loose: f32, first_axis: u32, axis_count: u32 }
+
+struct Axis {
+    direction: vec3f, is_linear: f32,
+    gap: f32, range: f32, speed: f32, max_impulse: f32,
+    rate: f32, mass_scale: f32, impulse_scale: f32, length: f32,
+}
 
 struct JointImpulse { linear: vec3f }
 
@@ -57,6 +63,7 @@ struct Softness { bias_rate: f32, mass_scale: f32, impulse_scale: f32, push_limi
 struct Params {
     restitution_threshold: f32, slop: f32, relaxation: f32, tolerance: f32,
     body_count: u32, point_count: u32, joint_count: u32, patches: u32,
+    axis_count: u32,
 }
 
 // What one dispatch sweeps: colors, one after another, with the substep of their block. The buffer `colors` holds where each color begins,

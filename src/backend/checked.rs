@@ -51,7 +51,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
                 (contacts, Some(rules.patch))
             }
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => (contacts, None),
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => (joints, None),
+            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => (joints, None),
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
             Kernel::IntegrateVelocities { .. }
             | Kernel::BeginChanges

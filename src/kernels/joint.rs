@@ -1,7 +1,8 @@
-//! One ball joint: the anchors of two bodies stay together. Doubles of `shaders/lib/joint.wgsl` and of the kernels
+//! One joint: the anchors of two bodies stay together, unless axes guide them. Doubles of `shaders/lib/joint.wgsl` and of the kernels
 //! `warm_start_joints` and `solve_joints`.
 
 use super::Rules;
+use super::axis::select3;
 use super::pair::{apply_impulse, note_correction, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
@@ -94,7 +95,10 @@ pub fn solve_joint<L: Lane>(
         impulse_scale = params.joint.impulse_scale;
     }
     let correction = solve_block(x, y, z, wanted) * mass_scale + before * impulse_scale;
-    let change = correction * -params.relaxation;
+    let mut change = correction * -params.relaxation;
+    if rules.axes {
+        change = select3(change, Vec3::default(), joint.is_loose.gt(zero));
+    }
     *impulse = before + change;
     if rules.measured {
         note_correction(rules, params, pair, change.x, reciprocal(x.x));

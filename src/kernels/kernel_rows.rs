@@ -1,6 +1,6 @@
 //! A whole problem as the kernels see it.
 
-use super::rows::{Body, Contact, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
+use super::rows::{Axis, Body, Contact, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::problem::StepProblem;
 
@@ -27,7 +27,9 @@ pub struct KernelRows<S> {
     pub totals: Vec<Impulse<S>>,
     /// Joints.
     pub joints: Vec<Joint<S>>,
-    /// Impulses of the joints.
+    /// Their axes.
+    pub axes: Vec<Axis<S>>,
+    /// Impulses of the joints, then of their axes.
     pub joint_impulses: Vec<Vec3<S>>,
     /// How far the sweeps extrapolate.
     pub momentum: Momentum<S>,
@@ -50,6 +52,7 @@ impl<S: Scalar> KernelRows<S> {
         refill(&problem.impulses, &mut self.impulses, Impulse::load);
         refill(&problem.totals, &mut self.totals, Impulse::load);
         refill(&problem.joints, &mut self.joints, Joint::load);
+        refill(&problem.axes, &mut self.axes, Axis::load);
         refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
         self.momentum = Momentum::load(&problem.momentum);
     }

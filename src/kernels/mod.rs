@@ -4,6 +4,7 @@
 //! constraints. `integrate` holds the doubles of kernels over bodies, `convergence` and `momentum` those between sweeps. Branches on
 //! data are `select`s; branches on rules are plain `if`s, here and in WGSL.
 
+pub mod axis;
 pub mod contact;
 pub mod convergence;
 pub mod friction;
@@ -17,8 +18,8 @@ mod rows;
 
 pub use kernel_rows::KernelRows;
 pub use rows::{
-    Body, Contact, Free, Impulse, ImpulseStep, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf, StepParams,
-    Sym3,
+    Axis, Body, Contact, Free, Impulse, ImpulseStep, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf,
+    StepParams, Sym3,
 };
 
 use crate::config::FrictionRule;
@@ -49,6 +50,8 @@ pub struct Rules {
     pub from_start: bool,
     /// Whether every body that can move has the same moment of inertia about all axes.
     pub isotropic: bool,
+    /// Whether joints have axes. Shaders with and without them are made of different files.
+    pub axes: bool,
 }
 
 impl Default for Rules {
@@ -66,6 +69,7 @@ impl Default for Rules {
             measured: false,
             from_start: false,
             isotropic: false,
+            axes: false,
         }
     }
 }
@@ -78,7 +82,8 @@ impl Rules {
 
     /// The rules of joints.
     pub fn of_joints(self) -> Self {
-        Self { biased: self.biased, measured: self.measured, from_start: self.from_start, ..Self::default() }
+        let Self { biased, measured, from_start, axes, .. } = self;
+        Self { biased, measured, from_start, axes, ..Self::default() }
     }
 
     /// How many of a manifold's rows are contact points; the patch is not.

@@ -2,7 +2,8 @@
 
 use crate::math::{Lane, Quat, Scalar, Vec3};
 use crate::problem::{
-    BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness, Substep,
+    AxisRow, BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness,
+    Substep,
 };
 pub use crate::problem::{Mass, Sym3};
 
@@ -92,6 +93,34 @@ pub struct Joint<L> {
     pub r_b: Vec3<L>,
     /// Anchor of b less anchor of a when the step begins.
     pub gap: Vec3<L>,
+    /// 1 if the anchors need not coincide.
+    pub is_loose: L,
+}
+
+/// Double of the WGSL struct `Axis`; in the order of `AxisRow`, as the lanes have it in memory.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Axis<L> {
+    /// Direction when the step begins.
+    pub direction: Vec3<L>,
+    /// 1 to shift along it, 0 to turn about it.
+    pub is_linear: L,
+    /// Where a is when the step begins.
+    pub gap: L,
+    /// How far the upper limit is above the lower one; -1 without limits.
+    pub range: L,
+    /// The speed of its motor.
+    pub speed: L,
+    /// The largest impulse of a substep.
+    pub max_impulse: L,
+    /// The speed that its spring gives in a substep by gap.
+    pub rate: L,
+    /// The share of the speed that a drive takes away.
+    pub mass_scale: L,
+    /// The share of its impulse that a spring gives back.
+    pub impulse_scale: L,
+    /// The distance of the anchors when the step begins, if the axis joins them.
+    pub length: L,
 }
 
 /// Double of the WGSL struct `Impulse`, in its order.
@@ -216,7 +245,10 @@ stored! {
         Vec3: r_a, r_b; [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2]
     }
     Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
-    Joint as JointRow { Vec3: r_a, r_b, gap; [] }
+    Joint as JointRow { Vec3: r_a, r_b, gap; [is_loose] }
+    Axis as AxisRow {
+        Vec3: direction; [is_linear, gap, range, speed, max_impulse, rate, mass_scale, impulse_scale, length]
+    }
     Momentum as MomentumRow { [t, factor, square] restarts }
 }
 

@@ -6,8 +6,8 @@ use super::{Kernel, Pass, StepPlan};
 use crate::config::FrictionRule;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
-    BodyRow, ContactRow, ContactSummary, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
-    MassRow, PointRow, StepProblem, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ContactSummary, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
+    JointRow, MassRow, PointRow, StepProblem, TorqueRow, TurningRow,
 };
 
 impl StepPlan {
@@ -33,6 +33,10 @@ impl Pass {
         let start = if self.kernel.reads_start() { 2 * size_of::<FreeRow>() } else { 0 };
         let pair = 2 * (BODY + MASS + VELOCITIES) + start;
         const IMPULSE: usize = size_of::<ImpulseRow>();
+        const JOINT: usize = size_of::<JointRow>();
+        const AXIS: usize = size_of::<AxisRow>();
+        let axes =
+            |rows: &[u32]| rows.iter().map(|&row| problem.joints[row as usize].axis_count as usize).sum::<usize>();
         let rows = problem.rows_of(&self.colors);
         let points_of = |colors: &Range<u32>| {
             let [first, end] = [colors.start, colors.end].map(|color| contacts.points[color as usize]);
@@ -61,10 +65,9 @@ impl Pass {
             Kernel::UpdateMomentum => {
                 problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * size_of::<StepLength<f32>>()
             }
-            Kernel::MeasureJoints(_) | Kernel::WarmStartJoints | Kernel::ApplyJointChanges(_) => {
-                rows.len() * (pair + size_of::<JointRow>() + size_of::<JointImpulseRow>())
-            }
-            Kernel::SolveJoints(_) => rows.len() * (pair + size_of::<JointRow>() + 2 * size_of::<JointImpulseRow>()),
+            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => rows.len() * (pair + JOINT + IMPULSE),
+            Kernel::WarmStartJoints { .. } => rows.len() * (pair + JOINT + IMPULSE) + axes(rows) * (AXIS + IMPULSE),
+            Kernel::SolveJoints(_) => rows.len() * (pair + JOINT + 2 * IMPULSE) + axes(rows) * (AXIS + 2 * IMPULSE),
             Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => {
                 let patches = if problem.has_patches() { rows.len() } else { 0 };

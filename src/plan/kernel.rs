@@ -42,7 +42,10 @@ pub enum Kernel {
     /// Factors the joints that are solved at once; over systems.
     FactorJoints,
     /// Impulses that the joints carry; over joint colors.
-    WarmStartJoints,
+    WarmStartJoints {
+        /// Whether joints have axes.
+        axes: bool,
+    },
     /// Impulses that the manifolds carry; over contact colors.
     WarmStart(Rules),
     /// Counts a sweep, and decides whether it is still needed; `first` of its kind in a substep always is.
@@ -93,7 +96,7 @@ impl Kernel {
             Self::SumImpulses { .. } => "sum_impulses",
             Self::TurnInertias => "turn_inertias",
             Self::FactorJoints => "factor_joints",
-            Self::WarmStartJoints => "warm_start_joints",
+            Self::WarmStartJoints { .. } => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
             Self::BeginSweep { .. } => "begin_sweep",
             Self::Extrapolate { .. } => "extrapolate",

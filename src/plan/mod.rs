@@ -66,9 +66,11 @@ pub(crate) struct PlanKey {
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
+    /// Whether joints have axes.
+    axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, isotropic, has_torques });
+crate::saved::cloned!(PlanKey { colors, blocks, totals, isotropic, has_torques, axes });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -77,14 +79,21 @@ impl PlanKey {
             && self.colors == problem.colors
             && self.has_torques != problem.torques.is_empty()
             && self.totals != problem.totals.is_empty()
+            && self.axes != problem.axes.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// That of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
-        let (has_torques, totals) = (!problem.torques.is_empty(), !problem.totals.is_empty());
-        Self { colors: problem.colors.clone(), blocks: problem.blocks.clone(), totals, isotropic, has_torques }
+        Self {
+            colors: problem.colors.clone(),
+            blocks: problem.blocks.clone(),
+            totals: !problem.totals.is_empty(),
+            isotropic,
+            has_torques: !problem.torques.is_empty(),
+            axes: !problem.axes.is_empty(),
+        }
     }
 }
 
@@ -119,6 +128,7 @@ impl StepPlan {
             biased: false,
             from_start: false,
             isotropic: false,
+            axes: !problem.axes.is_empty(),
         };
         let bounces = contacts.restitution;
         let mut plan = Self::default();
@@ -187,8 +197,8 @@ impl StepPlan {
                 self.over_colors(Kernel::IntegrateTorques { from_start }, block, bodies);
             }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
-            self.over_colors(Kernel::WarmStartJoints, block, &joints);
-            self.over_colors(Kernel::WarmStartJoints, block, &direct);
+            self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
+            self.over_colors(Kernel::WarmStartJoints { axes: false }, block, &direct);
             if warm_start {
                 // Done already.
             } else if shared.accumulated {
@@ -226,6 +236,7 @@ impl StepPlan {
             friction: if friction { FrictionRule::Disc } else { FrictionRule::None },
             driven: driven && friction,
             passes,
+            axes: !problem.axes.is_empty(),
             ..Rules::default()
         };
         let contacts = color_groups(&problem.colors, problem.contact_colors(), FUSE_BELOW);
@@ -267,13 +278,14 @@ impl StepPlan {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
             if let [first, ..] = sweeps.direct {
-                let rules = rules.of_joints();
+                let rules = Rules { axes: false, ..rules.of_joints() };
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
                 self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
                 self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
             }
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
+            let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);

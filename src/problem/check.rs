@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use super::StepProblem;
+use super::rows::{JointRow, MOST_AXES};
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 
@@ -22,6 +23,7 @@ impl StepProblem {
         self.check_order()?;
         self.check_bodies()?;
         self.check_points()?;
+        self.check_axes()?;
         self.check_systems()?;
         self.check_colors()
     }
@@ -61,10 +63,11 @@ impl StepProblem {
             ("masses", self.masses.len(), self.bodies.len(), "bodies"),
             ("impulses", self.impulses.len(), self.points.len(), "points"),
             ("totals", self.totals.len(), totals, "points"),
-            ("joint_impulses", self.joint_impulses.len(), self.joints.len(), "joints"),
+            ("joint_impulses", self.joint_impulses.len(), self.joints.len() + self.axes.len(), "joints and axes"),
             ("params.body_count", params.body_count as usize, self.bodies.len(), "bodies"),
             ("params.point_count", params.point_count as usize, self.points.len(), "points"),
             ("params.joint_count", params.joint_count as usize, self.joints.len(), "joints"),
+            ("params.axis_count", params.axis_count as usize, self.axes.len(), "axes"),
         ] {
             if rows != wanted {
                 return refuse(format_args!("{name}: {rows}, but {wanted} {of}"));
@@ -123,6 +126,29 @@ impl StepProblem {
                 return refuse(format_args!(
                     "contacts[{row}].first_point = {first}: points of contacts[{other}] are there"
                 ));
+            }
+            own.fill(row);
+        }
+        Ok(())
+    }
+
+    /// The joints that take part have axes of their own.
+    fn check_axes(&self) -> Result<()> {
+        let mut owner = vec![u32::MAX; self.axes.len()];
+        for &row in self.rows_of(&self.joint_colors()) {
+            let JointRow { first_axis, axis_count, .. } = self.joints[row as usize];
+            if axis_count as usize > MOST_AXES {
+                return refuse(format_args!("joints[{row}].axis_count = {axis_count}: must be at most {MOST_AXES}"));
+            }
+            let (first, end) = (first_axis as usize, first_axis as usize + axis_count as usize);
+            let Some(own) = owner.get_mut(first..end) else {
+                let axes = self.axes.len();
+                return refuse(format_args!(
+                    "joints[{row}].first_axis = {first}: {axis_count} axes from there, but there are {axes}"
+                ));
+            };
+            if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
+                return refuse(format_args!("joints[{row}].first_axis = {first}: axes of joints[{other}] are there"));
             }
             own.fill(row);
         }

@@ -1,10 +1,11 @@
-//! The rows of joints: one for each joint of the world, in its order. An impulse stays in its row.
+//! The rows of joints: one for each joint of the world, in its order, and those of their axes. An impulse stays in its row.
 
 use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
 
 use glam::Vec3;
 
+use super::axes;
 use super::joint_loads::borne_masses;
 use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, TorqueRow};
@@ -12,12 +13,12 @@ use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{BallJoint, BodyKind, JointHandle, World};
+use crate::world::{BodyKind, Bounds, Joint, JointHandle, Linear, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Debug, Default)]
 pub struct JointRows {
-    joints: Vec<BallJoint>,
+    joints: Vec<Joint>,
     handles: Vec<JointHandle>,
     /// The joints as edges of their graph.
     edges: Vec<Edge>,
@@ -121,7 +122,9 @@ impl JointRows {
                 _ => usize::MAX,
             };
             let system = problem.systems.len() as u32;
-            if problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
+            // Axes are swept, and the anchors of their joints with them.
+            let are_balls = joints.iter().all(|&joint| self.joints[joint as usize].is_ball());
+            if are_balls && problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
                 joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
             } else {
                 let need = SWING * gap / config.max_joint_gap_share;
@@ -143,8 +146,15 @@ impl JointRows {
         let mass = |body: u32| world.bodies[body as usize].mass.mass;
         let weight = |body: u32| mass(body) * world.bodies[body as usize].gravity_scale.abs();
         let omega = TAU * config.joint_frequency / substep;
+        let bears = |joint: &Joint| match &joint.linear {
+            Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
+            Linear::Distance(distance) => distance.bounds != Bounds::Free,
+        };
         let gap = |(&joint, borne): (&u32, f32)| {
-            let BallJoint { body_a, body_b, .. } = self.joints[joint as usize];
+            if !bears(&self.joints[joint as usize]) {
+                return 0.0;
+            }
+            let Joint { body_a, body_b, .. } = self.joints[joint as usize];
             let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
             let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
             let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
@@ -164,18 +174,17 @@ impl JointRows {
     /// Takes over the joints of the world; returns those that began, ended or changed.
     ///
     /// A joint keeps impulse and color wherever it stands in the list, and if its anchors move, but not if it ties other bodies.
-    pub fn follow(&mut self, world: &World, problem: &mut StepProblem) -> Vec<BallJoint> {
+    pub fn follow(&mut self, world: &World, problem: &mut StepProblem) -> Vec<Joint> {
         let (before, now) = (std::mem::take(&mut self.joints), &world.joints);
         let place_of: HashMap<JointHandle, usize> = self.handles.drain(..).zip(0..).collect();
         self.handles.extend_from_slice(now.handles());
         let same_bodies =
-            |joint: &BallJoint, i: usize| (before[i].body_a, before[i].body_b) == (joint.body_a, joint.body_b);
-        let from = |(joint, handle): (&BallJoint, &JointHandle)| {
-            place_of.get(handle).copied().filter(|&i| same_bodies(joint, i))
-        };
+            |joint: &Joint, i: usize| (before[i].body_a, before[i].body_b) == (joint.body_a, joint.body_b);
+        let from =
+            |(joint, handle): (&Joint, &JointHandle)| place_of.get(handle).copied().filter(|&i| same_bodies(joint, i));
         let from: Vec<Option<usize>> = now.iter().zip(now.handles()).map(from).collect();
         let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
-        let edge = |(joint, from): (&BallJoint, &Option<usize>)| Edge {
+        let edge = |(joint, from): (&Joint, &Option<usize>)| Edge {
             a: movable(joint.body_a),
             b: joint.body_b.map_or(IMMOVABLE, movable),
             color: from.and_then(|i| self.edges[i].color),
@@ -185,9 +194,16 @@ impl JointRows {
         self.is_colored &= edges == self.edges;
         self.chosen_for = None;
         self.edges = edges;
-        let impulse =
-            |from: &Option<usize>| from.and_then(|i| problem.joint_impulses.get(i).copied()).unwrap_or_default();
+        let old = std::mem::take(&mut problem.joint_impulses);
+        let impulse = |from: &Option<usize>| from.and_then(|i| old.get(i).copied()).unwrap_or_default();
         problem.joint_impulses = from.iter().map(impulse).collect();
+        // Impulses of axes follow if the joint has the same axes as before.
+        let firsts: Vec<usize> = first_axes(&before).collect();
+        for (joint, from) in now.iter().zip(&from) {
+            let same = from.filter(|&i| axes::kinds(&before[i]).eq(axes::kinds(joint)));
+            let axis = |k: usize| same.and_then(|i| old.get(before.len() + firsts[i] + k).copied()).unwrap_or_default();
+            problem.joint_impulses.extend((0..axes::kinds(joint).count()).map(axis));
+        }
         self.shares = from.iter().map(|from| from.map_or(0.0, |i| self.shares[i])).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);
@@ -235,16 +251,18 @@ impl JointRows {
     /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class 0 (s).
     pub fn write(&mut self, world: &World, asleep: &[bool], effort: &Effort, substep: f32, problem: &mut StepProblem) {
         problem.joints.clear();
+        problem.axes.clear();
         problem.turning.clear();
-        problem.joint_impulses.resize(world.joints.len(), JointImpulseRow::default());
         problem.params.joint_count = world.joints.len() as u32;
         if world.joints.is_empty() {
             return;
         }
         let world_row = world.bodies.len() as u32;
-        let rows = world.joints.iter().zip(&mut problem.joint_impulses).zip(&mut self.shares);
+        let (impulses, axis_impulses) = problem.joint_impulses.split_at_mut(world.joints.len());
+        let rows = world.joints.iter().zip(impulses).zip(&mut self.shares);
+        let axes = &mut problem.axes;
         problem.joints.extend(rows.map(|((joint, impulse), share_before)| {
-            let [anchor_a, anchor_b] = world.anchors(joint);
+            let [anchor_a, mut anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
             let is_movable = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
             let share = effort.share(joint.body_b.filter(|&b| is_movable(b)).unwrap_or(joint.body_a));
@@ -252,7 +270,23 @@ impl JointRows {
             if before != share && before > 0.0 {
                 impulse.linear = impulse.linear.map(|x| x * (share / before));
             }
+            let first_axis = axes.len();
+            if !joint.is_ball() {
+                axes::write(joint, &world.joint_motion(joint), substep * share, axes);
+                if before != share && before > 0.0 {
+                    for impulse in &mut axis_impulses[first_axis..axes.len()] {
+                        impulse.linear[0] *= share / before;
+                    }
+                }
+            }
+            let is_loose = !joint.holds_anchors();
+            if is_loose {
+                (*impulse, anchor_b) = (JointImpulseRow::default(), anchor_a);
+            }
             JointRow {
+                is_loose: if is_loose { 1.0 } else { 0.0 },
+                first_axis: first_axis as u32,
+                axis_count: (axes.len() - first_axis) as u32,
                 r_a: arm(joint.body_a, anchor_a),
                 body_a: joint.body_a as u32,
                 r_b: joint.body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
@@ -261,6 +295,7 @@ impl JointRows {
                 ..JointRow::default()
             }
         }));
+        problem.params.axis_count = problem.axes.len() as u32;
         let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
         let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
         lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
@@ -274,6 +309,15 @@ impl JointRows {
             problem.params.body_count += 1;
         }
     }
+}
+
+/// Where the axes of each joint begin.
+fn first_axes(joints: &[Joint]) -> impl Iterator<Item = usize> {
+    joints.iter().scan(0, |next, joint| {
+        let first = *next;
+        *next += axes::kinds(joint).count();
+        Some(first)
+    })
 }
 
 /// Whether a joint of the world is swept. A joint holds bodies of one island, which are asleep together; one of two bodies that nothing moves

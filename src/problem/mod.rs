@@ -1,6 +1,7 @@
 //! One step as a value: plain rows, whose names are the names of the WGSL bindings.
 
 pub(crate) mod arithmetic;
+mod axes;
 mod blocks;
 mod bodies;
 pub mod carry;
@@ -30,13 +31,15 @@ pub use joints::JointRows;
 pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
-    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
+    MOST_AXES, MassRow, MomentumRow, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
 };
 pub use summary::ContactSummary;
 pub use touching::{Approach, ColliderPair};
 
 use std::ops::Range;
+
+use glam::Vec3;
 
 use crate::error::Result;
 use crate::saved::{Archive, Saved};
@@ -65,9 +68,11 @@ pub struct StepProblem {
     pub totals: Vec<ImpulseRow>,
     /// How deep the bodies of each manifold sag at rest under what it bore in the step before, face to face (m).
     pub sags: Vec<f32>,
-    /// Ball joints. Only those in `order` take part.
+    /// Joints. Only those in `order` take part.
     pub joints: Vec<JointRow>,
-    /// Impulses of the joints.
+    /// Axes of joints; empty where all are ball joints.
+    pub axes: Vec<AxisRow>,
+    /// Impulses of the joints, then of the axes.
     pub joint_impulses: Vec<JointImpulseRow>,
     /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, the rows of unequal
     /// moments of inertia, the systems of joints that take part, and the rows of turning inertia.
@@ -98,6 +103,7 @@ crate::saved::cloned!(StepProblem {
     totals,
     sags,
     joints,
+    axes,
     joint_impulses,
     order,
     colors,
@@ -127,6 +133,7 @@ impl Saved for StepProblem {
             totals: _,
             sags: _,
             joints: _,
+            axes: _,
             joint_impulses,
             order: _,
             colors: _,
@@ -218,7 +225,17 @@ impl StepProblem {
         self.params.patches != 0
     }
 
-    /// Number of impulses, those of patches and joints included.
+    /// The impulse on body b of those axes of a joint that shift it, or turn it.
+    pub(crate) fn axis_impulse(&self, joint: usize, is_linear: bool) -> Vec3 {
+        let JointRow { first_axis, axis_count, .. } = self.joints[joint];
+        let own = first_axis as usize..(first_axis + axis_count) as usize;
+        let impulses = &self.joint_impulses[self.joints.len()..];
+        let rows = self.axes[own.clone()].iter().zip(&impulses[own]);
+        let wanted = rows.filter(|(axis, _)| (axis.is_linear > 0.0) == is_linear);
+        wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()
+    }
+
+    /// Number of impulses, those of patches, joints and their axes included.
     pub fn impulse_count(&self) -> usize {
         self.impulses.len() + self.joint_impulses.len()
     }

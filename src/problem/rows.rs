@@ -206,7 +206,7 @@ pub struct TurningRow {
     pub pad: f32,
 }
 
-/// One ball joint: the anchors of two bodies coincide, 48 B.
+/// One joint: the anchors of two bodies coincide, or axes guide them, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct JointRow {
@@ -220,8 +220,45 @@ pub struct JointRow {
     pub body_b: u32,
     /// Anchor of b less anchor of a when the step begins (m).
     pub gap: [f32; 3],
+    /// 1 if the anchors need not coincide. The arm of b then ends at the anchor of a.
+    pub is_loose: f32,
+    /// Where its axes begin in `axes`.
+    pub first_axis: u32,
+    /// How many axes it has, up to [`MOST_AXES`].
+    pub axis_count: u32,
     #[doc(hidden)]
-    pub pad: f32,
+    pub pad: [u32; 2],
+}
+
+/// Most rows of axes of one joint: each of its six axes may have bounds and a drive.
+pub const MOST_AXES: usize = 12;
+
+/// One axis of a joint along which or about which body a is held, limited or driven against body b, 48 B. Its impulse, on a, is the first
+/// number of a row of `joint_impulses`; those rows follow the rows of all joints.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct AxisRow {
+    /// Direction when the step begins, world axes; it turns with b. Of unit length, or a little longer for the angle about a first axis that
+    /// is turned aside.
+    pub direction: [f32; 3],
+    /// 1 to shift along it, 0 to turn about it.
+    pub is_linear: f32,
+    /// Where a is when the step begins: above its lower limit, or beyond the place where it is to be (m, rad).
+    pub gap: f32,
+    /// How far the upper limit is above the lower one (m, rad); -1 without limits.
+    pub range: f32,
+    /// The speed of its motor (m/s, rad/s).
+    pub speed: f32,
+    /// The largest impulse of a substep (N s, N m s).
+    pub max_impulse: f32,
+    /// Of a spring, the speed that it gives in a substep by gap (1/s).
+    pub rate: f32,
+    /// Of a drive, the share of the speed that it takes away in a substep: 1 of a motor; of bounds 0.
+    pub mass_scale: f32,
+    /// Of a spring, the share of its impulse that is given back; else 0.
+    pub impulse_scale: f32,
+    /// The distance of the anchors when the step begins, if the axis joins them (m); else 0.
+    pub length: f32,
 }
 
 /// The impulse of one joint on its body b, accumulated, 16 B (N s).
@@ -306,7 +343,7 @@ impl Softness {
     }
 }
 
-/// The numbers that are the same for every body and contact of a step, 32 B.
+/// The numbers that are the same for every body and contact of a step, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
@@ -326,6 +363,10 @@ pub struct Params {
     pub joint_count: u32,
     /// 1 if a patch follows the points of every contact.
     pub patches: u32,
+    /// Number of axes of joints.
+    pub axis_count: u32,
+    #[doc(hidden)]
+    pub pad: [u32; 3],
 }
 
 /// The length of the substeps of a block, and the coefficients that follow from it, 56 B.

@@ -10,7 +10,8 @@ mod spawner;
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 #[cfg(feature = "serde")]
 pub use file::{
-    BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile, load, schema,
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
+    SpawnerFile, SpringFile, load, schema,
 };
 pub use scene::{Group, Scene};
 pub use spawner::{Leaves, Spawner, Spawners};

@@ -79,7 +79,7 @@ pub enum Event {
         /// The other collider.
         visitor: ColliderOf,
     },
-    /// A joint bore more than its [`break_force`](crate::BallJoint::break_force), and is gone from the world.
+    /// A joint bore more than its [`break_force`](crate::Joint::break_force), and is gone from the world.
     Broke {
         /// The joint. The handle is stale.
         joint: JointHandle,

@@ -12,7 +12,7 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{BallJoint, BodyKind, MassProperties, Material, World};
+use crate::world::{BodyKind, Joint, MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
@@ -153,7 +153,6 @@ impl Stages {
         problem.walk(archive)?;
         contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
         joints.walk(archive)?;
-
         events.walk(archive)?;
         let bodies = detector.kinds().len();
         let of_effort = effort.classes().len();
@@ -349,12 +348,12 @@ impl Stages {
 
     /// Impulse of a joint on its body b in the last substep, world axes (N s).
     pub fn joint_impulse(&self, joint: usize) -> glam::Vec3 {
-        self.problem.joint_impulses[joint].linear.into()
+        glam::Vec3::from(self.problem.joint_impulses[joint].linear) + self.problem.axis_impulse(joint, true)
     }
 
     /// What a joint bore in the last substep (N).
     fn force_on_joint(&self, world: &World, joint: usize, dt: f32) -> f32 {
-        let BallJoint { body_a, body_b, .. } = world.joints[joint];
+        let Joint { body_a, body_b, .. } = world.joints[joint];
         let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let body = body_b.filter(|&b| moves(b) && !moves(body_a)).unwrap_or(body_a);
         let substep = dt / (self.key.config.substeps << self.effort.class_of(body)) as f32;

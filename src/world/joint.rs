@@ -1,10 +1,32 @@
-//! Ball joints.
+//! Joints: what a pair of bodies may still do against each other.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
-/// Keeps a point of one body together with a point of another, or of the world.
+use super::joint_axis::{Axis, Bounds};
+use crate::error::Result;
+use crate::saved::{Archive, Saved};
+
+/// Ties a body to another, or to the world.
+///
+/// A joint is a ball joint at first, and a method makes another kind of it: [`hinge`](Self::hinge), [`slider`](Self::slider),
+/// [`fixed`](Self::fixed), [`rope`](Self::rope), [`rod`](Self::rod), [`elastic`](Self::elastic) or [`generic`](Self::generic). Limits, motors and
+/// springs then belong to the axes.
+///
+/// Positions and speeds of a joint are those of body a as body b sees it, and so are targets of motors and springs. The axes of a joint turn
+/// with body b.
+///
+/// ```
+/// use drystone::{Body, Joint, Shape, World};
+/// use glam::Vec3;
+///
+/// let mut world = World::new();
+/// let wall = world.add(Body::fixed().shape(Shape::cuboid(0.1, 2.0, 2.0)));
+/// let door = world.add(Body::dynamic().position(0.6, 0.0, 0.0).shape(Shape::cuboid(0.5, 1.0, 0.02)));
+/// let edges = (Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.1, 0.0, 0.0));
+/// world.join(Joint::new(door, edges.0, wall, edges.1).hinge(Vec3::Y).limited(0.0, 1.5).motor(0.3, 20.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BallJoint {
+pub struct Joint {
     /// Index of one body.
     pub body_a: usize,
     /// Index of the other; none for the world.
@@ -13,6 +35,14 @@ pub struct BallJoint {
     pub anchor_a: Vec3,
     /// The point in b's frame, or in the world (m).
     pub anchor_b: Vec3,
+    /// Rotation from the axes of the joint to the frame of a.
+    pub frame_a: Quat,
+    /// Rotation from the axes of the joint to the frame of b, or to the world. Angles are zero where the two frames agree.
+    pub frame_b: Quat,
+    /// Where the anchor of a may be.
+    pub linear: Linear,
+    /// How a may turn: about the first axis, then the other two.
+    pub angular: [Axis; 3],
     /// Whether the two bodies still collide with each other.
     pub collide: bool,
     /// The force at which the joint breaks (N), above 0; infinite for one that holds. A joint breaks after a step whose last substep took more,
@@ -20,17 +50,161 @@ pub struct BallJoint {
     pub break_force: f32,
 }
 
-crate::saved::fields!(BallJoint { body_a, body_b, anchor_a, anchor_b, collide, break_force });
+/// How a joint guides the anchor of a.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Linear {
+    /// Along each of the axes (m).
+    Axes([Axis; 3]),
+    /// By its distance from the anchor of b (m).
+    Distance(Axis),
+}
 
-impl BallJoint {
-    /// Ties two bodies together, which then do not collide.
+/// The axes, or one for the distance.
+impl Saved for Linear {
+    fn blank() -> Self {
+        Self::Axes([Axis::LOCKED; 3])
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let mut is_distance = matches!(self, Self::Distance(_));
+        is_distance.walk(archive)?;
+        if A::READS {
+            *self = if is_distance { Self::Distance(Axis::blank()) } else { Self::blank() };
+        }
+        match self {
+            Self::Axes(axes) => axes.walk(archive),
+            Self::Distance(axis) => axis.walk(archive),
+        }
+    }
+}
+
+crate::saved::fields!(Joint {
+    body_a,
+    body_b,
+    anchor_a,
+    anchor_b,
+    frame_a,
+    frame_b,
+    linear,
+    angular,
+    collide,
+    break_force,
+});
+
+impl Joint {
+    /// Ties two bodies together by a ball joint. They then do not collide.
     pub fn new(body_a: usize, anchor_a: Vec3, body_b: usize, anchor_b: Vec3) -> Self {
         Self { body_b: Some(body_b), ..Self::to_world(body_a, anchor_a, anchor_b) }
     }
 
-    /// Ties a body to a point of the world.
+    /// Ties a body to a point of the world by a ball joint.
     pub fn to_world(body_a: usize, anchor_a: Vec3, point: Vec3) -> Self {
-        Self { body_a, body_b: None, anchor_a, anchor_b: point, collide: false, break_force: f32::INFINITY }
+        Self {
+            body_a,
+            body_b: None,
+            anchor_a,
+            anchor_b: point,
+            frame_a: Quat::IDENTITY,
+            frame_b: Quat::IDENTITY,
+            linear: Linear::Axes([Axis::LOCKED; 3]),
+            angular: [Axis::FREE; 3],
+            collide: false,
+            break_force: f32::INFINITY,
+        }
+    }
+
+    /// Body a may only turn, about an axis that has this direction in the frames of both bodies. The direction need not have unit length.
+    pub fn hinge(self, direction: Vec3) -> Self {
+        self.along(direction).generic([Axis::LOCKED; 3], [Axis::FREE, Axis::LOCKED, Axis::LOCKED])
+    }
+
+    /// Body a may only shift, along an axis that has this direction in the frames of both bodies.
+    pub fn slider(self, direction: Vec3) -> Self {
+        self.along(direction).generic([Axis::FREE, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3])
+    }
+
+    /// Body a may not move.
+    pub fn fixed(self) -> Self {
+        self.generic([Axis::LOCKED; 3], [Axis::LOCKED; 3])
+    }
+
+    /// The anchors are at most `length` apart (m).
+    pub fn rope(self, length: f32) -> Self {
+        self.at_distance(Axis::limited(0.0, length))
+    }
+
+    /// The anchors are `length` apart (m).
+    pub fn rod(self, length: f32) -> Self {
+        self.at_distance(Axis::limited(length, length))
+    }
+
+    /// A spring between the anchors: see [`Axis::spring`].
+    pub fn elastic(self, length: f32, frequency: f32, damping_ratio: f32) -> Self {
+        self.at_distance(Axis::FREE.spring(length, frequency, damping_ratio, f32::MAX))
+    }
+
+    /// Guides the distance of the anchors, and no angle.
+    pub fn at_distance(self, distance: Axis) -> Self {
+        Self { linear: Linear::Distance(distance), angular: [Axis::FREE; 3], ..self }
+    }
+
+    /// Any axes: three to shift along, three to turn about.
+    pub fn generic(self, linear: [Axis; 3], angular: [Axis; 3]) -> Self {
+        Self { linear: Linear::Axes(linear), angular, ..self }
+    }
+
+    /// Lets the first axis of the joint have this direction in the frames of both bodies.
+    pub fn along(self, direction: Vec3) -> Self {
+        let frame = Quat::from_rotation_arc(Vec3::X, direction.normalize_or(Vec3::X));
+        Self { frame_a: frame, frame_b: frame, ..self }
+    }
+
+    /// Lets all angles be zero where the bodies have these rotations; that of b is the identity for the world.
+    pub fn zero_at(self, rotation_a: Quat, rotation_b: Quat) -> Self {
+        Self { frame_a: (rotation_a.inverse() * rotation_b * self.frame_b).normalize(), ..self }
+    }
+
+    /// Limits the first axis that is not locked, or the distance.
+    pub fn limited(mut self, min: f32, max: f32) -> Self {
+        self.on_first(|axis| Axis { bounds: Bounds::Between { min, max }, ..axis });
+        self
+    }
+
+    /// Gives a motor to the first axis that is not locked, or to the distance: see [`Axis::motor`].
+    pub fn motor(mut self, speed: f32, max_load: f32) -> Self {
+        self.on_first(|axis| axis.motor(speed, max_load));
+        self
+    }
+
+    /// Gives a spring to the first axis that is not locked, or to the distance: see [`Axis::spring`].
+    pub fn spring(mut self, target: f32, frequency: f32, damping_ratio: f32) -> Self {
+        self.on_first(|axis| axis.spring(target, frequency, damping_ratio, f32::MAX));
+        self
+    }
+
+    /// The first axis that is not locked, those to shift along before those to turn about; or the distance. None of a fixed joint.
+    pub fn first_axis(&mut self) -> Option<&mut Axis> {
+        let linear = match &mut self.linear {
+            Linear::Axes(axes) => axes,
+            Linear::Distance(distance) => std::slice::from_mut(distance),
+        };
+        linear.iter_mut().chain(&mut self.angular).find(|axis| axis.bounds != Bounds::Locked)
+    }
+
+    fn on_first(&mut self, change: impl Fn(Axis) -> Axis) {
+        if let Some(axis) = self.first_axis() {
+            *axis = change(*axis);
+        }
+    }
+
+    /// Whether the anchors coincide.
+    pub fn holds_anchors(&self) -> bool {
+        self.linear == Linear::Axes([Axis::LOCKED; 3])
+    }
+
+    /// Whether it holds the anchors and nothing else.
+    pub fn is_ball(&self) -> bool {
+        self.holds_anchors() && self.angular == [Axis::FREE; 3]
     }
 
     /// Whether this is one of its bodies.

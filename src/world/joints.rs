@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 use std::slice;
 
-use super::joint::BallJoint;
+use super::joint::Joint;
 
 /// Names one joint for as long as the joint is in its world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -18,7 +18,7 @@ crate::saved::fields!(JointHandle { number, generation });
 /// is removed; its handle stays.
 #[derive(Debug, Default)]
 pub struct Joints {
-    all: Vec<BallJoint>,
+    all: Vec<Joint>,
     /// The handle of each.
     handles: Vec<JointHandle>,
     /// The generation of each number, and the index of its joint; none if the number is free.
@@ -31,7 +31,7 @@ crate::saved::state!(Joints { all, handles, numbers, free });
 
 impl Joints {
     /// Adds a joint behind the others.
-    pub(super) fn insert(&mut self, joint: BallJoint) -> JointHandle {
+    pub(super) fn insert(&mut self, joint: Joint) -> JointHandle {
         let number = self.free.pop().unwrap_or_else(|| {
             self.numbers.push((0, None));
             self.numbers.len() as u32 - 1
@@ -45,7 +45,7 @@ impl Joints {
     }
 
     /// Takes a joint out; none if it is gone.
-    pub(super) fn remove(&mut self, handle: JointHandle) -> Option<BallJoint> {
+    pub(super) fn remove(&mut self, handle: JointHandle) -> Option<Joint> {
         let index = self.index(handle)?;
         let joint = self.all[index];
         let mut here = 0..;
@@ -63,7 +63,7 @@ impl Joints {
     }
 
     /// Keeps the joints that `keep` takes.
-    pub fn retain(&mut self, mut keep: impl FnMut(&BallJoint) -> bool) {
+    pub fn retain(&mut self, mut keep: impl FnMut(&Joint) -> bool) {
         let mut kept = 0;
         for index in 0..self.all.len() {
             let handle = self.handles[index];
@@ -100,21 +100,21 @@ impl Joints {
 }
 
 impl Deref for Joints {
-    type Target = [BallJoint];
-    fn deref(&self) -> &[BallJoint] {
+    type Target = [Joint];
+    fn deref(&self) -> &[Joint] {
         &self.all
     }
 }
 
 impl DerefMut for Joints {
-    fn deref_mut(&mut self) -> &mut [BallJoint] {
+    fn deref_mut(&mut self) -> &mut [Joint] {
         &mut self.all
     }
 }
 
 impl<'a> IntoIterator for &'a Joints {
-    type Item = &'a BallJoint;
-    type IntoIter = slice::Iter<'a, BallJoint>;
+    type Item = &'a Joint;
+    type IntoIter = slice::Iter<'a, Joint>;
     fn into_iter(self) -> Self::IntoIter {
         self.all.iter()
     }

@@ -5,6 +5,8 @@ mod body;
 mod change;
 mod groups;
 mod joint;
+mod joint_axis;
+mod joint_motion;
 mod joints;
 mod lever;
 mod limits;
@@ -16,7 +18,10 @@ pub use bodies::{Bodies, BodyHandle};
 pub use body::{Body, BodyKind, Collider, Material};
 pub(crate) use change::WorldChange;
 pub use groups::Groups;
-pub use joint::BallJoint;
+pub use joint::{Joint, Linear};
+pub use joint_axis::{Axis, Bounds, Drive};
+pub use joint_motion::JointMotion;
+pub(crate) use joint_motion::LEAST_DISTANCE;
 pub use joints::{JointHandle, Joints};
 pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
 pub use mass::MassProperties;
@@ -51,7 +56,7 @@ pub struct World {
     pub own_gravity: Vec<Option<Vec3>>,
     /// The bodies. Joints and contacts name a body by its index here, which stays as long as the body does.
     pub bodies: Bodies,
-    /// The ball joints.
+    /// The joints.
     pub joints: Joints,
 }
 
@@ -129,7 +134,7 @@ impl World {
     ///
     /// # Panics
     /// The joint names a body that the world does not have.
-    pub fn join(&mut self, joint: BallJoint) -> usize {
+    pub fn join(&mut self, joint: Joint) -> usize {
         self.insert_joint(joint);
         self.joints.len() - 1
     }
@@ -138,7 +143,7 @@ impl World {
     ///
     /// # Panics
     /// The joint names a body that the world does not have.
-    pub fn insert_joint(&mut self, joint: BallJoint) -> JointHandle {
+    pub fn insert_joint(&mut self, joint: Joint) -> JointHandle {
         let is_there = |body: usize| !self.bodies.is_vacant(body);
         let bodies = self.bodies.len();
         assert!(
@@ -149,17 +154,17 @@ impl World {
     }
 
     /// Takes a joint out; none if it is gone already.
-    pub fn remove_joint(&mut self, joint: JointHandle) -> Option<BallJoint> {
+    pub fn remove_joint(&mut self, joint: JointHandle) -> Option<Joint> {
         self.joints.remove(joint)
     }
 
     /// A joint; none if it is gone.
-    pub fn joint(&self, joint: JointHandle) -> Option<&BallJoint> {
+    pub fn joint(&self, joint: JointHandle) -> Option<&Joint> {
         self.joints.index(joint).map(|index| &self.joints[index])
     }
 
     /// A joint, to be changed; none if it is gone.
-    pub fn joint_mut(&mut self, joint: JointHandle) -> Option<&mut BallJoint> {
+    pub fn joint_mut(&mut self, joint: JointHandle) -> Option<&mut Joint> {
         self.joints.index(joint).map(|index| &mut self.joints[index])
     }
 
@@ -184,7 +189,7 @@ impl World {
         self.bodies.append(&other.bodies);
         for joint in &other.joints {
             let (body_a, body_b) = (first + joint.body_a, joint.body_b.map(|b| first + b));
-            self.joints.insert(BallJoint { body_a, body_b, ..*joint });
+            self.joints.insert(Joint { body_a, body_b, ..*joint });
         }
     }
 
@@ -202,15 +207,15 @@ impl World {
     }
 
     /// Where the two anchors of a joint are in the world (m).
-    pub fn anchors(&self, joint: &BallJoint) -> [Vec3; 2] {
+    pub fn anchors(&self, joint: &Joint) -> [Vec3; 2] {
         let on_body = |b: usize, anchor: Vec3| self.bodies[b].position + self.bodies[b].rotation * anchor;
         let on_a = on_body(joint.body_a, joint.anchor_a);
         [on_a, joint.body_b.map_or(joint.anchor_b, |b| on_body(b, joint.anchor_b))]
     }
 
-    /// Largest distance between the two anchors of any joint (m).
+    /// Largest gap that is not to be in any joint (m): how far its anchors are apart along axes that are locked, and beyond its limits.
     pub fn joint_gap(&self) -> f32 {
-        self.joints.iter().map(|j| self.anchors(j)).map(|[a, b]| a.distance(b)).fold(0.0, f32::max)
+        self.joints.iter().map(|joint| self.joint_motion(joint).gap(joint)).fold(0.0, f32::max)
     }
 
     /// Refuses a world that cannot be simulated: numbers that are not finite or out of range, shapes without extent, dynamic bodies
@@ -265,6 +270,7 @@ impl World {
             ensure(breaks > 0.0, || format!("joint {i}: break_force = {breaks}: must be above 0 N"))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
             ensure(are_places, || format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size"))?;
+            joint.check_axes().map_err(|e| e.within(format_args!("joint {i}")))?;
         }
         Ok(())
     }

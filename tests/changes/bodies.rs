@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::stages::compare::Difference;
-use drystone::{BallJoint, Body, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
 
 use super::{BOTH, DT, cpu, cube, run, simulation, standing};
 
@@ -48,7 +48,7 @@ fn a_wrong_body_that_came_or_changed_is_refused_in_one_line() {
         ("joint 5: names a body that is gone", |w| {
             w.joints[0].body_a = 5;
             w.remove(w.bodies.handle(5).expect("a body"));
-            w.join(BallJoint::to_world(4, Vec3::ZERO, Vec3::ZERO));
+            w.join(Joint::to_world(4, Vec3::ZERO, Vec3::ZERO));
             w.joints[5].body_a = 5;
         }),
     ];
@@ -91,7 +91,7 @@ fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
     let cases: [(&str, Change); 6] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
         ("joint 0: names a body that is gone, or beyond", |w| w.joints[0].body_b = Some(99)),
-        ("joint 0: ties body 1 to itself", |w| w.joints[0] = BallJoint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
+        ("joint 0: ties body 1 to itself", |w| w.joints[0] = Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
         ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
         ("body 2 \"\": mass", |w| w.bodies[2].mass.mass = -1.0),
         ("body 2 \"\": friction", |w| w.bodies[2].material.friction = f32::NAN),

@@ -1,7 +1,7 @@
 //! Joints that begin, end, take the place of others, or move their anchors.
 
 use drystone::glam::Vec3;
-use drystone::{BallJoint, Body, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
 
 use super::{BOTH, DT, cpu, cube, net, reference, run, simulation, standing};
 
@@ -19,7 +19,7 @@ fn joints_that_take_the_place_of_others_hold_what_they_tie() {
         joints.retain(|j| j.body_b.is_some());
         for corner in [0, 3] {
             let at = simulation.world.bodies[corner + 12].position;
-            simulation.world.join(BallJoint::to_world(corner + 12, Vec3::ZERO, at));
+            simulation.world.join(Joint::to_world(corner + 12, Vec3::ZERO, at));
         }
         assert_eq!(simulation.world.joints.len(), count);
         for step in 0..120 {
@@ -38,7 +38,7 @@ fn a_joint_that_ends_leaves_the_impulses_of_the_others_alone() {
     run(&mut simulation, 120);
     // The top of a tower is held where it is.
     let top = simulation.world.bodies[5].position;
-    let held = simulation.world.insert_joint(BallJoint::to_world(5, Vec3::ZERO, top));
+    let held = simulation.world.insert_joint(Joint::to_world(5, Vec3::ZERO, top));
     run(&mut simulation, 60);
     let mut before = simulation.joint_impulses().to_vec();
     before.rotate_right(1);
@@ -62,7 +62,7 @@ fn whether_jointed_bodies_collide_may_change() {
     // Two balls that overlap, tied at their centers by a joint of no length.
     let a = world.add(Body::dynamic().shape(Shape::ball(0.5)));
     let b = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.6, 0.0, 0.0));
-    world.join(BallJoint::new(a, Vec3::new(0.3, 0.0, 0.0), b, Vec3::new(-0.3, 0.0, 0.0)));
+    world.join(Joint::new(a, Vec3::new(0.3, 0.0, 0.0), b, Vec3::new(-0.3, 0.0, 0.0)));
     for backend in BOTH {
         let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
         assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);
@@ -99,8 +99,8 @@ fn a_changed_joint_wakes_only_what_it_holds() {
     for x in [0.0, 5.0] {
         let upper = world.add(cube(x, -1.0, 0.0));
         let lower = world.add(cube(x, -2.5, 0.0));
-        world.join(BallJoint::to_world(upper, Vec3::Y, Vec3::new(x, 0.0, 0.0)));
-        world.join(BallJoint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
+        world.join(Joint::to_world(upper, Vec3::Y, Vec3::new(x, 0.0, 0.0)));
+        world.join(Joint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
     }
     let mut simulation = simulation(&world, &config, cpu);
     let asleep = |s: &Simulation| [0, 1, 2, 3].map(|i| s.is_asleep(i));
@@ -129,7 +129,7 @@ fn a_new_joint_wakes_both_of_its_bodies() {
         let [a, b] = if swap { [other, one] } else { [one, other] };
         let at = |i: usize| simulation.world.bodies[i].position;
         let half = 0.5 * (at(b) - at(a));
-        simulation.world.join(BallJoint::new(a, half, b, -half));
+        simulation.world.join(Joint::new(a, half, b, -half));
         run(&mut simulation, 1);
         assert!(!simulation.is_asleep(one) && !simulation.is_asleep(other));
     }
@@ -140,7 +140,7 @@ fn a_body_that_is_untied_rests_on_a_half_space() {
     let mut world = World::new();
     let ground = world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
-    world.join(BallJoint::new(ball, Vec3::ZERO, ground, 0.49 * Vec3::Y));
+    world.join(Joint::new(ball, Vec3::ZERO, ground, 0.49 * Vec3::Y));
     let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 10);
     assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);

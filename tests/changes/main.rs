@@ -6,7 +6,7 @@ mod plan;
 mod settings;
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{Backend, BallJoint, Body, BodyKind, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -65,8 +65,8 @@ fn standing() -> World {
         let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.25, 0.5, 0.25)).position(12.0, 8.0 - i as f32, 0.0));
         let end = Vec3::new(0.0, 0.5, 0.0);
         world.join(match above {
-            None => BallJoint::to_world(rod, end, Vec3::new(12.0, 8.5, 0.0)),
-            Some(above) => BallJoint::new(above, -end, rod, end),
+            None => Joint::to_world(rod, end, Vec3::new(12.0, 8.5, 0.0)),
+            Some(above) => Joint::new(above, -end, rod, end),
         });
         above = Some(rod);
     }
@@ -86,13 +86,13 @@ fn net() -> World {
     let half = 0.5 * Vec3::X;
     for i in 0..16 {
         if i % 4 < 3 {
-            world.join(BallJoint::new(i, half, i + 1, -half));
+            world.join(Joint::new(i, half, i + 1, -half));
         }
         if i < 12 {
-            world.join(BallJoint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
+            world.join(Joint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
         }
     }
-    world.join(BallJoint::to_world(0, Vec3::ZERO, Vec3::ZERO));
-    world.join(BallJoint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
+    world.join(Joint::to_world(0, Vec3::ZERO, Vec3::ZERO));
+    world.join(Joint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
     world
 }

@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::stages::compare::Difference;
-use drystone::{BallJoint, Body, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Body, Joint, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
 
 use super::{BOTH, DT, cpu, cube, fastest, ground, reference, run, simulation, standing};
 
@@ -137,9 +137,9 @@ fn a_plan_follows_contacts_and_lengths_of_steps_where_its_colors_stay() {
 fn a_plan_follows_spins_where_its_colors_stay() {
     let mut world = World::new();
     let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1)).position(0.0, -0.5, 0.0));
-    world.join(BallJoint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    world.join(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 0.0, 0.0));
-    world.join(BallJoint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
+    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
     let mut simulation = simulation(&world, &SolverConfig::default().with(|c| c.sleep_after = 0.3), cpu);
     for _ in 0..60 {
         simulation.world.bodies[ball].linear_velocity.y = 0.1;

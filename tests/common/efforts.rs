@@ -1,7 +1,7 @@
 //! A world whose islands take different numbers of substeps.
 
 use drystone::glam::Vec3;
-use drystone::{BallJoint, Body, Scene, Shape};
+use drystone::{Body, Joint, Scene, Shape};
 
 /// A pile of boxes that fall, a tower under a top 1000 times as heavy, one under a top 60 times as heavy, a rod on a joint, and two
 /// chains with a heavy end, one of which lies on boxes.
@@ -16,7 +16,7 @@ pub fn islands() -> Scene {
         }
     }
     let hung = scene.world.add(Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(40.0, 5.0, 0.0));
-    scene.world.join(BallJoint::to_world(hung, 0.3 * Vec3::Y, Vec3::new(40.0, 5.3, 0.0)));
+    scene.world.join(Joint::to_world(hung, 0.3 * Vec3::Y, Vec3::new(40.0, 5.3, 0.0)));
     add_chain(&mut scene, Vec3::new(50.0, 40.0, 0.0));
     // Of this one the heavy end presses on a box that lies on a box.
     add_chain(&mut scene, Vec3::new(70.0, 1.2, 0.0));
@@ -43,13 +43,13 @@ fn add_chain(scene: &mut Scene, anchor: Vec3) {
         let Vec3 { x, y, z } = anchor + (k as f32 + 0.5) * LINK * Vec3::X;
         let body = scene.world.add(link.clone().position(x, y, z));
         scene.world.join(match before {
-            None => BallJoint::to_world(body, -0.5 * LINK * Vec3::X, anchor),
-            Some(before) => BallJoint::new(before, 0.5 * LINK * Vec3::X, body, -0.5 * LINK * Vec3::X),
+            None => Joint::to_world(body, -0.5 * LINK * Vec3::X, anchor),
+            Some(before) => Joint::new(before, 0.5 * LINK * Vec3::X, body, -0.5 * LINK * Vec3::X),
         });
         before = Some(body);
     }
     let Vec3 { x, y, z } = anchor + (LINKS as f32 * LINK + ARM) * Vec3::X;
     let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(1000.0 * link.mass.mass).position(x, y, z);
     let end = scene.world.add(ball);
-    scene.world.join(BallJoint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, -ARM * Vec3::X));
+    scene.world.join(Joint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, -ARM * Vec3::X));
 }

@@ -26,6 +26,7 @@ pub fn every_rules() -> Vec<Rules> {
                 passes: 1 + u8::from(has(6)),
                 from_start: has(7),
                 isotropic: has(8),
+                axes: false,
             };
             // Velocities since the start of the step meet every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
@@ -68,7 +69,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::BeginSweep { first: false },
         Kernel::MeasureStep,
         Kernel::UpdateMomentum,
-        Kernel::WarmStartJoints,
+        Kernel::WarmStartJoints { axes: false },
+        Kernel::WarmStartJoints { axes: true },
         Kernel::TurnInertias,
         Kernel::FactorJoints,
     ];
@@ -78,6 +80,7 @@ pub fn every_kernel() -> Vec<Kernel> {
     for rules in every_rules() {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
+        all.push(Kernel::SolveJoints(Rules { axes: true, ..rules.of_joints() }));
         all.push(Kernel::MeasureJoints(rules.of_joints()));
         all.push(Kernel::SolveJointSystems(rules.of_joints()));
         all.push(Kernel::ApplyJointChanges(rules.of_joints()));
@@ -104,7 +107,7 @@ pub fn has_patches(kernel: Kernel) -> bool {
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
-        Kernel::WarmStartJoints | Kernel::SolveJoints(_) => joints,
+        Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => joints,
         Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
         Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,

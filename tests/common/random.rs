@@ -6,8 +6,8 @@ use drystone::StepProblem;
 use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::problem::softness::softness;
 use drystone::stages::problem::{
-    BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params, PointRow,
-    Substep, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
+    PointRow, Substep, TorqueRow, TurningRow,
 };
 use drystone::stages::random::SplitMix64;
 use glam::{Mat3, Quat, Vec3};
@@ -101,6 +101,21 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
         impulse.linear = random.vector(1.0).to_array();
         problem.joint_impulses.push(impulse);
     }
+    // A third of the joints are ball joints.
+    for joint in 0..problem.joints.len() {
+        let (first_axis, axis_count) = (problem.axes.len() as u32, random.below(3) * random.below(7));
+        (problem.joints[joint].first_axis, problem.joints[joint].axis_count) = (first_axis, axis_count);
+        for _ in 0..axis_count {
+            let (axis, impulse) = axis_row(random);
+            problem.axes.push(axis);
+            let mut row = JointImpulseRow::default();
+            row.linear[0] = impulse;
+            problem.joint_impulses.push(row);
+        }
+        if axis_count > 0 && random.happens(0.3) {
+            problem.joints[joint].is_loose = 1.0;
+        }
+    }
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
     problem.params = params(&problem, patches);
     solve_joints_at_once(random, &mut problem);
@@ -137,6 +152,8 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem.torques.iter_mut().flat_map(|row| &mut row.angular_acceleration).for_each(scale);
     problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
+    problem.axes.iter_mut().flat_map(|row| [&mut row.gap, &mut row.speed, &mut row.max_impulse]).for_each(scale);
+    problem.axes.iter_mut().filter(|row| row.range > 0.0).map(|row| &mut row.range).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
@@ -155,6 +172,7 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
         row.inv_inertia_x.iter_mut().chain(&mut row.inv_inertia_yz).for_each(lighter);
     }
     problem.points.iter_mut().flat_map(|row| [&mut row.normal_mass, &mut row.tangent_mass]).for_each(scale);
+    problem.axes.iter_mut().map(|row| &mut row.max_impulse).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
@@ -189,6 +207,7 @@ fn params(problem: &StepProblem, patches: bool) -> Params {
     params.body_count = problem.bodies.len() as u32;
     params.point_count = problem.points.len() as u32;
     params.joint_count = problem.joints.len() as u32;
+    params.axis_count = problem.axes.len() as u32;
     params.patches = patches.into();
     params.slop = 0.02;
     params.relaxation = 0.9;
@@ -295,4 +314,28 @@ fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {
     row.body_b = body_b;
     row.gap = random.vector(0.1).to_array();
     row
+}
+
+/// A lock, a limit, a motor or a spring, along or about any direction, and its impulse.
+fn axis_row(random: &mut Random) -> (AxisRow, f32) {
+    let mut row = AxisRow::default();
+    row.direction = (random.rotation() * Vec3::X).to_array();
+    row.is_linear = if random.happens(0.5) { 1.0 } else { 0.0 };
+    row.gap = random.within(-0.2, 0.2);
+    row.range = -1.0;
+    row.max_impulse = f32::MAX;
+    row.length = if random.happens(0.3) { random.within(0.5, 2.0) } else { 0.0 };
+    let impulse = random.within(-1.0, 1.0);
+    match random.below(4) {
+        0 => row.range = random.within(0.0, 0.5),
+        1 => (row.speed, row.mass_scale, row.max_impulse) = (random.within(-2.0, 2.0), 1.0, random.within(0.1, 1.0)),
+        2 => {
+            row.impulse_scale = random.within(0.2, 1.0);
+            row.mass_scale = 1.0 - row.impulse_scale;
+            row.rate = random.within(0.1, 5.0);
+            row.max_impulse = random.within(0.1, 3.0);
+        }
+        _ => {}
+    }
+    (row, if random.happens(0.2) { 0.0 } else { impulse })
 }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use drystone::{BallJoint, Body, Shape, SolverConfig, World};
+use drystone::{Body, Joint, Shape, SolverConfig, World};
 use glam::{Quat, Vec3};
 
 use super::{DT, ball, bounced, empty, floor, near, run, simulation};
@@ -20,7 +20,7 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
     for (frequency, damping) in [(0.02, 0.3), (0.02, 3.0), (0.1, 0.1)] {
         let mut world = empty();
         let hung = world.add(ball().position(0.1, 0.0, 0.0));
-        world.join(BallJoint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
+        world.join(Joint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
         let h = DT / 4.0;
         let config = SolverConfig::default().without_sleep().with(|c| {
             c.substeps = 4;
@@ -84,7 +84,7 @@ fn a_body_hung_by_its_center_of_mass_does_not_turn() {
     let mut body = ball().position(1.0, 2.0, 3.0);
     body.mass.center = Vec3::new(0.3, 0.0, 0.0);
     let hung = world.add(body);
-    world.join(BallJoint::to_world(hung, Vec3::new(0.3, 0.0, 0.0), Vec3::new(1.3, 2.0, 3.0)));
+    world.join(Joint::to_world(hung, Vec3::new(0.3, 0.0, 0.0), Vec3::new(1.3, 2.0, 3.0)));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 60, DT);
     let body = &simulation.world.bodies[hung];

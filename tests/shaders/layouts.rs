@@ -7,7 +7,7 @@ use super::parsed;
 use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW, WrittenContact};
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
-    BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
     MomentumRow, Params, PassRow, PointRow, Softness, TorqueRow, TurningRow,
 };
 
@@ -73,7 +73,10 @@ fn in_rust() -> BTreeMap<String, Layout> {
             preload substep_share
         }
         Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
-        Joint = JointRow { r_a body_a r_b body_b gap }
+        Joint = JointRow { r_a body_a r_b body_b gap is_loose first_axis axis_count }
+        Axis = AxisRow {
+            direction is_linear gap range speed max_impulse rate mass_scale impulse_scale length
+        }
         JointImpulse = JointImpulseRow { linear }
         JointNode = JointNode { r_a mass_a r_b mass_b turn_a turn_b right softness }
         JointBlock = JointBlock { lower upper }
@@ -85,6 +88,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
         Params = Params {
             restitution_threshold slop relaxation tolerance body_count point_count joint_count patches
+            axis_count
         }
         PassRow = PassRow {
             first end substep: substep.length inverse_substep: substep.inverse_length

@@ -2,7 +2,7 @@
 
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{Penetration, in_place_count};
-use drystone::{BallJoint, Body, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Joint, Body, Reference, Scene, Shape, Simulation, SolverConfig, World};
 use drystone_peers::{Engine, Entrant};
 
 /// The world after `steps` of the scene, by an engine at its defaults.
@@ -170,7 +170,7 @@ fn joints_hold_and_a_pendulum_swings_with_its_period() {
     let start = turn * Vec3::new(0.0, -length, 0.0);
     let ball = Body::dynamic().shape(Shape::ball(radius)).rotation(turn).position(start.x, start.y, start.z);
     let ball = world.add(ball);
-    world.join(BallJoint::to_world(ball, Vec3::new(0.0, length, 0.0), Vec3::ZERO));
+    world.join(Joint::to_world(ball, Vec3::new(0.0, length, 0.0), Vec3::ZERO));
     let period = std::f32::consts::TAU * ((length + 0.4 * radius * radius / length) / 9.81).sqrt();
     let steps = (period * 60.0).round() as u32;
     let scene = Scene::new("pendulum", world, steps);

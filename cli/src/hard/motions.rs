@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
 use drystone::config::Friction;
 use drystone::stats::largest;
-use drystone::{BallJoint, Body, MassProperties, Result, Scene, Shape, Simulation, World};
+use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World};
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const LINKS: usize = 100;
@@ -22,8 +22,8 @@ pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
         };
         let index = world.add(body.position(0.5 * k as f32 + half, 0.0, 0.0));
         world.join(match held {
-            None => BallJoint::to_world(index, -half * Vec3::X, Vec3::ZERO),
-            Some(before) => BallJoint::new(before, 0.25 * Vec3::X, index, -half * Vec3::X),
+            None => Joint::to_world(index, -half * Vec3::X, Vec3::ZERO),
+            Some(before) => Joint::new(before, 0.25 * Vec3::X, index, -half * Vec3::X),
         });
         held = Some(index);
     }

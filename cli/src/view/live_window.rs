@@ -12,7 +12,7 @@ use super::live::{Grabbed, Live};
 use super::overlay::{LineEnd, Overlay, lines};
 use super::panel;
 use super::show::{Pointer, Show};
-use drystone::{BallJoint, Result, World};
+use drystone::{Joint, Result, World};
 
 /// Longest time of the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
@@ -111,7 +111,7 @@ impl Show for Live {
         let target = origin + distance * direction;
         let pulled = &world.bodies[body];
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
-        let joint = world.insert_joint(BallJoint::to_world(body, anchor, target));
+        let joint = world.insert_joint(Joint::to_world(body, anchor, target));
         self.grabbed = Some(Grabbed { body, anchor, distance, target, joint });
         true
     }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::{BallJoint, BodyKind, Simulation, SolvedManifold, World};
+use drystone::{BodyKind, Joint, Simulation, SolvedManifold, World};
 
 /// An end of a line, in the layout of the shader.
 #[repr(C)]
@@ -31,7 +31,7 @@ const BOX: Rgba = [90, 90, 90, 255];
 /// Lines from bodies to their anchors in the world, as pairs of ends.
 pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     let hung = world.joints.iter().filter(|j| j.body_b.is_none());
-    let rope = |j: &BallJoint| {
+    let rope = |j: &Joint| {
         let (position, rotation) = poses[j.body_a];
         let center = position + rotation * world.bodies[j.body_a].mass.center;
         [center, j.anchor_b].map(|p| LineEnd { position: p.to_array(), color: BOX })

@@ -2,19 +2,23 @@
 
 use std::ops::Range;
 
+use crate::kernels::axis::{solve_axis, warm_start_axis};
 use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::joint_system::{apply_joint_change, measure_joint};
-use crate::kernels::{Contact, Impulse, Joint, Pair, Point, StepParams};
+use crate::kernels::{Axis, Contact, Impulse, Joint, Pair, Point, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
-use crate::problem::{Block, ContactRow, JointRow, StepProblem};
+use crate::problem::{Block, ContactRow, JointRow, MOST_AXES, StepProblem};
+
+/// Most impulses of a constraint, but for the patch: those of a joint and its axes.
+pub(super) const MOST_IMPULSES: usize = 1 + MOST_AXES;
 
 /// A kind of constraint: contacts or joints.
 pub(super) trait Constraint: bytemuck::Pod + Sync {
-    /// Whether each impulse has a row of `points`.
+    /// Whether its rows of impulses and of points stand together, the first of them with the first.
     const HAS_POINTS: bool;
-    /// Which numbers of its row stand in lanes, in the order of the kernels' struct; those of a joint end before the padding.
+    /// Which numbers of its row stand in lanes, in the order of the kernels' struct; the last of a joint is padding.
     const HEADER: [usize; 11];
     fn colors(problem: &StepProblem) -> Range<u32>;
     fn own_colors(block: &Block) -> Range<u32>;
@@ -22,10 +26,14 @@ pub(super) trait Constraint: bytemuck::Pod + Sync {
     fn impulses(problem: &StepProblem) -> &[[f32; 4]];
     fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
     fn bodies(&self) -> [u32; 2];
-    /// Contact points, 1 to 4; 1 of a joint.
+    /// Contact points, 1 to 4; of a joint its anchors and its axes.
     fn points(&self) -> u32;
-    /// Its first row of impulses and points; `row` is its own row.
-    fn first(&self, row: u32) -> u32;
+    /// The row of its impulse `k`; `row` is its own row, one of `rows`.
+    fn impulse(rows: &[Self], row: u32, k: usize) -> usize;
+    /// Whether lanes hold points of the rows of a problem.
+    fn are_with_points(problem: &StepProblem) -> bool;
+    /// The numbers of the point, or of the axis, of its impulse `k`.
+    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]>;
 }
 
 impl Constraint for ContactRow {
@@ -53,15 +61,21 @@ impl Constraint for ContactRow {
     fn points(&self) -> u32 {
         self.point_count
     }
-    fn first(&self, _: u32) -> u32 {
-        self.first_point
+    fn impulse(rows: &[Self], row: u32, k: usize) -> usize {
+        rows[row as usize].first_point as usize + k
+    }
+    fn are_with_points(_: &StepProblem) -> bool {
+        true
+    }
+    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
+        problem.points.get(self.first_point as usize + k).map(bytemuck::cast_ref)
     }
 }
 
 impl Constraint for JointRow {
     const HAS_POINTS: bool = false;
-    /// Arms and gap.
-    const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 11];
+    /// Arms, gap, whether the anchors are loose.
+    const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 15];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.joint_colors()
     }
@@ -81,10 +95,16 @@ impl Constraint for JointRow {
         [self.body_a, self.body_b]
     }
     fn points(&self) -> u32 {
-        1
+        1 + self.axis_count
     }
-    fn first(&self, row: u32) -> u32 {
-        row
+    fn impulse(rows: &[Self], row: u32, k: usize) -> usize {
+        if k == 0 { row as usize } else { rows.len() + rows[row as usize].first_axis as usize + k - 1 }
+    }
+    fn are_with_points(problem: &StepProblem) -> bool {
+        !problem.axes.is_empty()
+    }
+    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
+        problem.axes.get((self.first_axis as usize + k).checked_sub(1)?).filter(|_| k > 0).map(bytemuck::cast_ref)
     }
 }
 
@@ -106,7 +126,7 @@ pub(super) fn sweep_contact<L: Lane>(
     }
 }
 
-/// Applies a kernel to a joint of a lane, and to its impulse; where it is solved at once with others, to its correction.
+/// Applies a kernel to a joint of a lane and its axes, and to their impulses; where it is solved at once with others, to its correction.
 #[inline(always)]
 pub(super) fn sweep_joint<L: Lane>(
     kernel: Kernel,
@@ -114,10 +134,26 @@ pub(super) fn sweep_joint<L: Lane>(
     pair: &mut Pair<L>,
     joint: &Joint<L>,
     impulse: &mut Vec3<L>,
+    axes: &[Axis<L>],
+    axis_impulses: &mut [Impulse<L>],
 ) {
     match kernel {
-        Kernel::WarmStartJoints => warm_start_joint(pair, joint, *impulse),
-        Kernel::SolveJoints(rules) => solve_joint(rules, params, pair, joint, impulse),
+        Kernel::WarmStartJoints { axes: has_axes } => {
+            if has_axes {
+                for (axis, impulse) in axes.iter().zip(axis_impulses) {
+                    warm_start_axis(pair, joint, axis, impulse.normal);
+                }
+            }
+            warm_start_joint(pair, joint, *impulse);
+        }
+        Kernel::SolveJoints(rules) => {
+            if rules.axes {
+                for (axis, impulse) in axes.iter().zip(axis_impulses) {
+                    solve_axis(rules, params, pair, joint, axis, &mut impulse.normal);
+                }
+            }
+            solve_joint(rules, params, pair, joint, impulse);
+        }
         Kernel::MeasureJoints(rules) => *impulse = measure_joint(rules, params, pair, joint),
         Kernel::ApplyJointChanges(_) => apply_joint_change(pair, joint, *impulse),
         _ => unreachable!("a kernel over other rows"),

@@ -5,7 +5,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::constraint::Constraint;
+use super::constraint::{Constraint, MOST_IMPULSES};
 use super::lane_group::{LaneGroup, NO_ROW};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::threads::Threads;
@@ -33,8 +33,8 @@ pub(super) struct LaneLayout<C> {
     pub ranges: ColorRanges,
     pub points: Vec<[Wide; 12]>,
     rows: PartitionedRows,
-    /// Constraints of each color of each part with one to four points, and its first group and impulse.
-    counts: Vec<[usize; 4]>,
+    /// Constraints of each color of each part by their numbers of points, and its first group and impulse.
+    counts: Vec<[usize; MOST_IMPULSES]>,
     firsts: Vec<(usize, u32)>,
     /// State of accelerated sweeps.
     steps: Vec<ImpulseStep<Portable>>,
@@ -53,7 +53,7 @@ impl<C: Constraint> LaneLayout<C> {
     ) {
         self.make_groups(problem, partition, threads);
         let count = self.groups.last().map_or(0, |group| group.impulses().end);
-        self.points.resize(if C::HAS_POINTS { count } else { 0 }, [Wide::default(); 12]);
+        self.points.resize(if C::are_with_points(problem) { count } else { 0 }, [Wide::default(); 12]);
         impulses.resize(count, [Wide::default(); 4]);
         let len = self.groups.len();
         let work = Load::<C> {
@@ -88,7 +88,7 @@ impl<C: Constraint> LaneLayout<C> {
                 // SAFETY: `LaneLayout::make_groups` gives each group impulses of its own.
                 for (k, wide) in unsafe { sums.slice(group.impulses()) }.iter_mut().enumerate() {
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                        let sum = &from[rows[row as usize].first(row) as usize + k];
+                        let sum = &from[C::impulse(rows, row, k)];
                         wide.iter_mut().zip(sum).for_each(|(wide, number)| wide.0[lane] = *number);
                     }
                 }
@@ -139,7 +139,7 @@ impl<C: Constraint> LaneLayout<C> {
                     let StepLength { square, along } = step_length(components(&impulses[i]), &self.steps[i]);
                     let (square, along) = (square.store(), along.store());
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                        let to = rows[row as usize].first(row) as usize + k;
+                        let to = C::impulse(rows, row, k);
                         // SAFETY: as in `store`.
                         unsafe { lengths.write(to, StepLength { square: square.0[lane], along: along.0[lane] }) };
                     }
@@ -161,11 +161,11 @@ impl<C: Constraint> LaneLayout<C> {
         let patch = u32::from(C::HAS_POINTS && problem.has_patches());
         let kind_of = |row: u32| all[row as usize].points() as usize - 1;
         let (rows, cells) = (&self.rows, self.rows.ranges.len());
-        self.counts.resize(cells, [0; 4]);
+        self.counts.resize(cells, [0; MOST_IMPULSES]);
         let counts = Shared::new(&mut self.counts);
         threads.spread_each(0..cells, &|range| {
             for cell in range {
-                let mut count = [0; 4];
+                let mut count = [0; MOST_IMPULSES];
                 rows.at(cell).iter().for_each(|&row| count[kind_of(row)] += 1);
                 // SAFETY: tasks have different cells: `Threads::spread_each` cuts their range.
                 unsafe { counts.write(cell, count) };
@@ -188,7 +188,7 @@ impl<C: Constraint> LaneLayout<C> {
             for cell in range {
                 let (mut next, mut next_impulse) = firsts[cell];
                 // For each number of points the group with free lanes, and the lanes taken so far.
-                let (mut open, mut taken) = ([0; 4], [0; 4]);
+                let (mut open, mut taken) = ([0; MOST_IMPULSES], [0; MOST_IMPULSES]);
                 for &row in rows.at(cell) {
                     let kind = kind_of(row);
                     let lane = taken[kind] % WIDTH;
@@ -207,6 +207,11 @@ impl<C: Constraint> LaneLayout<C> {
                 }
             }
         });
+    }
+
+    /// The rows of points of a group of joints: those of axes, after that of the anchors.
+    pub fn axes(&self, impulses: Range<usize>) -> &[[Wide; 12]] {
+        self.points.get(impulses.start + 1..impulses.end).unwrap_or_default()
     }
 
     /// The place of the first impulse of each of `count` rows.

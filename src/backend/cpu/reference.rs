@@ -14,7 +14,7 @@ use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolate
 use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, StepProblem};
+use crate::problem::{ConvergenceRow, JointRow, MOST_AXES, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 #[derive(Debug, Default)]
@@ -138,17 +138,26 @@ impl<S: Scalar> Reference<S> {
                 }
             }
             Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
-            Kernel::WarmStartJoints
+            Kernel::WarmStartJoints { .. }
             | Kernel::SolveJoints(_)
             | Kernel::MeasureJoints(_)
             | Kernel::ApplyJointChanges(_) => {
-                let is_swept = matches!(pass.kernel, Kernel::WarmStartJoints | Kernel::SolveJoints(_));
+                let is_swept = matches!(pass.kernel, Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_));
                 self.joint_changes.resize(problem.joints.len(), Vec3::default());
                 for i in places(problem, pass) {
                     let bodies = problem.joints[i].bodies();
                     let (mut pair, rows) = (self.load_pair(bodies), &mut self.rows);
                     let numbers = if is_swept { &mut rows.joint_impulses } else { &mut self.joint_changes };
-                    sweep_joint(pass.kernel, &params, &mut pair, &rows.joints[i], &mut numbers[i]);
+                    let JointRow { first_axis, axis_count, .. } = problem.joints[i];
+                    let (first, count) = (first_axis as usize, if is_swept { axis_count as usize } else { 0 });
+                    let (joint, axes) = (&rows.joints[i], &rows.axes[first..first + count]);
+                    let (own, of_axes) = numbers.split_at_mut(problem.joints.len());
+                    let of_axes = of_axes.get_mut(first..first + count).unwrap_or_default();
+                    let mut impulses = [Impulse::default(); MOST_AXES];
+                    let impulses = &mut impulses[..count];
+                    impulses.iter_mut().zip(&*of_axes).for_each(|(impulse, row)| impulse.set_components(*row));
+                    sweep_joint(pass.kernel, &params, &mut pair, joint, &mut own[i], axes, impulses);
+                    impulses.iter().zip(of_axes).for_each(|(impulse, row)| *row = impulse.components());
                     self.store_pair(bodies, &pair);
                 }
             }

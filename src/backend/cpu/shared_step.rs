@@ -78,7 +78,7 @@ impl SharedStep<'_> {
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 self.sweep(pass, part, self.contacts, self.contact_impulses, spread);
             }
-            Kernel::WarmStartJoints | Kernel::SolveJoints(_) => {
+            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => {
                 self.sweep(pass, part, self.joints, self.joint_impulses, spread);
             }
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {

@@ -10,7 +10,7 @@ use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_layout::LaneLayout;
 use crate::kernels::contact::sum_impulse;
-use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
+use crate::kernels::{Axis, Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
@@ -63,12 +63,14 @@ impl<C: Constraint> Sweep<'_, C> {
                 unsafe { (&as_lanes(std::slice::from_ref(&group.header))[0], as_lanes(&self.layout.points[rows])) };
             sweep_contact(self.kernel, params, &mut pair, contact, points, impulses);
         } else {
-            let [joint @ .., _, _]: &[Wide; 11] = &group.header;
-            // SAFETY: `Joint` is `repr(C)` and holds lanes only.
-            let joint: &Joint<L> = unsafe { &as_lanes::<_, 9>(std::slice::from_ref(joint))[0] };
-            let mut impulse = impulses[0].components();
-            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse);
-            impulses[0].set_components(impulse);
+            let [joint @ .., _]: &[Wide; 11] = &group.header;
+            // SAFETY: `Joint` and `Axis` are `repr(C)` and hold lanes only.
+            let (joint, axes): (&Joint<L>, &[Axis<L>]) =
+                unsafe { (&as_lanes::<_, 10>(std::slice::from_ref(joint))[0], as_lanes(self.layout.axes(rows))) };
+            let (first, others) = impulses.split_first_mut().expect("a group of joints has impulses");
+            let mut impulse = first.components();
+            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse, axes, others);
+            first.set_components(impulse);
         }
         // SAFETY: as above.
         unsafe {

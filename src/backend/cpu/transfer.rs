@@ -42,11 +42,11 @@ impl<C: Constraint> Work for Load<'_, C> {
         // SAFETY: tasks have different groups: `Threads::spread` cuts their range.
         for group in unsafe { self.groups.slice(range) } {
             let own = group.impulses();
-            let own_points = if C::HAS_POINTS { own.clone() } else { 0..0 };
+            let own_points = if C::are_with_points(self.problem) { own.clone() } else { 0..0 };
             // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
             let (points, impulses) = unsafe { (self.points.slice(own_points), self.impulses.slice(own)) };
             self.take_bodies(group);
-            if group.is_full() {
+            if group.is_full() && (C::HAS_POINTS || points.is_empty()) {
                 self.take_full::<L>(group, points, impulses);
             } else {
                 self.take_some(group, points, impulses);
@@ -77,7 +77,7 @@ impl<C: Constraint> Load<'_, C> {
         for (wide, at) in group.header.iter_mut().zip(C::HEADER) {
             *wide = if at < 8 { low[at] } else { high[at + 8 - numbers[0].len()] };
         }
-        let firsts: [usize; WIDTH] = lanes!(lane => own[lane].first(group.rows[lane]) as usize);
+        let firsts: [usize; WIDTH] = lanes!(lane => C::impulse(rows, group.rows[lane], 0));
         for (k, point) in points.iter_mut().enumerate() {
             let all: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
             let rows: [&[f32]; WIDTH] = lanes!(lane => &all[firsts[lane] + k][..]);
@@ -101,22 +101,22 @@ impl<C: Constraint> Load<'_, C> {
 
     /// Lanes without a row hold zeros.
     fn take_some(&self, group: &mut LaneGroup, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
-        let all_points: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
+        let rows = C::rows(self.problem);
         let all_impulses = C::impulses(self.problem);
         for (lane, row) in group.rows.into_iter().enumerate() {
-            let (header, first) = match C::rows(self.problem).get(row as usize) {
-                Some(constraint) => {
-                    let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(constraint));
-                    (C::HEADER.map(|at| numbers[at]), constraint.first(row) as usize)
-                }
-                None => ([0.0; 11], NO_ROW as usize),
-            };
+            let constraint = rows.get(row as usize);
+            let header = constraint.map_or([0.0; 11], |constraint| {
+                let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(constraint));
+                C::HEADER.map(|at| numbers[at])
+            });
             set_lane(&mut group.header, lane, &header);
             for (k, point) in points.iter_mut().enumerate() {
-                set_lane(point, lane, all_points.get(first + k).unwrap_or(&[0.0; 12]));
+                let numbers = constraint.and_then(|constraint| constraint.point(self.problem, k));
+                set_lane(point, lane, numbers.unwrap_or(&[0.0; 12]));
             }
             for (k, impulse) in impulses.iter_mut().enumerate() {
-                set_lane(impulse, lane, all_impulses.get(first + k).unwrap_or(&[0.0; 4]));
+                let numbers = constraint.and_then(|_| all_impulses.get(C::impulse(rows, row, k)));
+                set_lane(impulse, lane, numbers.unwrap_or(&[0.0; 4]));
             }
         }
     }
@@ -127,18 +127,17 @@ impl<C: Constraint> Work for Store<'_, C> {
     fn over<L: Lanes>(&self, range: Range<usize>) {
         for group in &self.groups[range] {
             let impulses = &self.impulses[group.impulses()];
-            let first = |row: u32| self.rows[row as usize].first(row) as usize;
-            if !group.is_full() || impulses.len() == 1 {
+            if !group.is_full() || impulses.len() == 1 || !C::HAS_POINTS {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                     for (k, wide) in impulses.iter().enumerate() {
                         // SAFETY: `LaneLayout::make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
                         // constraints have different impulses.
-                        unsafe { self.to.write(first(row) + k, wide.map(|number| number.0[lane])) };
+                        unsafe { self.to.write(C::impulse(self.rows, row, k), wide.map(|number| number.0[lane])) };
                     }
                 }
                 continue;
             }
-            let firsts: [usize; WIDTH] = lanes!(lane => first(group.rows[lane]));
+            let firsts: [usize; WIDTH] = lanes!(lane => C::impulse(self.rows, group.rows[lane], 0));
             for k in pairs_of(impulses.len()) {
                 let [[a, b, c, d], [e, f, g, h]] = [&impulses[k], &impulses[k + 1]];
                 let pairs = L::scattered([

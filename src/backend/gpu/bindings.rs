@@ -63,7 +63,9 @@ bindings! {
     Colors "colors": "array<u32>", Read;
     /// Joints.
     Joints "joints": "array<Joint>", Read;
-    /// Impulses of the joints; read back.
+    /// Axes of joints.
+    Axes "axes": "array<Axis>", Read;
+    /// Impulses of the joints and of their axes; read back.
     JointImpulses "joint_impulses": "array<JointImpulse>", Write;
     /// The lists of the systems of joints that are solved at once.
     JointSystems "joint_systems": "array<u32>", Read;

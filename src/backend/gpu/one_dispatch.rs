@@ -60,7 +60,7 @@ fn shares_only_rows(kernel: Kernel) -> bool {
 fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let measured = passes.iter().any(|pass| matches!(pass.kernel, Kernel::BeginSweep { .. }));
     let contacts = if problem.contacts.is_empty() { 0 } else { 3 };
-    let joints = if problem.joints.is_empty() { 0 } else { 2 };
+    let joints = if problem.joints.is_empty() { 0 } else { 2 + usize::from(!problem.axes.is_empty()) };
     let colors = usize::from(contacts + joints > 0);
     let totals = usize::from(!problem.totals.is_empty());
     let of_bodies = [!problem.torques.is_empty(), !problem.inertias.is_empty()].map(usize::from);

@@ -35,7 +35,7 @@ pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
 }
 
 /// Rows of which a step changes little.
-pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 12] {
+pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 13] {
     [
         (Binding::Params, bytemuck::bytes_of(&problem.params)),
         (Binding::Bodies, bytemuck::cast_slice(&problem.bodies)),
@@ -44,6 +44,7 @@ pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'
         (Binding::Inertias, bytemuck::cast_slice(&problem.inertias)),
         (Binding::Colors, bytemuck::cast_slice(colors)),
         (Binding::Joints, bytemuck::cast_slice(&problem.joints)),
+        (Binding::Axes, bytemuck::cast_slice(&problem.axes)),
         (Binding::JointImpulses, bytemuck::cast_slice(&problem.joint_impulses)),
         (Binding::JointSystems, bytemuck::cast_slice(systems)),
         (Binding::Turning, bytemuck::cast_slice(&problem.turning)),

@@ -118,8 +118,12 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
         Kernel::UpdateMomentum => {
             (&[part!("lib/sum"), part!("update_momentum")], Over::Own, "update_momentum(thread)".into())
         }
-        Kernel::WarmStartJoints => {
-            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("warm_start_joints")];
+        Kernel::WarmStartJoints { axes } => {
+            let parts: &[&str] = if axes {
+                &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!("warm_start_joints")]
+            } else {
+                &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!("warm_start_joints")]
+            };
             (parts, Over::Colors, "warm_start_joint(row)".into())
         }
         Kernel::TurnInertias => (&[part!("turn_inertias")], Over::Colors, "turn_inertia(row)".into()),
@@ -140,7 +144,12 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (parts, Over::Colors, with("apply_joint_change", rules))
         }
         Kernel::SolveJoints(rules) => {
-            (&[part!("lib/pair"), part!("lib/joint"), part!("solve_joints")], Over::Colors, with("solve_joint", rules))
+            let parts: &[&str] = if rules.axes {
+                &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!("solve_joints")]
+            } else {
+                &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!("solve_joints")]
+            };
+            (parts, Over::Colors, with("solve_joint", rules))
         }
         Kernel::WarmStart(rules) => {
             (&[part!("lib/pair"), part!("warm_start")], Over::Colors, with("warm_start_contact", rules))
@@ -169,6 +178,7 @@ fn rules_text(rules: Rules) -> String {
         from_start,
         isotropic,
         friction,
+        axes: _,
     } = rules;
     let friction = match friction {
         FrictionRule::None => "NONE",

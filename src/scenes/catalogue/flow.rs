@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
-use crate::world::{BallJoint, Body, Groups, Shape, World};
+use crate::world::{Body, Groups, Joint, Shape, World};
 
 /// Radius of the rollers of the conveyor (m), and the distance from one to the next.
 const ROLLER: f32 = 0.15;
@@ -58,7 +58,7 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     let at = place(0.0, 0.35, 0.5 * WIDTH);
     let cross = world.add(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));
     for y in [-0.5, 0.5] {
-        world.join(BallJoint::to_world(cross, Vec3::Y * y, at + slope * Vec3::Y * y));
+        world.join(Joint::to_world(cross, Vec3::Y * y, at + slope * Vec3::Y * y));
     }
     let at = place(-11.0, BALL + 0.01, 0.0);
     let ball = Body::dynamic().named("ball").shape(Shape::ball(BALL)).density(100.0).groups(groups(balls, u32::MAX));

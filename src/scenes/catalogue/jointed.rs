@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::common::centered;
 use crate::scenes::scene::Scene;
-use crate::world::{BallJoint, Body, Shape, World};
+use crate::world::{Body, Joint, Shape, World};
 
 /// A ball at the end of `length` (m), lifted by `degrees` from where it would hang. Its radius is a tenth of the length,
 /// so that its period is 0.2 % longer than that of a point.
@@ -14,7 +14,7 @@ pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     let Vec3 { x, y, z } = turn * (-length * Vec3::Y);
     let ball =
         world.add(Body::dynamic().named("ball").shape(Shape::ball(0.1 * length)).rotation(turn).position(x, y, z));
-    world.join(BallJoint::to_world(ball, length * Vec3::Y, Vec3::ZERO));
+    world.join(Joint::to_world(ball, length * Vec3::Y, Vec3::ZERO));
     Scene::new("pendulum", world, 600)
 }
 
@@ -32,8 +32,8 @@ pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
         let index = world.add(body.position(x, y, z));
         let top = half * Vec3::Y;
         world.join(match index.checked_sub(1) {
-            None => BallJoint::to_world(index, top, Vec3::ZERO),
-            Some(above) => BallJoint::new(above, -HALF * Vec3::Y, index, top),
+            None => Joint::to_world(index, top, Vec3::ZERO),
+            Some(above) => Joint::new(above, -HALF * Vec3::Y, index, top),
         });
     };
     for k in 0..links {
@@ -64,7 +64,7 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     // Joins a body's right side, at this place in its frame, to the left side of the next plank.
     let join = |world: &mut World, body: usize, side: Vec3, next: usize, next_side: Vec3| {
         for z in [-0.8, 0.8].map(|z| z * Vec3::Z) {
-            world.join(BallJoint::new(body, side + z, next, next_side + z));
+            world.join(Joint::new(body, side + z, next, next_side + z));
         }
     };
     let half_pitch = 0.5 * PITCH * Vec3::X;
@@ -106,11 +106,11 @@ pub(super) fn grid(n: usize, ratio: f32) -> Scene {
         let density = if i == heavy { 1000.0 * ratio } else { 1000.0 };
         world.add(ball(density).position(place.x, place.y, place.z));
         if column > 0 {
-            world.join(BallJoint::new(i - 1, to_x, i, -to_x));
+            world.join(Joint::new(i - 1, to_x, i, -to_x));
         }
         world.join(match i.checked_sub(n) {
-            None => BallJoint::to_world(i, -to_z, place - to_z),
-            Some(above) => BallJoint::new(above, to_z, i, -to_z),
+            None => Joint::to_world(i, -to_z, place - to_z),
+            Some(above) => Joint::new(above, to_z, i, -to_z),
         });
     }
     Scene::new("joint-grid", world, 600)

@@ -8,6 +8,7 @@ mod drum;
 mod entry;
 mod flow;
 mod jointed;
+mod machines;
 mod masonry;
 mod stacks;
 
@@ -230,6 +231,34 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[0] * v[0],
         build: |v| Ok(jointed::grid(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "four-bar",
+        summary: "a motor turns a crank, and a coupler swings a rocker: between the angles that their lengths give",
+        parameters: &[Parameter::real("speed", 6.0, (-20.0, 20.0), "speed of the crank [rad/s]")],
+        bodies: |_| 3.0,
+        build: |v| Ok(machines::four_bar(v[0] as f32)),
+    },
+    Entry {
+        name: "drawbridge",
+        summary: "two winches pull up a deck with a crate on it: at their speed, to the limit of its hinge",
+        parameters: &[Parameter::real("load", 100.0, (0.0, 1000.0), "mass of the crate [kg]")],
+        bodies: |_| 2.0,
+        build: |v| Ok(machines::drawbridge(v[0] as f32)),
+    },
+    Entry {
+        name: "car",
+        summary: "a car on sprung wheels drives over bumps: it reaches its speed and stays upright",
+        parameters: &[Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]")],
+        bodies: |_| 5.0,
+        build: |v| Ok(machines::car(v[0] as f32)),
+    },
+    Entry {
+        name: "ragdoll",
+        summary: "n ragdolls fall down stairs: joints stay closed and within their limits, all come to rest",
+        parameters: &[Parameter::whole("n", 1, (1.0, 1000.0), "number of ragdolls")],
+        bodies: |v| 11.0 * v[0],
+        build: |v| Ok(machines::ragdoll(v[0] as usize)),
     },
     Entry {
         name: "arch",

@@ -86,7 +86,7 @@ fn body(file: &BodyFile) -> Result<Body> {
         .restitution(restitution?[0]);
     for (k, shape_file) in file.shapes.iter().enumerate() {
         let (shape, at, turned) = shape(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?;
-        body = body.shape_at(shape, at, turned);
+        body = if shape_file.sensor { body.sensor_at(shape, at, turned) } else { body.shape_at(shape, at, turned) };
     }
     let body = with_mass(body, file)?;
     body.check().map(|()| body)

@@ -2,10 +2,12 @@
 
 use std::fmt;
 
-use super::numbers::lengths;
-use super::schema::{BodyRef, JointFile};
+use glam::{Quat, Vec3};
+
+use super::numbers::{finite, lengths, positive, rotation, unit};
+use super::schema::{AxisFile, BodyRef, JointFile, JointKind, MotorFile, SpringFile};
 use crate::error::{Error, Result, ensure, input};
-use crate::world::{BallJoint, BodyKind, World};
+use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, World};
 
 impl fmt::Display for BodyRef {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -38,8 +40,8 @@ impl BodyRef {
 }
 
 /// The joint that `file` describes, between bodies of `world`.
-pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
-    let JointFile::Ball { bodies, anchor, anchors, collide } = file;
+pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
+    let JointFile { bodies, anchor, anchors, collide, break_force, kind } = file;
     let (a, b) = match &bodies[..] {
         [a] => (a.find(world)?, None),
         [a, b] => (a.find(world)?, Some(b.find(world)?)),
@@ -58,5 +60,86 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<BallJoint> {
         (None, Some([on_a, on_b])) => (lengths("anchors[0]", *on_a)?.into(), lengths("anchors[1]", *on_b)?.into()),
         _ => return Err(Error::input("anchor and anchors: give one of them")),
     };
-    Ok(BallJoint { body_b: b, collide: *collide, ..BallJoint::to_world(a, anchor_a, anchor_b) })
+    let break_force = match break_force {
+        Some(force) => positive("break_force", [*force])?[0],
+        None => f32::INFINITY,
+    };
+    let joint = Joint { body_b: b, collide: *collide, break_force, ..Joint::to_world(a, anchor_a, anchor_b) };
+    // Frames that agree as the bodies stand.
+    let in_world = |frame: Quat| {
+        let on = |body: usize| (world.bodies[body].rotation.inverse() * frame).normalize();
+        Joint { frame_a: on(a), frame_b: b.map_or(frame, on), ..joint }
+    };
+    let along = |direction: &[f64; 3]| -> Result<Joint> {
+        let direction = Vec3::from(unit("axis", *direction)?);
+        Ok(in_world(Quat::from_rotation_arc(Vec3::X, direction)))
+    };
+    const LOCKED: Axis = Axis::LOCKED;
+    let joint = match kind {
+        JointKind::Ball {} => joint,
+        JointKind::Fixed {} => in_world(Quat::IDENTITY).fixed(),
+        JointKind::Hinge { axis, limits, motor, spring } => {
+            let turn = read_axis("", false, limits, motor, spring)?;
+            along(axis)?.generic([LOCKED; 3], [turn, LOCKED, LOCKED])
+        }
+        JointKind::Slider { axis, limits, motor, spring } => {
+            let shift = read_axis("", false, limits, motor, spring)?;
+            along(axis)?.generic([shift, LOCKED, LOCKED], [LOCKED; 3])
+        }
+        JointKind::Distance { limits, motor, spring } => {
+            joint.at_distance(read_axis("", false, limits, motor, spring)?)
+        }
+        JointKind::Generic { frame, frames, linear, angular } => {
+            let [linear, angular] = [("linear", linear), ("angular", angular)].map(|(name, axes)| {
+                let mut read = [LOCKED; 3];
+                for (i, AxisFile { locked, limits, motor, spring }) in axes.iter().enumerate() {
+                    read[i] = read_axis(&format!("{name}[{i}]."), *locked, limits, motor, spring)?;
+                }
+                Ok(read)
+            });
+            let joint = match frames {
+                Some([frame_a, frame_b]) => {
+                    let (frame_a, frame_b) = (rotation("frames[0]", *frame_a)?, rotation("frames[1]", *frame_b)?);
+                    Joint { frame_a, frame_b, ..joint }
+                }
+                None => in_world(rotation("frame", *frame)?),
+            };
+            joint.generic(linear?, angular?)
+        }
+    };
+    joint.check_axes()?;
+    Ok(joint)
+}
+
+fn read_axis(
+    name: &str,
+    locked: bool,
+    limits: &Option<[f64; 2]>,
+    motor: &Option<MotorFile>,
+    spring: &Option<SpringFile>,
+) -> Result<Axis> {
+    let bounds = match limits {
+        Some(_) if locked => return Err(input!("{name}locked and {name}limits: give one of them")),
+        Some(limits) => {
+            let [min, max] = finite(format!("{name}limits"), *limits)?;
+            Bounds::Between { min, max }
+        }
+        None if locked => Bounds::Locked,
+        None => Bounds::Free,
+    };
+    let number = |key: &str, value: f64| -> Result<f32> { Ok(finite(format!("{name}{key}"), [value])?[0]) };
+    let drive = match (motor, spring) {
+        (Some(_), Some(_)) => return Err(input!("{name}motor and {name}spring: give one of them")),
+        (Some(MotorFile { speed, max_load }), None) => {
+            Drive::Motor { speed: number("motor.speed", *speed)?, max_load: number("motor.max_load", *max_load)? }
+        }
+        (None, Some(SpringFile { target, frequency, damping_ratio, max_load })) => Drive::Spring {
+            target: number("spring.target", *target)?,
+            frequency: number("spring.frequency", *frequency)?,
+            damping_ratio: number("spring.damping_ratio", *damping_ratio)?,
+            max_load: max_load.map_or(Ok(f32::MAX), |max_load| number("spring.max_load", max_load))?,
+        },
+        (None, None) => Drive::None,
+    };
+    Ok(Axis { bounds, drive })
 }

@@ -6,7 +6,10 @@ mod numbers;
 mod schema;
 mod write;
 
-pub use schema::{BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
+pub use schema::{
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
+    SpawnerFile, SpringFile,
+};
 
 use std::path::Path;
 

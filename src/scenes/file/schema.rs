@@ -174,6 +174,9 @@ pub struct ShapeFile {
     /// Rotation in the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
     #[serde(default = "defaults::rotation")]
     pub rotation: [f64; 4],
+    /// Whether the shape is a sensor: it meets others without contacts.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub sensor: bool,
     /// The shape itself. Refuses the keys that are unknown to both.
     #[serde(flatten)]
     pub geometry: Geometry,
@@ -241,25 +244,143 @@ pub enum Geometry {
     },
 }
 
-/// A joint of a scene file.
+/// A joint of a scene file. Needs an anchor or anchors.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[schemars(title = "Joint", extend("unevaluatedProperties" = false))]
+pub struct JointFile {
+    /// One body, which is tied to the world, or two; at least one of them dynamic. Places, angles and speeds of a joint are those of the first
+    /// against the second.
+    #[schemars(length(min = 1, max = 2))]
+    pub bodies: Vec<BodyRef>,
+    /// The point where the bodies are tied as they stand, in the world (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anchor: Option<[f64; 3]>,
+    /// The point in the frame of each body (m); with one body, the second is in the world.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anchors: Option<[[f64; 3]; 2]>,
+    /// Whether the two bodies still collide with each other.
+    #[serde(default)]
+    pub collide: bool,
+    /// The force at which it breaks (N), more than 0; it holds any if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub break_force: Option<f64>,
+    /// The kind of joint. Refuses the keys that are unknown to both.
+    #[serde(flatten)]
+    pub kind: JointKind,
+}
+
+/// What a joint leaves free. Angles are zero as the bodies stand.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-#[schemars(title = "Joint")]
+#[schemars(title = "Kind of joint")]
 #[non_exhaustive]
-pub enum JointFile {
-    /// Keeps a point of one body together with a point of another, or of the world. Needs an anchor or anchors.
-    Ball {
-        /// One body, which is tied to the world, or two; at least one of them dynamic.
-        #[schemars(length(min = 1, max = 2))]
-        bodies: Vec<BodyRef>,
-        /// The point where the bodies are tied as they stand, in the world (m).
-        anchor: Option<[f64; 3]>,
-        /// The point in the frame of each body (m); with one body, the second is in the world.
-        anchors: Option<[[f64; 3]; 2]>,
-        /// Whether the two bodies still collide with each other.
-        #[serde(default)]
-        collide: bool,
+pub enum JointKind {
+    /// Keeps the points together.
+    Ball {},
+    /// Nothing.
+    Fixed {},
+    /// Turning about an axis.
+    Hinge {
+        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        axis: [f64; 3],
+        /// Least and largest angle (rad), -pi to pi.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        limits: Option<[f64; 2]>,
+        /// A motor about the axis (rad/s, N m), instead of a spring.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        motor: Option<MotorFile>,
+        /// A spring about the axis (rad, N m).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        spring: Option<SpringFile>,
     },
+    /// Shifting along an axis.
+    Slider {
+        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        axis: [f64; 3],
+        /// Least and largest place (m).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        limits: Option<[f64; 2]>,
+        /// A motor along the axis (m/s, N), instead of a spring.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        motor: Option<MotorFile>,
+        /// A spring along the axis (m, N).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        spring: Option<SpringFile>,
+    },
+    /// All but the distance of the points: a rope, a rod or a spring.
+    Distance {
+        /// Least and largest distance (m), the same of a rod.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        limits: Option<[f64; 2]>,
+        /// A winch (m/s, N), instead of a spring.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        motor: Option<MotorFile>,
+        /// A spring (m, N).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        spring: Option<SpringFile>,
+    },
+    /// What each of the axes says.
+    Generic {
+        /// Rotation from the axes of the joint to the world, as the bodies stand: a quaternion x, y, z, w of length 1 within 0.001.
+        #[serde(default = "defaults::rotation")]
+        frame: [f64; 4],
+        /// Rotations from the axes of the joint to the frame of each body, instead of `frame`; with one body, the second is to the world. Angles
+        /// are zero where they agree.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        frames: Option<[[f64; 4]; 2]>,
+        /// Shifts along the three axes (m).
+        linear: Box<[AxisFile; 3]>,
+        /// Turns about the three axes (rad).
+        angular: Box<[AxisFile; 3]>,
+    },
+}
+
+/// One axis of a generic joint; free if it says nothing.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(title = "Axis")]
+pub struct AxisFile {
+    /// Whether it is held at zero; limits are then not given.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub locked: bool,
+    /// Least and largest place (m) or angle (rad).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<[f64; 2]>,
+    /// A motor, instead of a spring.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motor: Option<MotorFile>,
+    /// A spring.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spring: Option<SpringFile>,
+}
+
+/// A motor of a joint.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Motor")]
+pub struct MotorFile {
+    /// The speed that it holds (m/s, rad/s). 0 makes dry friction.
+    pub speed: f64,
+    /// The most that it pushes or pulls (N, N m).
+    pub max_load: f64,
+}
+
+/// A spring and damper of a joint.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Spring")]
+pub struct SpringFile {
+    /// Where it is at rest (m, rad).
+    #[serde(default)]
+    pub target: f64,
+    /// How often a second what it moves swings without damper (Hz), more than 0.
+    pub frequency: f64,
+    /// 0 without damping, 1 where it no longer swings.
+    #[serde(default = "defaults::damping_ratio")]
+    pub damping_ratio: f64,
+    /// The most that it pushes or pulls (N, N m); any if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_load: Option<f64>,
 }
 
 /// Which body of the scene.
@@ -283,6 +404,10 @@ mod defaults {
 
     pub(super) fn steps() -> u32 {
         600
+    }
+
+    pub(super) fn damping_ratio() -> f64 {
+        1.0
     }
 
     pub(super) fn rotation() -> [f64; 4] {

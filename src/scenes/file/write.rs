@@ -2,11 +2,14 @@
 
 use parry3d::shape::TypedShape;
 
-use super::schema::{BodyFile, BodyRef, Geometry, JointFile, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
+use super::schema::{
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
+    SpawnerFile, SpringFile,
+};
 use crate::error::{Error, Result, ensure, input};
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
-use crate::world::{BallJoint, Body, BodyKind, Collider};
+use crate::world::{Axis, Body, BodyKind, Bounds, Collider, Drive, Joint, Linear};
 
 /// The file of a scene: every number as it is, to the last bit. A body has the index in the file that it has among the bodies that are there.
 pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
@@ -29,6 +32,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
         bodies.push(body(&world.bodies[i], leaves).map_err(of_body)?);
     }
     let of_spawner = |(k, s): (usize, &Spawner)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
+    let of_joint = |(k, j): (usize, &Joint)| joint(j, &index_of).map_err(|e| e.within(format_args!("joints[{k}]")));
     Ok(SceneFile {
         version: 1,
         name: Some(scene.name.clone()),
@@ -37,7 +41,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
         steps: scene.steps,
         container: scene.container.map(|(low, high)| [low, high].map(|corner| numbers(corner.to_array()))),
         bodies,
-        joints: world.joints.iter().map(|joint| self::joint(joint, &index_of)).collect(),
+        joints: world.joints.iter().enumerate().map(of_joint).collect::<Result<_>>()?,
         spawners: scene.spawners.iter().enumerate().map(of_spawner).collect::<Result<_>>()?,
     })
 }
@@ -109,14 +113,55 @@ fn shape(c: &Collider) -> Result<ShapeFile> {
         }
         _ => return Err(input!("a shape of type {:?}: no scene file can say it", c.shape)),
     };
-    Ok(ShapeFile { position: numbers(c.position.to_array()), rotation: numbers(c.rotation.to_array()), geometry })
+    let (position, rotation) = (numbers(c.position.to_array()), numbers(c.rotation.to_array()));
+    Ok(ShapeFile { position, rotation, sensor: c.sensor, geometry })
 }
 
-fn joint(joint: &BallJoint, index_of: &[usize]) -> JointFile {
-    JointFile::Ball {
+fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
+    let kind = match joint.linear {
+        _ if joint.is_ball() => JointKind::Ball {},
+        Linear::Distance(distance) if joint.angular == [Axis::FREE; 3] => {
+            let AxisFile { locked: _, limits, motor, spring } = axis(&distance);
+            JointKind::Distance { limits, motor, spring }
+        }
+        Linear::Distance(_) => {
+            return Err(input!("its distance and its angles are guided: no scene file can say both"));
+        }
+        Linear::Axes(linear) => JointKind::Generic {
+            frame: [0.0, 0.0, 0.0, 1.0],
+            frames: Some([joint.frame_a, joint.frame_b].map(|frame| numbers(frame.to_array()))),
+            linear: Box::new(linear.each_ref().map(axis)),
+            angular: Box::new(joint.angular.each_ref().map(axis)),
+        },
+    };
+    Ok(JointFile {
         bodies: [Some(joint.body_a), joint.body_b].into_iter().flatten().map(|b| BodyRef::Index(index_of[b])).collect(),
         anchor: None,
         anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
         collide: joint.collide,
+        break_force: (joint.break_force < f32::INFINITY).then(|| number(joint.break_force)),
+        kind,
+    })
+}
+
+fn axis(axis: &Axis) -> AxisFile {
+    let mut file = AxisFile { locked: axis.bounds == Bounds::Locked, ..AxisFile::default() };
+    if let Bounds::Between { min, max } = axis.bounds {
+        file.limits = Some([number(min), number(max)]);
     }
+    match axis.drive {
+        Drive::None => {}
+        Drive::Motor { speed, max_load } => {
+            file.motor = Some(MotorFile { speed: number(speed), max_load: number(max_load) });
+        }
+        Drive::Spring { target, frequency, damping_ratio, max_load } => {
+            file.spring = Some(SpringFile {
+                target: number(target),
+                frequency: number(frequency),
+                damping_ratio: number(damping_ratio),
+                max_load: (max_load < f32::MAX).then(|| number(max_load)),
+            });
+        }
+    }
+    file
 }

@@ -1,0 +1,130 @@
+// The axes of a joint: body a is held, limited or driven along each or about it. Doubles: src/kernels/axis.rs.
+
+struct AxisMotion { along: vec3f, about_a: vec3f, about_b: vec3f, moved: f32 }
+
+// The vector by which a turned against b since the step began.
+fn relative_turn(pair: ptr<function, Pair>) -> vec3f {
+    let q = quat_mul((*pair).a.dq, conjugate((*pair).b.dq));
+    let half = q.xyz * select(1.0, -1.0, 0.0 > q.w);
+    return half * (2.0 + dot3(half, half) * (1.0 / 3.0));
+}
+
+// Distances below the root of this have no direction (m^2).
+const LEAST_SQUARE: f32 = 1e-12;
+
+struct AnchorMotion { now: vec3f, longer: f32 }
+
+// The direction of the anchors, and how much longer their distance is than when the step began, where the anchor of a shifted. Without a
+// length the direction is the one that b carried.
+fn along_anchors(carried: vec3f, shift: vec3f, length: f32) -> AnchorMotion {
+    let apart = carried * length + shift;
+    let square = dot3(apart, apart);
+    let has_direction = length > 0.0 && square > LEAST_SQUARE;
+    let now = select(carried, apart * inverse_sqrt(square), has_direction);
+    // Without the cancellation of a difference of two lengths, unless the anchors passed each other.
+    let cosine = dot3(carried, now);
+    let longer = dot3(carried + now, shift) * reciprocal(1.0 + cosine);
+    return AnchorMotion(now, select(square * inverse_sqrt(square) - length, longer, cosine > 0.0));
+}
+
+// The axis now: as it was when the step began, turned with b; that of a distance follows the anchors.
+fn axis_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AxisMotion {
+    let carried = axis.direction + turned((*pair).b.dq, axis.direction);
+    let shift = -relative_movement(pair, joint.r_a, joint.r_b);
+    let anchors = along_anchors(carried, shift, axis.length);
+    let now = anchors.now;
+    let arm_a = joint.r_a + turned((*pair).a.dq, joint.r_a);
+    let arm_b = joint.r_b + turned((*pair).b.dq, joint.r_b) + shift;
+    let shifted = select(dot3(carried, shift), anchors.longer, axis.length > 0.0);
+    let is_linear = axis.is_linear > 0.0;
+    return AxisMotion(
+        select(vec3f(), now, is_linear),
+        select(carried, cross3(arm_a, now), is_linear),
+        select(carried, cross3(arm_b, now), is_linear),
+        select(dot3(carried, relative_turn(pair)), shifted, is_linear),
+    );
+}
+
+// How fast a moves against b.
+fn axis_speed(rules: Rules, pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
+    let u = dot3(motion.along, (*pair).a.v - (*pair).b.v)
+        + (dot3(motion.about_a, (*pair).a.w) - dot3(motion.about_b, (*pair).b.w));
+    if rules.from_start {
+        let a = (*pair).start_a;
+        let b = (*pair).start_b;
+        return u + (dot3(motion.along, a.v - b.v) + (dot3(motion.about_a, a.w) - dot3(motion.about_b, b.w)));
+    }
+    return u;
+}
+
+// Applies an impulse along the axis to a, and its opposite to b.
+fn apply_axis_impulse(pair: ptr<function, Pair>, motion: AxisMotion, p: f32) {
+    (*pair).a.v += motion.along * (p * (*pair).mass_a.inv_mass);
+    (*pair).a.w += inv_inertia_times((*pair).mass_a, motion.about_a) * p;
+    (*pair).b.v -= motion.along * (p * (*pair).mass_b.inv_mass);
+    (*pair).b.w -= inv_inertia_times((*pair).mass_b, motion.about_b) * p;
+}
+
+// The speed that a unit impulse along the axis gives.
+fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
+    let turn_a = dot3(motion.about_a, inv_inertia_times((*pair).mass_a, motion.about_a));
+    let turn_b = dot3(motion.about_b, inv_inertia_times((*pair).mass_b, motion.about_b));
+    return dot3(motion.along, motion.along) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turn_a + turn_b);
+}
+
+fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
+    let motion = axis_motion(pair, joint, axis);
+    let mass = reciprocal(axis_inverse_mass(pair, motion));
+
+    // Of two limits the nearer one acts: it pushes the body inwards.
+    let is_limit = axis.range > -0.5;
+    let place = axis.gap + motion.moved;
+    let left = axis.range - place;
+    let is_upper = is_limit && place > left;
+    let sign = select(1.0, -1.0, is_upper);
+    let gap = select(place, left, is_upper);
+    let apart = is_limit && gap > 0.0;
+
+    // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
+    let is_drive = axis.mass_scale + axis.impulse_scale > 0.0;
+    var rate = 0.0;
+    var mass_scale = select(1.0, 0.0, axis.impulse_scale > 0.0);
+    var impulse_scale = 0.0;
+    if rules.biased {
+        rate = select(pass_row.joint.bias_rate * pass_row.joint.mass_scale, axis.rate, is_drive);
+        mass_scale = select(pass_row.joint.mass_scale, axis.mass_scale, is_drive);
+        impulse_scale = select(pass_row.joint.impulse_scale, axis.impulse_scale, is_drive);
+    }
+    // Apart from its limit the body may close the gap in this substep.
+    rate = select(rate, pass_row.inverse_substep, apart);
+    mass_scale = select(mass_scale, 1.0, apart);
+    impulse_scale = select(impulse_scale, 0.0, apart);
+
+    let before = joint_impulses[k].linear.x * sign;
+    let wanted = (axis_speed(rules, pair, motion) - axis.speed) * sign;
+    let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
+    let least = select(-axis.max_impulse, 0.0, is_limit);
+    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    let change = (sum - before) * sign;
+    joint_impulses[k].linear.x = sum * sign;
+    note_correction(rules.measured, change, mass);
+    apply_axis_impulse(pair, motion, change);
+}
+
+// Impulses of axes follow those of joints.
+fn solve_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        solve_axis(rules, pair, joint, axes[k], params.joint_count + k);
+    }
+}
+
+fn warm_start_axes(pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        apply_axis_impulse(pair, axis_motion(pair, joint, axes[k]), joint_impulses[params.joint_count + k].linear.x);
+    }
+}
+
+// The correction of the anchors of a joint: none where axes guide them.
+fn of_anchors(joint: Joint, change: vec3f) -> vec3f {
+    return select(change, vec3f(), joint.is_loose > 0.0);
+}

@@ -1,0 +1,7 @@
+// Joints that hold their anchors together, and nothing else. Twin: lib/axes.wgsl.
+
+fn solve_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {}
+
+fn warm_start_axes(pair: ptr<function, Pair>, joint: Joint) {}
+
+fn of_anchors(joint: Joint, change: vec3f) -> vec3f { return change; }

@@ -1,0 +1,157 @@
+//! One axis of a joint: body a is held, limited or driven along it or about it. Doubles of `shaders/lib/axes.wgsl`.
+
+use super::Rules;
+use super::pair::{note_correction, relative_movement};
+use super::rows::{Axis, Joint, Pair, StepParams};
+use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
+
+/// How bodies move along an axis: double of the WGSL struct `AxisMotion`.
+pub struct AxisMotion<L> {
+    /// Along which the bodies shift; zero for an axis to turn about.
+    pub along: Vec3<L>,
+    /// About which a turns.
+    pub about_a: Vec3<L>,
+    /// About which b turns.
+    pub about_b: Vec3<L>,
+    /// How far a moved against b since the step began.
+    pub moved: L,
+}
+
+/// Component by component.
+#[inline(always)]
+pub(super) fn select3<L: Lane>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mask) -> Vec3<L> {
+    let select = L::select;
+    vec3(select(if_false.x, if_true.x, mask), select(if_false.y, if_true.y, mask), select(if_false.z, if_true.z, mask))
+}
+
+/// The vector by which a turned against b since the step began, to 3e-4 at 1 rad.
+#[inline(always)]
+pub fn relative_turn<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
+    let q = quat_mul(pair.a.dq, conjugate(pair.b.dq));
+    let sign = L::select(L::constant(1.0), L::constant(-1.0), L::constant(0.0).gt(q.w));
+    let half = q.axis * sign;
+    half * (L::constant(2.0) + dot3(half, half) * L::constant(1.0 / 3.0))
+}
+
+/// Distances below the root of this have no direction (m²).
+const LEAST_SQUARE: f64 = 1e-12;
+
+/// The direction of the anchors, and how much longer their distance is than when the step began, where the anchor of a shifted. Without a
+/// length the direction is the one that b carried.
+#[inline(always)]
+fn along_anchors<L: Lane>(carried: Vec3<L>, shift: Vec3<L>, length: L) -> (Vec3<L>, L) {
+    let apart = carried * length + shift;
+    let square = dot3(apart, apart);
+    let has_direction = L::and(length.gt(L::constant(0.0)), square.gt(L::constant(LEAST_SQUARE)));
+    let now = select3(carried, apart * square.inverse_sqrt(), has_direction);
+    // Without the cancellation of a difference of two lengths, unless the anchors passed each other.
+    let cosine = dot3(carried, now);
+    let longer = dot3(carried + now, shift) * reciprocal(L::constant(1.0) + cosine);
+    (now, L::select(square * square.inverse_sqrt() - length, longer, cosine.gt(L::constant(0.0))))
+}
+
+/// The axis now: as it was when the step began, turned with b; that of a distance follows the anchors.
+#[inline(always)]
+pub fn axis_motion<L: Lane>(pair: &Pair<L>, joint: &Joint<L>, axis: &Axis<L>) -> AxisMotion<L> {
+    let zero = L::constant(0.0);
+    let is_linear = axis.is_linear.gt(zero);
+    let carried = axis.direction + turned(pair.b.dq, axis.direction);
+    // The anchor of a, as seen from the point of b that was there when the step began.
+    let shift = -relative_movement(pair, joint.r_a, joint.r_b);
+    let (now, distance) = along_anchors(carried, shift, axis.length);
+    let arm_a = joint.r_a + turned(pair.a.dq, joint.r_a);
+    let arm_b = joint.r_b + turned(pair.b.dq, joint.r_b) + shift;
+    let shifted = L::select(dot3(carried, shift), distance, axis.length.gt(zero));
+    AxisMotion {
+        along: select3(Vec3::default(), now, is_linear),
+        about_a: select3(carried, cross3(arm_a, now), is_linear),
+        about_b: select3(carried, cross3(arm_b, now), is_linear),
+        moved: L::select(dot3(carried, relative_turn(pair)), shifted, is_linear),
+    }
+}
+
+/// How fast a moves against b.
+#[inline(always)]
+pub fn axis_speed<L: Lane>(rules: Rules, pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
+    let u = dot3(motion.along, pair.a.v - pair.b.v) + (dot3(motion.about_a, pair.a.w) - dot3(motion.about_b, pair.b.w));
+    if rules.from_start {
+        let (a, b) = (&pair.start_a, &pair.start_b);
+        return u + (dot3(motion.along, a.v - b.v) + (dot3(motion.about_a, a.w) - dot3(motion.about_b, b.w)));
+    }
+    u
+}
+
+/// Applies an impulse along the axis to a, and its opposite to b.
+#[inline(always)]
+fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L) {
+    pair.a.v += motion.along * (p * pair.mass_a.inv_mass);
+    pair.a.w += pair.mass_a.inv_inertia.times(motion.about_a) * p;
+    pair.b.v -= motion.along * (p * pair.mass_b.inv_mass);
+    pair.b.w -= pair.mass_b.inv_inertia.times(motion.about_b) * p;
+}
+
+/// The speed that a unit impulse along the axis gives.
+#[inline(always)]
+fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
+    let turn_a = dot3(motion.about_a, pair.mass_a.inv_inertia.times(motion.about_a));
+    let turn_b = dot3(motion.about_b, pair.mass_b.inv_inertia.times(motion.about_b));
+    dot3(motion.along, motion.along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b)
+}
+
+/// Applies the impulse that an axis already carries. Kernel `warm_start_joints`.
+#[inline(always)]
+pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axis<L>, impulse: L) {
+    let motion = axis_motion(pair, joint, axis);
+    apply_axis_impulse(pair, &motion, impulse);
+}
+
+/// Sweeps one axis. Kernel `solve_joints`.
+#[inline(always)]
+pub fn solve_axis<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    joint: &Joint<L>,
+    axis: &Axis<L>,
+    impulse: &mut L,
+) {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let motion = axis_motion(pair, joint, axis);
+    let mass = reciprocal(axis_inverse_mass(pair, &motion));
+
+    // Of two limits the nearer one acts: it pushes the body inwards.
+    let is_limit = axis.range.gt(L::constant(-0.5));
+    let place = axis.gap + motion.moved;
+    let left = axis.range - place;
+    let is_upper = L::and(is_limit, place.gt(left));
+    let sign = L::select(one, L::constant(-1.0), is_upper);
+    let gap = L::select(place, left, is_upper);
+    let apart = L::and(is_limit, gap.gt(zero));
+
+    // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
+    let is_drive = (axis.mass_scale + axis.impulse_scale).gt(zero);
+    let (mut rate, mut mass_scale, mut impulse_scale);
+    if rules.biased {
+        rate = L::select(params.joint.bias_rate * params.joint.mass_scale, axis.rate, is_drive);
+        mass_scale = L::select(params.joint.mass_scale, axis.mass_scale, is_drive);
+        impulse_scale = L::select(params.joint.impulse_scale, axis.impulse_scale, is_drive);
+    } else {
+        rate = zero;
+        mass_scale = L::select(one, zero, axis.impulse_scale.gt(zero));
+        impulse_scale = zero;
+    }
+    // Apart from its limit the body may close the gap in this substep.
+    rate = L::select(rate, params.inverse_substep, apart);
+    mass_scale = L::select(mass_scale, one, apart);
+    impulse_scale = L::select(impulse_scale, zero, apart);
+
+    let before = *impulse * sign;
+    let wanted = (axis_speed(rules, pair, &motion) - axis.speed) * sign;
+    let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
+    let least = L::select(-axis.max_impulse, zero, is_limit);
+    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    let change = (sum - before) * sign;
+    *impulse = sum * sign;
+    note_correction(rules, params, pair, change, mass);
+    apply_axis_impulse(pair, &motion, change);
+}

@@ -1,0 +1,118 @@
+//! The rows of the axes of joints: from a joint, and how it stands when the step begins.
+//!
+//! A spring of frequency w/2 pi and damping ratio z, on what moves with an effective mass m, would change its coordinate x in a substep h by
+//! a turn in phase space with the determinant exp(-2 z w h). With a = z w h the law
+//!
+//! ```text
+//! v' = s v - r x,   x' = x + h v',   s = 1 / (1 + 2 a + 2 a²),   r = w² h / (1 + a + a²/2)
+//! ```
+//!
+//! has that determinant to the third order in a and that period to the second order in w h: a spring without damper keeps its energy. A row
+//! holds 1 - s as the share of the speed that is taken away, s as the share of the impulse that is given back, and r (docs/derivation.md).
+
+use super::rows::AxisRow;
+use super::softness::softness;
+use crate::world::{Axis, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear};
+
+/// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
+/// some otherwise.
+const STIFFEST: f32 = 0.5;
+
+/// The axes of a joint that may have rows, by their numbers: 0 to 2 to shift along, 3 to 5 to turn about.
+fn axes_of(joint: &Joint) -> impl Iterator<Item = (usize, &Axis)> {
+    let linear = match &joint.linear {
+        _ if joint.holds_anchors() => &[],
+        Linear::Axes(axes) => &axes[..],
+        Linear::Distance(distance) => std::slice::from_ref(distance),
+    };
+    linear.iter().enumerate().chain((3..).zip(&joint.angular))
+}
+
+/// The rows that a joint has: the number of an axis, and whether the row is that of its drive. Drives give way to bounds and stand before
+/// them.
+pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
+    let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
+    let bounds = axes_of(joint).filter(|(_, axis)| axis.bounds != Bounds::Free);
+    drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
+}
+
+/// Writes the rows of a joint for substeps of `substep` seconds.
+pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, rows: &mut Vec<AxisRow>) {
+    let is_distance = matches!(joint.linear, Linear::Distance(_));
+    for (i, is_drive) in kinds(joint) {
+        let position = motion.position[i];
+        let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        let row = AxisRow {
+            direction: motion.direction[i].to_array(),
+            is_linear: if i < 3 { 1.0 } else { 0.0 },
+            length: if is_distance && i == 0 && position > LEAST_DISTANCE { position } else { 0.0 },
+            range: -1.0,
+            max_impulse: f32::MAX,
+            ..AxisRow::default()
+        };
+        rows.push(if is_drive {
+            driven(row, axis.drive, position, substep)
+        } else {
+            bounded(row, axis.bounds, position)
+        });
+    }
+}
+
+fn bounded(row: AxisRow, bounds: Bounds, position: f32) -> AxisRow {
+    match bounds {
+        Bounds::Between { min, max } if min < max => AxisRow { gap: position - min, range: max - min, ..row },
+        Bounds::Between { min, .. } => AxisRow { gap: position - min, ..row },
+        Bounds::Locked | Bounds::Free => AxisRow { gap: position, ..row },
+    }
+}
+
+fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
+    match drive {
+        Drive::Motor { speed, max_load } => {
+            AxisRow { speed, mass_scale: 1.0, max_impulse: largest(max_load, h), ..row }
+        }
+        Drive::Spring { target, frequency, damping_ratio, max_load } => {
+            let [rate, impulse_scale] = spring(frequency, damping_ratio, h);
+            let (gap, mass_scale) = (position - target, 1.0 - impulse_scale);
+            AxisRow { gap, rate, mass_scale, impulse_scale, max_impulse: largest(max_load, h), ..row }
+        }
+        Drive::None => row,
+    }
+}
+
+fn largest(max_load: f32, h: f32) -> f32 {
+    (max_load * h).min(f32::MAX)
+}
+
+/// The speed that a spring gives by gap in a substep, and the share of its impulse that it gives back.
+fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
+    let omega = std::f32::consts::TAU * frequency;
+    if omega * h > STIFFEST {
+        let soft = softness(frequency, damping_ratio, h, 0.0);
+        return [soft.bias_rate * soft.mass_scale, soft.impulse_scale];
+    }
+    let a = damping_ratio * omega * h;
+    [omega * omega * h / (1.0 + a + 0.5 * a * a), 1.0 / (1.0 + 2.0 * a + 2.0 * a * a)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The eigenvalues of the law of a spring are those of the motion that it stands for.
+    #[test]
+    fn a_spring_has_its_period_and_its_decay() {
+        let h = 1.0 / 480.0;
+        for (frequency, damping_ratio) in [(1.0, 0.0), (1.0, 0.1), (5.0, 0.5), (20.0, 0.2)] {
+            let [rate, keep] = spring(frequency, damping_ratio, h).map(f64::from);
+            let h = f64::from(h);
+            let omega = std::f64::consts::TAU * f64::from(frequency);
+            let a = f64::from(damping_ratio) * omega * h;
+            let turn = omega * h * (1.0 - f64::from(damping_ratio).powi(2)).sqrt();
+            let middle = (1.0 - h * rate + keep) / 2.0;
+            let (found_turn, found_decay) = ((middle / keep.sqrt()).acos(), -0.5 * keep.ln());
+            assert!((found_turn / turn - 1.0).abs() < 0.01, "{frequency} {damping_ratio}: {found_turn} {turn}");
+            assert!((found_decay - a).abs() <= 0.01 * a + 1e-9, "{frequency} {damping_ratio}: {found_decay} {a}");
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Where the axes of a joint stand, and how fast they move.
+
+use std::f32::consts::PI;
+
+use glam::{Quat, Vec3};
+
+use super::World;
+use super::joint::{Joint, Linear};
+use super::joint_axis::{Axis, Bounds, Drive};
+use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
+use crate::error::{Result, ensure};
+
+/// Where body a of a joint is against body b, and how fast it moves there: three axes to shift along, then three to turn about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMotion {
+    /// Positions (m), then angles (rad): that about the first axis, between -pi and pi, and the two of the vector by which the first axis is
+    /// turned. The first is the distance of the anchors if the joint guides that.
+    pub position: [f32; 6],
+    /// Their changes (m/s, rad/s).
+    pub speed: [f32; 6],
+    /// The world's direction of each axis. Along it, or about it, body a is pushed.
+    pub(crate) direction: [Vec3; 6],
+    /// The gap between the anchors (m).
+    anchor_gap: f32,
+}
+
+/// Distances below this have no direction (m).
+pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
+
+impl World {
+    /// Where the axes of a joint stand, and how fast they move.
+    pub fn joint_motion(&self, joint: &Joint) -> JointMotion {
+        let [anchor_a, anchor_b] = self.anchors(joint);
+        let a = &self.bodies[joint.body_a];
+        let b = joint.body_b.map(|b| &self.bodies[b]);
+        let offset = anchor_a - anchor_b;
+        let frame_b = b.map_or(Quat::IDENTITY, |b| b.rotation) * joint.frame_b;
+        let relative = (frame_b.inverse() * (a.rotation * joint.frame_a)).normalize();
+        let axes_b = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| frame_b * e);
+        let first_a = frame_b * (relative * Vec3::X);
+
+        let mut direction = [Vec3::ZERO; 6];
+        direction[..3].copy_from_slice(&axes_b);
+        direction[3..].copy_from_slice(&axes_b);
+        let mut position = [0.0; 6];
+        for (position, axis) in position.iter_mut().zip(axes_b) {
+            *position = axis.dot(offset);
+        }
+        if let Linear::Distance(_) = joint.linear {
+            let distance = offset.length();
+            let along = if distance > LEAST_DISTANCE { offset / distance } else { axes_b[0] };
+            (direction[0], position[0]) = (along, distance);
+            (direction[1], direction[2], position[1], position[2]) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
+        }
+        position[3..].copy_from_slice(&angles(relative));
+        // The angle about the first axis grows with the spin about the middle between the axes of the two bodies.
+        let both = 1.0 + axes_b[0].dot(first_a);
+        if both > 1e-3 {
+            direction[3] = (axes_b[0] + first_a) / both;
+        }
+        let velocity = a.linear_velocity + a.angular_velocity.cross(anchor_a - a.center_of_mass())
+            - b.map_or(Vec3::ZERO, |b| b.linear_velocity + b.angular_velocity.cross(anchor_a - b.center_of_mass()));
+        let spin = a.angular_velocity - b.map_or(Vec3::ZERO, |b| b.angular_velocity);
+        let speed = std::array::from_fn(|i| direction[i].dot(if i < 3 { velocity } else { spin }));
+        JointMotion { position, speed, direction, anchor_gap: anchor_a.distance(anchor_b) }
+    }
+}
+
+impl JointMotion {
+    /// How far the anchors are from where the joint is to hold them (m).
+    pub(super) fn gap(&self, joint: &Joint) -> f32 {
+        if joint.holds_anchors() {
+            return self.anchor_gap;
+        }
+        let outside = |(axis, position): (&Axis, &f32)| match axis.bounds {
+            Bounds::Free => 0.0,
+            Bounds::Locked => *position,
+            Bounds::Between { min, max } => position - position.max(min).min(max),
+        };
+        let axes = match &joint.linear {
+            Linear::Axes(axes) => &axes[..],
+            Linear::Distance(distance) => std::slice::from_ref(distance),
+        };
+        axes.iter().zip(&self.position).map(outside).map(|x| x * x).sum::<f32>().sqrt()
+    }
+}
+
+/// The angle of a rotation about the first axis, and the two components of the vector of the rotation that is left.
+fn angles(q: Quat) -> [f32; 3] {
+    let q = if q.w < 0.0 { -q } else { q };
+    let length = (q.w * q.w + q.x * q.x).sqrt();
+    // Turned by pi about an axis across the first.
+    let twist = if length > 0.0 { Quat::from_xyzw(q.x / length, 0.0, 0.0, q.w / length) } else { Quat::IDENTITY };
+    let swing = q * twist.conjugate();
+    let sine = (swing.y * swing.y + swing.z * swing.z).sqrt();
+    let per_sine = if sine > 0.0 { 2.0 * libm::atan2f(sine, swing.w) / sine } else { 2.0 };
+    [2.0 * libm::atan2f(twist.x, twist.w), swing.y * per_sine, swing.z * per_sine]
+}
+
+impl Joint {
+    /// Refuses frames that are no rotations, and limits and drives out of range.
+    pub(crate) fn check_axes(&self) -> Result<()> {
+        check_rotation("frame_a", self.frame_a)?;
+        check_rotation("frame_b", self.frame_b)?;
+        match &self.linear {
+            Linear::Axes(axes) => axes.iter().try_for_each(|axis| axis.check("linear", -MOST_LENGTH, MOST_LENGTH))?,
+            Linear::Distance(distance) => {
+                let message = || "distance: locked at zero, which is a ball joint".into();
+                ensure(distance.bounds != Bounds::Locked, message)?;
+                distance.check("distance", 0.0, MOST_LENGTH)?;
+            }
+        }
+        self.angular.iter().try_for_each(|axis| axis.check("angular", -PI, PI))
+    }
+}
+
+impl Axis {
+    fn check(&self, name: &str, least: f32, most: f32) -> Result<()> {
+        if let Bounds::Between { min, max } = self.bounds {
+            let is_range = least <= min && min <= max && max <= most;
+            ensure(is_range, || format!("{name}: limits {min} and {max}: must ascend, within {least} and {most}"))?;
+        }
+        let max_load = match self.drive {
+            Drive::None => return Ok(()),
+            Drive::Motor { speed, max_load } => {
+                let message = || format!("{name}: speed = {speed}: must be at most {MOST_SPEED:e} in size");
+                ensure(speed.abs() <= MOST_SPEED, message)?;
+                max_load
+            }
+            Drive::Spring { target, frequency, damping_ratio, max_load } => {
+                let message = || format!("{name}: target = {target}: must be within {least} and {most}");
+                ensure((least..=most).contains(&target), message)?;
+                let message = || format!("{name}: frequency = {frequency}: must be above 0 and at most 1e6 Hz");
+                ensure(frequency > 0.0 && frequency <= 1e6, message)?;
+                let message = || format!("{name}: damping_ratio = {damping_ratio}: must be 0 to 1e6");
+                ensure((0.0..=1e6).contains(&damping_ratio), message)?;
+                max_load
+            }
+        };
+        ensure(max_load >= 0.0, || format!("{name}: max_load = {max_load}: must be at least 0"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_that_a_rotation_is_made_of() {
+        for (twist, swing) in [(0.4, Vec3::new(0.0, 0.3, -0.2)), (-3.0, Vec3::ZERO), (2.0, Vec3::new(0.0, -1.0, 0.5))] {
+            let found = angles(Quat::from_scaled_axis(swing) * Quat::from_rotation_x(twist));
+            assert!(Vec3::from(found).distance(Vec3::new(twist, swing.y, swing.z)) < 1e-5, "{found:?}");
+        }
+    }
+}
