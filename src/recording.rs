@@ -239,7 +239,7 @@ impl Replay {
         let version = u32::from_le_bytes(*version);
         ensure(version == VERSION, || format!("it has version {version}, and this program reads {VERSION}"))?;
         let (mut title, mut states, mut steps) = (String::new(), Vec::<KeptState>::new(), Vec::<StepRecord>::new());
-        let mut shapes = Vec::new();
+        let mut reader = Reader::new(&[]);
         loop {
             let (header, after) = rest.split_first_chunk::<PART>().ok_or_else(cut_short)?;
             let number = |from: usize| u64::from_le_bytes(std::array::from_fn(|k| header[from + k]));
@@ -254,10 +254,9 @@ impl Replay {
                     states.push(KeptState { step: steps.len() as u32, is_jump: kind == JUMP, bytes: part.to_vec() });
                 }
                 STEP => {
-                    let mut reader = Reader::with_shapes(part, std::mem::take(&mut shapes));
+                    reader = Reader::behind(reader, part);
                     let mut record = StepRecord::blank();
                     record.walk(&mut reader)?;
-                    shapes = reader.into_shapes();
                     steps.push(record);
                 }
                 END => {

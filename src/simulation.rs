@@ -1,5 +1,6 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+mod by_body;
 mod contacts;
 mod events;
 mod hash;

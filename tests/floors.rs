@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 /// The modules of the library on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
-    &["math", "lanes", "random", "error", "memory", "names", "stats", "suggest"],
+    &["math", "lanes", "random", "error", "memory", "names", "saved", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
-    &["effort"],
+    &["effort", "queries"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
     &["backend", "solver"],
     &["simulation"],
-    &["compare"],
+    &["compare", "recording"],
     &["stages"],
 ];
 
@@ -33,7 +33,7 @@ fn identifier(text: &str) -> &str {
 
 /// What the crate's root gives on under a shorter name, and the module that it comes from.
 fn re_exports() -> BTreeMap<&'static str, &'static str> {
-    let lines = LIB.lines().filter_map(|line| line.strip_prefix("pub use "));
+    let lines = LIB.split(';').filter_map(|statement| statement.trim_start().strip_prefix("pub use "));
     let names = |line: &'static str| {
         let last = line.rsplit("::").next().unwrap_or(line);
         last.split(|c: char| !c.is_alphanumeric()).filter(|name| !name.is_empty()).map(move |n| (n, identifier(line)))

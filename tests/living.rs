@@ -14,6 +14,8 @@ const DT: f32 = 1.0 / 60.0;
 
 tests! {
     every_backend {
+        a_fixed_body_with_a_velocity_is_as_one_without,
+        settings_change_after_a_contact_ended,
         a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else,
         a_body_that_comes_lands_and_rests_on_what_sleeps,
         a_body_in_the_place_of_another_is_another_body,
@@ -316,47 +318,41 @@ fn what_comes_and_goes_has_the_same_bits_everywhere() {
 }
 
 /// The first pair of the world has no contact, and the rows of a contact that ended are free: other settings write no free rows.
-#[test]
-fn settings_change_after_a_contact_ended() {
-    for backend in [reference, cpu] {
-        let ball = |x: f32, y: f32| Body::dynamic().shape(Shape::ball(0.5)).position(x, y, 0.0);
-        let mut world = World::new();
-        world.gravity = Vec3::ZERO;
-        let near = [world.insert(ball(0.0, 0.0)), world.insert(ball(0.9, 0.9))];
-        let touching = [world.insert(ball(10.0, 0.0)), world.insert(ball(10.99, 0.0))];
-        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
-        run(&mut simulation, 1);
-        assert_eq!(simulation.manifolds().count(), 1);
-        simulation.world.remove(touching[1]);
-        run(&mut simulation, 1);
-        simulation.set_config(SolverConfig::default().without_sleep().with(|c| c.substeps = 4)).expect("good settings");
-        run(&mut simulation, 1);
-        assert_eq!(simulation.manifolds().count(), 0);
-        assert!(near.iter().all(|&body| simulation.world.body(body).expect("a ball").linear_velocity == Vec3::ZERO));
-    }
+fn settings_change_after_a_contact_ended(open: Open) {
+    let ball = |x: f32, y: f32| Body::dynamic().shape(Shape::ball(0.5)).position(x, y, 0.0);
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    let near = [world.insert(ball(0.0, 0.0)), world.insert(ball(0.9, 0.9))];
+    let touching = [world.insert(ball(10.0, 0.0)), world.insert(ball(10.99, 0.0))];
+    let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), open);
+    run(&mut simulation, 1);
+    assert_eq!(simulation.manifolds().count(), 1);
+    simulation.world.remove(touching[1]);
+    run(&mut simulation, 1);
+    simulation.set_config(SolverConfig::default().without_sleep().with(|c| c.substeps = 4)).expect("good settings");
+    run(&mut simulation, 1);
+    assert_eq!(simulation.manifolds().count(), 0);
+    assert!(near.iter().all(|&body| simulation.world.body(body).expect("a ball").linear_velocity == Vec3::ZERO));
 }
 
 /// A body that moved and became fixed keeps the numbers of its velocity, and they mean nothing.
-#[test]
-fn a_fixed_body_with_a_velocity_is_as_one_without() {
-    for backend in [reference, cpu] {
-        let mut world = World::new();
-        world.add(ground());
-        // The cube passes by the corner of the fixed one.
-        let fixed = world.insert(cube(0.0, 1.2).rotation(Quat::from_rotation_z(0.6)));
-        let passing = world.insert(cube(-1.45, 3.0).velocity(Vec3::new(0.1, 0.0, 0.0), Vec3::splat(0.5)));
-        world.body_mut(fixed).expect("a cube").kind = BodyKind::Fixed;
-        let mut still = simulation(&world, &SolverConfig::default(), backend);
-        let body = world.body_mut(fixed).expect("a cube");
-        (body.linear_velocity, body.angular_velocity) = (Vec3::new(-3.0, 0.0, 20.0), Vec3::splat(8.0));
-        assert_eq!(world.kinetic_energy(), still.world.kinetic_energy());
-        let mut moving = simulation(&world, &SolverConfig::default(), backend);
-        for step in 0..90 {
-            run(&mut still, 1);
-            run(&mut moving, 1);
-            let body = |s: &Simulation| bits(s.world.body(passing).expect("a cube"));
-            assert_eq!(body(&still), body(&moving), "step {step}");
-            assert_eq!(still.manifolds().count(), moving.manifolds().count(), "step {step}");
-        }
+fn a_fixed_body_with_a_velocity_is_as_one_without(open: Open) {
+    let mut world = World::new();
+    world.add(ground());
+    // The cube passes by the corner of the fixed one.
+    let fixed = world.insert(cube(0.0, 1.2).rotation(Quat::from_rotation_z(0.6)));
+    let passing = world.insert(cube(-1.45, 3.0).velocity(Vec3::new(0.1, 0.0, 0.0), Vec3::splat(0.5)));
+    world.body_mut(fixed).expect("a cube").kind = BodyKind::Fixed;
+    let mut still = simulation(&world, &SolverConfig::default(), open);
+    let body = world.body_mut(fixed).expect("a cube");
+    (body.linear_velocity, body.angular_velocity) = (Vec3::new(-3.0, 0.0, 20.0), Vec3::splat(8.0));
+    assert_eq!(world.kinetic_energy(), still.world.kinetic_energy());
+    let mut moving = simulation(&world, &SolverConfig::default(), open);
+    for step in 0..90 {
+        run(&mut still, 1);
+        run(&mut moving, 1);
+        let body = |s: &Simulation| bits(s.world.body(passing).expect("a cube"));
+        assert_eq!(body(&still), body(&moving), "step {step}");
+        assert_eq!(still.manifolds().count(), moving.manifolds().count(), "step {step}");
     }
 }

@@ -598,7 +598,7 @@ fn shapes_of_all_sizes_give_numbers() {
 /// A sensor hangs in the way of a ray; only who asks for sensors meets it, in a world that is simulated and in one that is not.
 #[test]
 fn a_query_looks_at_sensors_if_it_is_told() {
-    let (mut world, ball, _) = ball_over_floor();
+    let (mut world, _, ball) = ball_over_floor();
     let gate = Body::kinematic().sensor(Shape::cuboid(0.5, 0.1, 0.5)).position(0.0, 20.0, 0.0);
     let gate = world.insert(gate);
     let mut simulation = simulation(world.clone());

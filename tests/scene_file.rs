@@ -412,10 +412,10 @@ fn the_schema_describes_every_key() {
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");
     assert_eq!(keys(&schema["$defs"]["Groups"]), "filter membership");
-    assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation");
+    assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation sensor");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
     let joint = &schema["$defs"]["JointFile"];
-    assert_eq!(keys(joint), "anchor anchors bodies collide");
+    assert_eq!(keys(joint), "anchor anchors bodies break_force collide");
     assert_eq!((&joint["required"], &joint["unevaluatedProperties"]), (&json!(["bodies"]), &json!(false)));
     let kinds = joint["oneOf"].as_array().expect("kinds").iter();
     let kinds: Vec<_> = kinds.map(|kind| kind["properties"]["type"]["const"].clone()).collect();

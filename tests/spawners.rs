@@ -171,7 +171,7 @@ fn a_run_of_the_written_file_brings_the_bodies_that_were_still_to_come() {
 #[test]
 fn what_a_scene_file_cannot_say_is_refused_in_one_line() {
     let mut scene = Scene::find("tower", &[]).expect("a scene");
-    let refusal = |scene: &Scene| SceneFile::of(scene).err().expect("a refusal").to_string();
+    let refusal = |scene: &Scene| SceneFile::of(scene).expect_err("a refusal").to_string();
     scene.world.beside(&World::new());
     assert_eq!(refusal(&scene), "a scene file holds one world, and there are 2 beside each other");
     let mut scene = Scene::find("tower", &[]).expect("a scene");

@@ -188,7 +188,9 @@ fn assert_turns_as_the_reference(open: Open) {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
         for (_, inertia) in INERTIAS {
             for speed in SPEEDS {
-                world.add(spinning(inertia, speed).bodies[0].clone());
+                for body in spinning(inertia, speed).bodies {
+                    world.insert(body);
+                }
             }
         }
         let mut simulation = simulate(world, open);

@@ -179,6 +179,12 @@ impl BodyState {
 /// Farthest that something is from the origin and still touches anything (m): the square is far inside of single precision.
 pub(super) const FARTHEST: f32 = 1e15;
 
+/// Whether a box is so near that something may touch it.
+pub(super) fn is_in_range(aabb: &Aabb) -> bool {
+    let farthest = glam::Vec3::splat(FARTHEST);
+    aabb.mins.abs().cmple(farthest).all() && aabb.maxs.abs().cmple(farthest).all()
+}
+
 /// Settings of the detection, as lengths relative to the thinner shape.
 #[derive(Clone, Copy)]
 pub(super) struct Margins {

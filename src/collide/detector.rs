@@ -69,7 +69,7 @@ impl Detector {
         // Whether the colliders of a body are still those of the world.
         let mut are_current = vec![false; bodies];
         let mut next = KnownBody::default();
-        for i in 0..bodies {
+        for (i, current) in are_current.iter_mut().enumerate() {
             let mut known = self.known[i];
             let body = world.bodies.get(i);
             let mut is_left = !A::READS && body.is_some_and(|body| self.left[i].is_of(body));
@@ -89,7 +89,7 @@ impl Detector {
                 None => self.left[i].walk(archive)?,
             }
             next.colliders.first = known.colliders.first.wrapping_add(known.colliders.count);
-            (self.known[i], are_current[i]) = (known, is_current);
+            (self.known[i], *current) = (known, is_current);
         }
         self.jointed.walk(archive)?;
         let parts = archive.count(self.worlds.len())?;

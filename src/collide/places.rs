@@ -5,8 +5,8 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use rayon::prelude::*;
 
+use super::collider::is_in_range;
 use super::tree::{NOWHERE, Tree};
-use super::world_contacts::is_in_range;
 use crate::world::{Body, Collider, MOST_LENGTH, World, pose};
 
 /// A collider by its body and its index there.

@@ -11,7 +11,7 @@ use parry3d::math::Pose;
 use rayon::prelude::*;
 
 use super::collider::Activity;
-use super::collider::{BodyState, ColliderInfo, CuboidPlace, FARTHEST, Margins};
+use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins, is_in_range};
 use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
@@ -377,9 +377,4 @@ pub(super) fn box_reaches_plane(plane: &ColliderInfo, pose: Pose, aabb: &Aabb) -
 
 pub(super) fn key(i: u32, j: u32) -> (u32, u32) {
     (i.min(j), i.max(j))
-}
-
-pub(super) fn is_in_range(aabb: &Aabb) -> bool {
-    let farthest = glam::Vec3::splat(FARTHEST);
-    aabb.mins.abs().cmple(farthest).all() && aabb.maxs.abs().cmple(farthest).all()
 }

@@ -1,13 +1,11 @@
 //! Where a walk writes to, or reads from.
 
+use std::any::Any;
 use std::collections::HashMap;
-use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::shapes::content;
 use crate::error::{Result, ensure, input};
-use crate::world::Shape;
 
 /// Bytes that a walk writes, or reads back.
 pub(crate) trait Archive: Sized {
@@ -26,8 +24,13 @@ pub(crate) trait Archive: Sized {
     /// Writes the number of things that take a byte or more each, or reads it: no more than bytes are left.
     fn count(&mut self, count: usize) -> Result<usize>;
 
-    /// Writes a shape, or reads it: what was one shape is one again.
-    fn shape(&mut self, shape: &mut Shape) -> Result<()>;
+    /// Writes a value by `walk`, or reads it: values of the same address are written once, and read they share one address again.
+    fn shared<T: Clone + Send + Sync + 'static>(
+        &mut self,
+        value: &mut T,
+        address: usize,
+        walk: fn(&mut T, &mut Self) -> Result<()>,
+    ) -> Result<()>;
 
     /// Writes or reads what `walk` does. What has the same bytes as before takes a byte or two.
     fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
@@ -60,8 +63,8 @@ pub(crate) trait Archive: Sized {
 #[derive(Default)]
 pub(crate) struct Writer {
     pub bytes: Vec<u8>,
-    /// The shapes that are written, with their numbers, by their addresses: a shape that is kept keeps its address.
-    shapes: HashMap<usize, (u64, Shape)>,
+    /// The shared values that are written, with their numbers, by their addresses: a value that is kept keeps its address.
+    shared: HashMap<usize, (u64, Shared)>,
     /// The numbers of bytes that were written once, the last such bytes, and memory for the next.
     repeated: HashMap<Vec<u8>, u64>,
     last: (Vec<u8>, u64),
@@ -69,9 +72,9 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    /// Writes behind bytes of another one, in which its shapes stood.
+    /// Writes behind bytes of another one, in which shared values stood.
     pub fn behind(other: Self) -> Self {
-        Self { shapes: other.shapes, ..Self::default() }
+        Self { shared: other.shared, ..Self::default() }
     }
 }
 
@@ -98,12 +101,17 @@ impl Archive for Writer {
         Ok(count)
     }
 
-    fn shape(&mut self, shape: &mut Shape) -> Result<()> {
-        let next = self.shapes.len() as u64;
-        let known = self.shapes.entry(Arc::as_ptr(&shape.0.0).addr()).or_insert_with(|| (next, shape.clone()));
+    fn shared<T: Clone + Send + Sync + 'static>(
+        &mut self,
+        value: &mut T,
+        address: usize,
+        walk: fn(&mut T, &mut Self) -> Result<()>,
+    ) -> Result<()> {
+        let next = self.shared.len() as u64;
+        let known = self.shared.entry(address).or_insert_with(|| (next, Box::new(value.clone())));
         let mut number = known.0;
         self.number(&mut number)?;
-        if number == next { content(shape, self) } else { Ok(()) }
+        if number == next { walk(value, self) } else { Ok(()) }
     }
 
     /// New bytes are a 0 and themselves; others are by how many new ones they came before the next.
@@ -128,27 +136,25 @@ impl Archive for Writer {
     }
 }
 
+/// A value that several things share.
+type Shared = Box<dyn Any + Send + Sync>;
+
 /// Reads.
 pub(crate) struct Reader<'a> {
     rest: &'a [u8],
-    shapes: Vec<Shape>,
+    shared: Vec<Shared>,
     repeated: Vec<&'a [u8]>,
 }
 
 impl<'a> Reader<'a> {
     /// Reads these bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, shapes: Vec::new(), repeated: Vec::new() }
+        Self { rest: bytes, shared: Vec::new(), repeated: Vec::new() }
     }
 
-    /// Reads these bytes, behind others in which shapes stood.
-    pub fn with_shapes(bytes: &'a [u8], shapes: Vec<Shape>) -> Self {
-        Self { rest: bytes, shapes, repeated: Vec::new() }
-    }
-
-    /// All shapes that stood in them.
-    pub fn into_shapes(self) -> Vec<Shape> {
-        self.shapes
+    /// Reads these bytes, behind those of another one in which shared values stood.
+    pub fn behind(other: Reader, bytes: &'a [u8]) -> Self {
+        Self { rest: bytes, shared: other.shared, repeated: Vec::new() }
     }
 
     /// Whether all is read.
@@ -187,15 +193,20 @@ impl Archive for Reader<'_> {
         Ok(count as usize)
     }
 
-    fn shape(&mut self, shape: &mut Shape) -> Result<()> {
+    fn shared<T: Clone + Send + Sync + 'static>(
+        &mut self,
+        value: &mut T,
+        _: usize,
+        walk: fn(&mut T, &mut Self) -> Result<()>,
+    ) -> Result<()> {
         let mut number = 0;
         self.number(&mut number)?;
-        if number == self.shapes.len() as u64 {
-            content(shape, self)?;
-            self.shapes.push(shape.clone());
+        if number == self.shared.len() as u64 {
+            walk(value, self)?;
+            self.shared.push(Box::new(value.clone()));
         }
-        let known = self.shapes.get(number as usize);
-        *shape = known.ok_or_else(|| input!("shape {number} of {}", self.shapes.len()))?.clone();
+        let known = self.shared.get(number as usize).and_then(|known| known.downcast_ref::<T>());
+        value.clone_from(known.ok_or_else(|| input!("shape {number} of {}", self.shared.len()))?);
         Ok(())
     }
 

@@ -5,7 +5,6 @@
 
 mod archive;
 mod plain;
-mod shapes;
 
 pub(crate) use archive::{Archive, Reader, Writer};
 

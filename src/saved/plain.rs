@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{BuildHasher, Hash};
-use std::sync::LazyLock;
 
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::Aabb;
@@ -10,7 +9,6 @@ use parry3d::math::Pose;
 
 use super::{Archive, Saved};
 use crate::error::{Result, input};
-use crate::world::Shape;
 
 /// Numbers by their bytes, the least first.
 macro_rules! by_bytes {
@@ -212,16 +210,5 @@ impl<K: Saved + Ord + Copy, V: Saved> Saved for BTreeMap<K, V> {
         all.walk(archive)?;
         *self = all.into_iter().collect();
         Ok(())
-    }
-}
-
-impl Saved for Shape {
-    fn blank() -> Self {
-        static BLANK: LazyLock<Shape> = LazyLock::new(|| Shape::ball(1.0));
-        BLANK.clone()
-    }
-
-    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        archive.shape(self)
     }
 }

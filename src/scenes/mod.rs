@@ -6,6 +6,7 @@ mod file;
 mod find;
 mod scene;
 mod spawner;
+mod spawners;
 
 pub use catalogue::{CATALOGUE, Entry, Parameter};
 #[cfg(feature = "serde")]
@@ -14,4 +15,5 @@ pub use file::{
     SpawnerFile, SpringFile, load, schema,
 };
 pub use scene::{Group, Scene};
-pub use spawner::{Leaves, Spawner, Spawners};
+pub use spawner::{Leaves, Spawner};
+pub use spawners::Spawners;

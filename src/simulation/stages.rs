@@ -1,6 +1,6 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
-use super::contacts::ByBody;
+use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;

@@ -12,6 +12,7 @@ mod lever;
 mod limits;
 mod mass;
 mod shape;
+mod shape_parts;
 mod surface;
 
 pub use bodies::{Bodies, BodyHandle};

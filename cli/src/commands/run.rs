@@ -56,11 +56,11 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", help_heading = OUTPUT, conflicts_with = "save_problem")]
     record: Option<PathBuf>,
     /// Steps from each hash of all bodies to the next in the recording.
-    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 10, requires = "record")]
+    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 10, requires = "record", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     hash_every: u32,
     /// Steps from each whole state to the next in the recording.
-    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 600, requires = "record")]
+    #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 600, requires = "record", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     state_every: u32,
 }

@@ -251,7 +251,7 @@ impl WorldContacts {
         }
         // The first of the slots of each pair that is made again, and one past the last.
         let mut slots_of = vec![0_u32];
-        for i in 0..count {
+        for (i, remade) in are_remade.iter_mut().enumerate() {
             let mut flags = Flags::default();
             let (mut i_key, mut manifolds) = (self.keys[i], 0);
             if !A::READS {
@@ -259,13 +259,13 @@ impl WorldContacts {
                 let plain = Track::of(&Pair::new(pair.collider_a, pair.collider_b, &self.colliders), &self.colliders);
                 let are_current = are_current[i_key.0 as usize] && are_current[i_key.1 as usize];
                 let is_plain = are_current && is_plain(pair, track, &plain);
-                are_remade[i] = is_plain && self.is_remade(i);
+                *remade = is_plain && self.is_remade(i);
                 flags = Flags {
                     is_swapped: pair.collider_a > pair.collider_b,
                     takes_part: pair.takes_part,
                     is_plain,
                     is_computed: track.predicted != NEVER,
-                    are_remade: are_remade[i],
+                    are_remade: *remade,
                     manifolds: pair.manifolds.len().min(3) as u8,
                 };
                 manifolds = pair.manifolds.len();
@@ -308,7 +308,7 @@ impl WorldContacts {
             })?;
             (pair.takes_part, track.takes_part) = (flags.takes_part, f32::from(flags.takes_part));
             walk_track(&mut track, flags, share * pair.size + added, &mut places, world, archive)?;
-            are_remade[i] = flags.are_remade && flags.is_plain && flags.is_computed;
+            *remade = flags.are_remade && flags.is_plain && flags.is_computed;
             if flags.are_remade {
                 for _ in 0..manifolds {
                     let mut slot = 0;

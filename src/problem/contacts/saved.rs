@@ -344,6 +344,9 @@ fn walk_impulses<A: Archive>(impulses: &mut [ImpulseRow], archive: &mut A) -> Re
     Ok(())
 }
 
+/// A slot by its index, with what of it does not follow from its manifold.
+type OtherSlot = (u32, (Write, (bool, (f32, Edge))));
+
 /// Slots and edges, which are those of the manifolds of the detector; whether each has one.
 fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, archive: &mut A) -> Result<Vec<bool>> {
     let Slots { all, edges, colliders, free, taken } = slots;
@@ -363,7 +366,7 @@ fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, archive: &mut 
         }
     }
     // What waits for the next step, and what the last one left otherwise.
-    let mut others: Vec<(u32, (Write, (bool, (f32, Edge))))> = Vec::new();
+    let mut others: Vec<OtherSlot> = Vec::new();
     if A::READS {
         (*all, *edges) = settled.into_iter().unzip();
     } else {

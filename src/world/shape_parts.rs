@@ -1,11 +1,13 @@
 //! Shapes by what they were made of.
 
+use std::sync::{Arc, LazyLock};
+
 use glam::Vec3;
 use parry3d::shape::TypedShape;
 
-use super::{Archive, Saved};
+use super::Shape;
 use crate::error::{Result, input};
-use crate::world::Shape;
+use crate::saved::{Archive, Saved};
 
 /// What each kind of shape is made of.
 #[derive(Default)]
@@ -17,10 +19,23 @@ struct Parts {
     rows: Vec<Vec<f32>>,
 }
 
-super::fields!(Parts { kind, sizes, points, triangles, rows });
+crate::saved::fields!(Parts { kind, sizes, points, triangles, rows });
+
+/// What was one shape is one again.
+impl Saved for Shape {
+    fn blank() -> Self {
+        static BLANK: LazyLock<Shape> = LazyLock::new(|| Shape::ball(1.0));
+        BLANK.clone()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let address = Arc::as_ptr(&self.0.0).addr();
+        archive.shared(self, address, content)
+    }
+}
 
 /// Writes what a shape was made of, or makes it again.
-pub(super) fn content<A: Archive>(shape: &mut Shape, archive: &mut A) -> Result<()> {
+fn content<A: Archive>(shape: &mut Shape, archive: &mut A) -> Result<()> {
     let mut parts = if A::READS { Parts::default() } else { parts(shape)? };
     parts.walk(archive)?;
     if A::READS {
