@@ -47,9 +47,10 @@ impl Default for RecordingIntervals {
 ///     recorder.step(&mut simulation, 1.0 / 60.0)?;
 /// }
 /// let bytes = recorder.finish(&mut simulation)?;
-/// let mut replay = Replay::read(&bytes, Box::new(Reference::<f32>::new()))?;
-/// replay.seek(40)?;
-/// assert_eq!(replay.simulation().hash(), simulation.hash());
+/// let mut replay = Replay::read(&bytes)?;
+/// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+/// replay.seek(&mut again, 40)?;
+/// assert_eq!(again.hash(), simulation.hash());
 /// assert!(replay.first_difference().is_none());
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -206,13 +207,12 @@ struct KeptState {
     bytes: Vec<u8>,
 }
 
-/// A recording that runs again.
+/// A recording that runs again, in a simulation of the caller.
 pub struct Replay {
     title: String,
     /// Ascending by their steps.
     states: Vec<KeptState>,
     steps: Vec<StepRecord>,
-    simulation: Simulation,
     step: u32,
     agreed: u32,
     difference: Option<ReplayDifference>,
@@ -228,11 +228,11 @@ impl Replay {
     ///
     /// # Errors
     /// The bytes are none of a recording, of another version, damaged or cut short.
-    pub fn read(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
-        Self::read_parts(bytes, backend).map_err(|error| error.within("a recording that cannot be replayed"))
+    pub fn read(bytes: &[u8]) -> Result<Self> {
+        Self::read_parts(bytes).map_err(|error| error.within("a recording that cannot be replayed"))
     }
 
-    fn read_parts(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
+    fn read_parts(bytes: &[u8]) -> Result<Self> {
         let cut_short = || input!("cut short");
         let rest = bytes.strip_prefix(&MAGIC).ok_or_else(|| input!("these bytes are none"))?;
         let (version, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut_short)?;
@@ -270,9 +270,18 @@ impl Replay {
             }
         }
         ensure(rest.is_empty(), || "it goes on behind its end".into())?;
-        let first = states.first().filter(|state| state.step == 0).ok_or_else(|| input!("it has no beginning"))?;
-        let simulation = Simulation::load(&first.bytes, backend)?;
-        Ok(Self { title, states, steps, simulation, step: 0, agreed: 0, difference: None })
+        let begins = states.first().is_some_and(|state| state.step == 0 && !state.is_jump);
+        ensure(begins, || "it has no beginning".into())?;
+        Ok(Self { title, states, steps, step: 0, agreed: 0, difference: None })
+    }
+
+    /// Goes to the beginning, in a simulation of its own.
+    ///
+    /// # Errors
+    /// The state of the beginning is damaged.
+    pub fn begin(&mut self, backend: Box<dyn Backend>) -> Result<Simulation> {
+        self.step = 0;
+        Simulation::load(&self.states[0].bytes, backend)
     }
 
     /// The title.
@@ -305,45 +314,35 @@ impl Replay {
         self.steps.get(self.step as usize).or(self.steps.last()).map(|step| step.dt)
     }
 
-    /// The simulation after the steps that are made.
-    pub fn simulation(&self) -> &Simulation {
-        &self.simulation
-    }
-
-    /// Changes what runs the steps, from the next one on.
-    pub fn set_backend(&mut self, backend: Box<dyn Backend>) {
-        self.simulation.set_backend(backend);
-    }
-
     /// Where the replay first went another way than the recording, in the steps that were made so far.
     pub fn first_difference(&self) -> Option<ReplayDifference> {
         self.difference
     }
 
-    /// Makes the next step; none at the end.
+    /// Makes the next step in the simulation that the replay began, as it left it; none at the end.
     ///
     /// # Errors
     /// As [`Simulation::step`].
-    pub fn step(&mut self) -> Result<Option<StepStats>> {
+    pub fn step(&mut self, simulation: &mut Simulation) -> Result<Option<StepStats>> {
         if self.step == self.len() {
             return Ok(None);
         }
         if let Some(state) = self.states.iter().position(|state| state.step == self.step && state.is_jump) {
-            self.load(state)?;
+            self.load(simulation, state)?;
         }
         let record = &self.steps[self.step as usize];
-        record.change.make(&mut self.simulation.world);
+        record.change.make(&mut simulation.world);
         if let Some(config) = &record.config {
-            self.simulation.set_config(config.clone())?;
+            simulation.set_config(config.clone())?;
         }
-        record.woken.iter().for_each(|&body| self.simulation.wake(body as usize));
-        let stats = self.simulation.step(record.dt)?;
+        record.woken.iter().for_each(|&body| simulation.wake(body as usize));
+        let stats = simulation.step(record.dt)?;
         self.step += 1;
         if let Some((hash, bodies)) = &record.hash {
-            if *hash == self.simulation.hash() {
+            if *hash == simulation.hash() {
                 self.agreed = self.agreed.max(self.step);
             } else if self.difference.is_none_or(|known| known.step > self.step) {
-                let own = self.simulation.body_hashes().map(|hash| hash as u8);
+                let own = simulation.body_hashes().map(|hash| hash as u8);
                 let differ: Vec<usize> =
                     (0..).zip(own.zip(bodies)).filter(|(_, (a, b))| a != *b).map(|(i, _)| i).collect();
                 let (step, agreed) = (self.step, self.agreed);
@@ -358,23 +357,23 @@ impl Replay {
     ///
     /// # Errors
     /// As [`Simulation::step`].
-    pub fn seek(&mut self, step: u32) -> Result<()> {
+    pub fn seek(&mut self, simulation: &mut Simulation, step: u32) -> Result<()> {
         let step = step.min(self.len());
         let nearest = self.states.iter().rposition(|state| state.step <= step && !state.is_jump);
         let nearest = nearest.expect("a recording begins with a state");
         if step < self.step || self.states[nearest].step > self.step {
-            self.load(nearest)?;
+            self.load(simulation, nearest)?;
         }
         while self.step < step {
-            self.step()?;
+            self.step(simulation)?;
         }
         Ok(())
     }
 
     /// Goes to a kept state.
-    fn load(&mut self, state: usize) -> Result<()> {
-        let backend = self.simulation.set_backend(Box::new(Reference::<f32>::new()));
-        self.simulation = Simulation::load(&self.states[state].bytes, backend)?;
+    fn load(&mut self, simulation: &mut Simulation, state: usize) -> Result<()> {
+        let backend = simulation.set_backend(Box::new(Reference::<f32>::new()));
+        *simulation = Simulation::load(&self.states[state].bytes, backend)?;
         self.step = self.states[state].step;
         Ok(())
     }

@@ -72,19 +72,20 @@ fn a_replay_goes_the_same_way_on_any_backend_and_from_any_step() {
     let (bytes, simulation) = recorded();
     let backends: [fn() -> Box<dyn Backend>; 2] = [reference, || Box::new(Cpu::new())];
     for backend in backends {
-        let mut replay = Replay::read(&bytes, backend()).expect("a recording");
+        let mut replay = Replay::read(&bytes).expect("a recording");
+        let mut again = replay.begin(backend()).expect("a beginning");
         assert_eq!((replay.title(), replay.len()), ("towers", 120));
-        let mut hashes = vec![replay.simulation().hash()];
-        while replay.step().expect("a step").is_some() {
-            hashes.push(replay.simulation().hash());
+        let mut hashes = vec![again.hash()];
+        while replay.step(&mut again).expect("a step").is_some() {
+            hashes.push(again.hash());
         }
         assert_eq!(replay.first_difference(), None);
         assert_eq!((hashes.len(), hashes[120]), (121, simulation.hash()));
         assert!((replay.time() - (103.0 + 0.5 * 17.0) / 60.0).abs() < 1e-4, "{}", replay.time());
         for step in [60, 3, 61, 62, 63, 20, 0, 119, 120, 41, 40, 39, 500] {
-            replay.seek(step).expect("a step");
+            replay.seek(&mut again, step).expect("a step");
             assert_eq!(replay.step_number(), step.min(120));
-            assert_eq!(replay.simulation().hash(), hashes[step.min(120) as usize], "step {step}");
+            assert_eq!(again.hash(), hashes[step.min(120) as usize], "step {step}");
         }
         assert_eq!(replay.first_difference(), None);
     }
@@ -123,8 +124,9 @@ fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
         let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
         (0..50).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
         let bytes = recorder.finish(&mut simulation).expect("memory");
-        let mut replay = Replay::read(&bytes, Box::new(Broken(Reference::new(), 0))).expect("a recording");
-        while replay.step().expect("a step").is_some() {}
+        let mut replay = Replay::read(&bytes).expect("a recording");
+        let mut again = replay.begin(Box::new(Broken(Reference::new(), 0))).expect("a beginning");
+        while replay.step(&mut again).expect("a step").is_some() {}
         let first = replay.first_difference().expect("a difference");
         assert_eq!((first.step, first.agreed, first.body, first.bodies), expected);
     }
@@ -136,7 +138,7 @@ fn what_is_no_whole_recording_is_refused_in_one_line() {
     let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
     (0..8).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
     let bytes = recorder.finish(&mut simulation).expect("memory");
-    let refusal = |bytes: &[u8]| match Replay::read(bytes, reference()) {
+    let refusal = |bytes: &[u8]| match Replay::read(bytes) {
         Ok(_) => panic!("it is refused"),
         Err(e) => e.to_string(),
     };

@@ -9,12 +9,12 @@ use super::progress::Progress;
 use super::scene::{MACHINE, SceneArgs, SleepArgs};
 use super::words;
 use crate::files;
-use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly};
+use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly, scene_of};
 use drystone::backend::{BackendChoice, choose};
 use drystone::scenes::CATALOGUE;
 use drystone::scenes::Spawners;
 use drystone::stages::memory;
-use drystone::{Error, Result, Scene, Simulation, SolverConfig};
+use drystone::{Error, Reference, Replay, Result, Scene, Simulation, SolverConfig};
 
 /// Memory of a body in a frame: pose and color (bytes).
 const FRAME: f64 = 32.0;
@@ -69,7 +69,14 @@ impl RenderArgs {
 
     fn film(&self, args: &SceneArgs, out: &Path) -> Result<()> {
         Output::check(out)?;
-        let (scene, mut config) = args.load(1, None)?;
+        let mut replay = args.recording()?;
+        let (scene, mut config) = match &mut replay {
+            Some(replay) => {
+                let simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
+                (scene_of(replay, &simulation), simulation.config().clone())
+            }
+            None => args.load(1, None)?,
+        };
         self.sleep.apply(&mut config);
         args.set_threads(self.backend);
         let png = out.extension().is_some_and(|e| e == "png");
@@ -85,15 +92,22 @@ impl RenderArgs {
         let mut output = Output::open(out, self.size, f64::from(frames) / seconds.max(1e-3))?;
         let film = match &self.from {
             Some(path) => Film::read(scene, self.color, path)?.thinned(frames as usize),
-            None => self.shoot(scene, config, frames, args.json)?,
+            None => self.shoot(scene, config, replay, frames, args.json)?,
         };
         film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
         replacing(out, || output.finish())?;
         print(out.display())
     }
 
-    /// Solves the scene and keeps `frames` evenly spaced states.
-    fn shoot(&self, scene: Scene, config: SolverConfig, frames: u32, quiet: bool) -> Result<Film> {
+    /// Solves the scene, or runs the recording of it again, and keeps `frames` evenly spaced states.
+    fn shoot(
+        &self,
+        scene: Scene,
+        config: SolverConfig,
+        mut replay: Option<Replay>,
+        frames: u32,
+        quiet: bool,
+    ) -> Result<Film> {
         let (backend, why) = choose(self.backend, scene.world.dynamic_count(), false)?;
         if !quiet {
             say(why);
@@ -101,14 +115,22 @@ impl RenderArgs {
         let kept: Vec<usize> = evenly(scene.steps as usize + 1, frames as usize).collect();
         memory::check(FRAME * (scene.world.bodies.len() * kept.len()) as f64, format_args!("{} pictures", kept.len()))?;
         let mut spawners = Spawners::new(&scene);
-        let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let mut simulation = match &mut replay {
+            Some(replay) => replay.begin(backend)?,
+            None => Simulation::new(scene.world.clone(), config, backend)?,
+        };
         let bar = Progress::steps(scene.steps, quiet);
         let (steps, dt) = (scene.steps, scene.dt);
         let mut film = Film::new(scene, self.color);
         for step in 0..=steps {
             if step > 0 {
-                spawners.before_step(&mut simulation.world, dt);
-                simulation.step(dt)?;
+                match &mut replay {
+                    Some(replay) => drop(replay.step(&mut simulation)?),
+                    None => {
+                        spawners.before_step(&mut simulation.world, dt);
+                        simulation.step(dt)?;
+                    }
+                }
                 bar.inc();
             }
             if kept.binary_search(&(step as usize)).is_ok() {
@@ -142,7 +164,7 @@ impl RenderArgs {
             let mut canvas = Canvas::new(&scene.world, self.size)?;
             let mut config = SolverConfig::default();
             self.sleep.apply(&mut config);
-            let film = self.shoot(scene, config, 1, true)?;
+            let film = self.shoot(scene, config, None, 1, true)?;
             film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
             output.finish()?;
             let picture = folder.file_name().map(Path::new).unwrap_or(folder).join(format!("{name}.png"));

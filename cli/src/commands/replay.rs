@@ -36,23 +36,23 @@ impl ReplayArgs {
         set_threads(self.threads, self.backend.choice);
         let bytes = std::fs::read(&self.file).map_err(Error::file(&self.file))?;
         let place = |e: Error| e.within(self.file.display());
-        let mut replay = Replay::read(&bytes, Box::new(Reference::<f32>::new())).map_err(place)?;
-        let bodies = replay.simulation().world.dynamic_count();
-        let (backend, _) = choose(self.backend.choice, bodies, self.backend.exact)?;
-        replay.set_backend(backend);
+        let mut replay = Replay::read(&bytes).map_err(place)?;
+        let mut simulation = replay.begin(Box::new(Reference::<f32>::new())).map_err(place)?;
+        let (backend, _) = choose(self.backend.choice, simulation.world.dynamic_count(), self.backend.exact)?;
+        simulation.set_backend(backend);
         let last = self.to.unwrap_or(replay.len()).min(replay.len());
         if self.from > last {
             return Err(Error::input(format!("--from {}: the replay ends after step {last}", self.from)));
         }
-        replay.seek(self.from).map_err(place)?;
+        replay.seek(&mut simulation, self.from).map_err(place)?;
         let bar = Progress::steps(last - self.from, self.json);
         while replay.step_number() < last {
-            replay.step().map_err(place)?;
+            replay.step(&mut simulation).map_err(place)?;
             bar.inc();
         }
         bar.finish();
         let difference = replay.first_difference();
-        let (simulation, time) = (replay.simulation(), replay.time());
+        let time = replay.time();
         let (name, adapter) = (simulation.backend().name(), simulation.backend().adapter());
         let hash = format!("{:016x}", simulation.hash());
         if self.json {

@@ -7,6 +7,8 @@ use clap::Args;
 use super::output::say;
 use super::words;
 use crate::settings;
+#[cfg(feature = "view")]
+use drystone::Replay;
 use drystone::backend::BackendChoice;
 use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP};
 use drystone::load::Load;
@@ -138,6 +140,16 @@ impl SceneArgs {
             choose_substeps(&mut config, &scene, most)?;
         }
         Ok((scene, config))
+    }
+
+    /// The recording that the scene names; none if it names no file of a recording.
+    #[cfg(feature = "view")]
+    pub(super) fn recording(&self) -> Result<Option<Replay>> {
+        let Ok(bytes) = std::fs::read(&self.scene) else { return Ok(None) };
+        if !Replay::is_recording(&bytes) {
+            return Ok(None);
+        }
+        Replay::read(&bytes).map(Some).map_err(|e| e.within(&self.scene))
     }
 
     /// Sets the number of threads of the process.

@@ -21,6 +21,15 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     pub fn run(&self) -> Result<()> {
+        if let Some(replay) = self.scene.recording()? {
+            self.scene.set_threads(self.backend.choice);
+            return window::run(Box::new(Live::of_recording(
+                replay,
+                self.backend.choice,
+                self.backend.exact,
+                self.color,
+            )?));
+        }
         let (scene, mut config) = self.scene.load(1, None)?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);

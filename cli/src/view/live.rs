@@ -12,7 +12,9 @@ use super::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
 use drystone::scenes::Spawners;
-use drystone::{Body, BodyKind, JointHandle, Result, Scene, Shape, Simulation, SolverConfig, StepStats};
+use drystone::{
+    Body, BodyKind, JointHandle, Reference, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig, StepStats,
+};
 
 /// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
@@ -43,6 +45,9 @@ pub struct Live {
     /// Time of the steps before the last picture.
     pub(super) stepping: Duration,
     pub(super) grabbed: Option<Grabbed>,
+    pub(super) kept: Option<Kept>,
+    /// The recording that runs again, instead of the scene.
+    pub(super) replay: Option<Replay>,
     /// Where the mouse points.
     pub(super) pointer: Option<Pointer>,
     pub(super) bounds: Bounds,
@@ -60,7 +65,28 @@ pub(super) struct Grabbed {
     pub(super) joint: JointHandle,
 }
 
+/// The scene of a recording, whose simulation has begun.
+pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
+    let mut scene = Scene::new(replay.title(), simulation.world.clone(), replay.len());
+    scene.dt = replay.dt().unwrap_or(scene.dt);
+    scene
+}
+
+/// A state to go back to: that of the simulation and of the spawners, and its step.
+pub(super) type Kept = (Snapshot, Spawners, u32);
+
 impl Live {
+    /// A recording that runs again.
+    pub fn of_recording(mut replay: Replay, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
+        let simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
+        let scene = scene_of(&replay, &simulation);
+        let mut live = Self::new(scene, simulation.config().clone(), choice, exact, color)?;
+        live.simulation = simulation;
+        live.set_backend(choice);
+        live.replay = Some(replay);
+        Ok(live)
+    }
+
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
@@ -83,6 +109,8 @@ impl Live {
             owed: 0.0,
             stepping: Duration::ZERO,
             grabbed: None,
+            kept: None,
+            replay: None,
             pointer: None,
             light_end: 0.0,
             scene,
@@ -95,6 +123,9 @@ impl Live {
     }
 
     pub(super) fn restart(&mut self) -> Result<()> {
+        if self.replay.is_some() {
+            return self.seek(-f64::INFINITY);
+        }
         let config = self.simulation.config().clone();
         let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;
         self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
@@ -103,9 +134,33 @@ impl Live {
         Ok(())
     }
 
+    /// Keeps the state, to go back to it.
+    pub(super) fn keep(&mut self) {
+        self.kept = Some((self.simulation.snapshot(), self.spawners.clone(), self.steps));
+    }
+
+    /// Goes back to the state that was kept.
+    pub(super) fn go_back(&mut self) {
+        if let Some((snapshot, spawners, steps)) = self.kept.as_ref().filter(|_| self.replay.is_none()) {
+            self.simulation.restore(snapshot);
+            self.spawners.clone_from(spawners);
+            (self.steps, self.owed, self.grabbed) = (*steps, 0.0, None);
+        }
+    }
+
+    /// Goes so many seconds forth or back in a recording.
+    pub(super) fn seek(&mut self, seconds: f64) -> Result<()> {
+        if let Some(replay) = &mut self.replay {
+            let step = (f64::from(self.steps) + seconds / f64::from(self.scene.dt)).round().max(0.0);
+            replay.seek(&mut self.simulation, step as u32)?;
+            (self.steps, self.owed) = (replay.step_number(), 0.0);
+        }
+        Ok(())
+    }
+
     /// Throws a cube from the eye to where the mouse points.
     pub(super) fn throw(&mut self) {
-        let Some(Pointer { origin, direction, .. }) = self.pointer else { return };
+        let Some(Pointer { origin, direction, .. }) = self.pointer.filter(|_| self.replay.is_none()) else { return };
         let size = 0.02 * self.bounds.radius();
         let cube = Body::dynamic().named("thrown").shape(Shape::cuboid(size, size, size));
         let [x, y, z] = (origin + 4.0 * size * direction).to_array();
@@ -116,6 +171,10 @@ impl Live {
 
     /// The dynamic body under the mouse, through other bodies if need be, and how far from the eye (m).
     pub(super) fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
+        // A recording goes its own way.
+        if self.replay.is_some() {
+            return None;
+        }
         let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
         let filter = Filter::default().only(&is_dynamic);
         let hit = self.simulation.queries().ray(origin, direction, f32::INFINITY, &filter)?;
@@ -146,6 +205,13 @@ impl Live {
     }
 
     pub(super) fn step(&mut self) -> Result<()> {
+        if let Some(replay) = &mut self.replay {
+            match replay.step(&mut self.simulation)? {
+                Some(stats) => self.note(stats),
+                None => self.paused = true,
+            }
+            return Ok(());
+        }
         let dt = self.scene.dt;
         self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
@@ -159,12 +225,18 @@ impl Live {
             }
             self.simulation.wake(grabbed.body);
         }
-        self.stats = self.simulation.step(dt)?;
+        let stats = self.simulation.step(dt)?;
+        self.note(stats);
+        Ok(())
+    }
+
+    /// Notes a step that was made.
+    fn note(&mut self, stats: StepStats) {
+        self.stats = stats;
         self.steps += 1;
         for (mean, (_, time)) in self.stage_ms.iter_mut().zip(self.stats.times.stages()) {
             *mean += 0.1 * (time.as_secs_f64() * 1e3 - *mean);
         }
-        Ok(())
     }
 }
 
@@ -175,6 +247,7 @@ mod tests {
 
     use super::super::show::{Pointer, Show};
     use super::*;
+    use drystone::{Recorder, RecordingIntervals};
 
     fn live(name: &str) -> Live {
         let scene = Scene::find(name, &[]).expect("a scene");
@@ -261,5 +334,42 @@ mod tests {
         live.set_config(SolverConfig::default().with(|c| c.substeps = 0));
         assert!(live.refused.as_ref().is_some_and(|e| e.contains("substeps")));
         assert_eq!(live.simulation.config().substeps, 3);
+    }
+
+    #[test]
+    fn a_kept_state_comes_back_with_its_bodies() {
+        let mut live = live("tower");
+        (0..5).for_each(|_| live.step().expect("a step"));
+        let (hash, bodies) = (live.simulation.hash(), live.world().bodies.count());
+        press(&mut live, "s");
+        let top = live.world().bodies.handle(bodies - 1).expect("a cube");
+        live.simulation.world.remove(top);
+        (0..5).for_each(|_| live.step().expect("a step"));
+        press(&mut live, "l");
+        assert_eq!((live.steps, live.simulation.hash(), live.world().bodies.count()), (5, hash, bodies));
+    }
+
+    #[test]
+    fn a_recording_runs_forth_and_back_and_stops_at_its_end() {
+        let scene = Scene::find("drum", &[]).expect("a scene");
+        let config = SolverConfig::default();
+        let mut simulation = Simulation::new(scene.world, config, Box::new(Reference::<f32>::new())).expect("a scene");
+        let mut recorder =
+            Recorder::new(Vec::new(), "drum", &mut simulation, RecordingIntervals::default()).expect("memory");
+        let hashes: Vec<u64> = (0..90)
+            .map(|_| {
+                recorder.step(&mut simulation, scene.dt).expect("a step");
+                simulation.hash()
+            })
+            .collect();
+        let replay = Replay::read(&recorder.finish(&mut simulation).expect("memory")).expect("a recording");
+        let mut live = Live::of_recording(replay, BackendChoice::Reference, false, ColorBy::Batch).expect("a scene");
+        (0..70).for_each(|_| live.step().expect("a step"));
+        live.key(&Key::Named(NamedKey::ArrowLeft), true).expect("a key");
+        assert_eq!((live.steps, live.simulation.hash()), (10, hashes[9]));
+        live.key(&Key::Named(NamedKey::ArrowRight), true).expect("a key");
+        assert_eq!((live.steps, live.simulation.hash()), (70, hashes[69]));
+        (0..30).for_each(|_| live.step().expect("a step"));
+        assert_eq!((live.steps, live.paused, live.simulation.hash()), (90, true, hashes[89]));
     }
 }

@@ -22,7 +22,7 @@ pub use canvas::{Canvas, Picture};
 pub use colors::{ColorBy, Rgba, batch_color};
 pub use film::{Film, Frame, Look, evenly};
 pub use labyrinth::{Labyrinth, draw_game};
-pub use live::Live;
+pub use live::{Live, scene_of};
 pub use mesh::{Meshes, Poses, poses};
 pub use output::Output;
 pub use overlay::{LineEnd, Overlay, lines};

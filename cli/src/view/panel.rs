@@ -17,6 +17,7 @@ pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
         for line in [
             "space pause, n one step, r restart, + - speed",
             "b throw a cube, x delete the body under the mouse",
+            "s keep the state, l go back to it; left, right: a second in a recording",
             "c color, 1 contacts, 2 joints, 3 boxes",
             "f whole scene, h panel, esc close",
             "left: pull a body, or turn the view",
