@@ -192,7 +192,7 @@ pub struct ReplayDifference {
     pub step: u32,
     /// The last step before it after which they agreed; 0 for the beginning.
     pub agreed: u32,
-    /// The first body that differs; none where the hashes of bodies are too short to say.
+    /// Index of the first body that differs; none where the hashes of bodies are too short to say.
     pub body: Option<usize>,
     /// How many bodies differ at least.
     pub bodies: usize,
@@ -280,7 +280,7 @@ impl Replay {
     /// # Errors
     /// The state of the beginning is damaged.
     pub fn begin(&mut self, backend: Box<dyn Backend>) -> Result<Simulation> {
-        self.step = 0;
+        (self.step, self.agreed, self.difference) = (0, 0, None);
         Simulation::load(&self.states[0].bytes, backend)
     }
 
@@ -342,9 +342,9 @@ impl Replay {
             if *hash == simulation.hash() {
                 self.agreed = self.agreed.max(self.step);
             } else if self.difference.is_none_or(|known| known.step > self.step) {
-                let own = simulation.body_hashes().map(|hash| hash as u8);
+                let own = simulation.world.bodies.handles().zip(simulation.body_hashes().zip(bodies));
                 let differ: Vec<usize> =
-                    (0..).zip(own.zip(bodies)).filter(|(_, (a, b))| a != *b).map(|(i, _)| i).collect();
+                    own.filter(|(_, (a, b))| *a as u8 != **b).map(|(body, _)| body.index()).collect();
                 let (step, agreed) = (self.step, self.agreed);
                 self.difference =
                     Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });

@@ -1,30 +1,9 @@
 //! A settled step allocates nothing. One test only: what another one allocates would be counted, too.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+#[path = "common/counting.rs"]
+mod counting;
 
 use drystone::{Body, Cpu, Listen, Scene, Shape, Simulation, SolverConfig};
-
-/// Counts what is asked of the system.
-struct Counting;
-
-static ASKED: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: does what `System` does.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(memory, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 /// Allocations of the steps that compute no contact, and of the others, of a pile of 500 boxes on `threads` threads.
 /// `listens`: to all that there is, and with a sensor around the pile.
@@ -45,10 +24,10 @@ fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2
         }
         let (mut asked, mut steps) = ([0; 2], [0; 2]);
         for _ in 0..40 {
-            let before = ASKED.load(Ordering::Relaxed);
+            let before = counting::asked();
             let stats = simulation.step(scene.dt).expect("a step");
             let which = usize::from(stats.computed > 0);
-            asked[which] += ASKED.load(Ordering::Relaxed) - before;
+            asked[which] += counting::asked() - before;
             steps[which] += 1;
         }
         println!("{steps:?} steps without and with contacts computed: {asked:?} allocations");

@@ -119,7 +119,10 @@ impl Backend for Broken {
 fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
     for (hash, expected) in [(1, (33, 32, Some(9), 1)), (5, (35, 30, Some(6), 5))] {
         let config = SolverConfig::default().without_sleep();
-        let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+        let mut world = towers();
+        // A vacancy before the body of the mistake.
+        world.remove(world.bodies.handle(2).expect("a cube"));
+        let mut simulation = Simulation::new(world, config, reference()).expect("a world");
         let intervals = RecordingIntervals { hash, ..INTERVALS };
         let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
         (0..50).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));

@@ -1,7 +1,7 @@
 //! A run that goes back and steps again, and what that asks of memory. One test only: what another one allocates would be counted, too.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+#[path = "common/counting.rs"]
+mod counting;
 
 use drystone::glam::Vec3;
 use drystone::{Cpu, Rollback, Scene, Simulation, SolverConfig};
@@ -10,27 +10,6 @@ use drystone::{Cpu, Rollback, Scene, Simulation, SolverConfig};
 #[path = "../examples/rollback.rs"]
 mod example;
 
-/// Counts what is asked of the system.
-struct Counting;
-
-static ASKED: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: does what `System` does.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(memory, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
-
 fn pile(config: &SolverConfig) -> (Simulation, f32) {
     let scene = Scene::find("pile", &["n=200".into()]).expect("the scene");
     (Simulation::new(scene.world, config.clone(), Box::new(Cpu::new())).expect("good settings"), scene.dt)
@@ -38,9 +17,9 @@ fn pile(config: &SolverConfig) -> (Simulation, f32) {
 
 /// The calls that `work` makes for memory.
 fn asked(work: impl FnOnce()) -> usize {
-    let before = ASKED.load(Ordering::Relaxed);
+    let before = counting::asked();
     work();
-    ASKED.load(Ordering::Relaxed) - before
+    counting::asked() - before
 }
 
 /// A push of one box that is told seven steps late, in a pile that falls.

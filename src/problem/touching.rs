@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::StepProblem;
 use super::contacts::ContactRows;
-use super::rows::ContactRow;
+use super::rows::{ContactRow, ImpulseRow};
 use super::write::speed_at_impact;
 use crate::world::World;
 
@@ -59,6 +59,19 @@ impl ContactRows {
         let [on_a, on_b] = self.colliders_of(row);
         let (a, b) = ((contact.body_a, on_a), (contact.body_b, on_b));
         if a.0 < b.0 { ([a, b], false) } else { ([b, a], true) }
+    }
+}
+
+impl StepProblem {
+    /// Impulse of a contact on its body b, summed over the step: normal and friction of all points and of the patch, world axes (N s). The
+    /// problem has totals.
+    pub fn total_impulse(&self, contact: &ContactRow) -> Vec3 {
+        let (normal, (tangent_1, tangent_2)) = (Vec3::from_array(contact.normal), contact.tangents());
+        let friction = |total: &ImpulseRow| tangent_1 * total.tangent_1 + tangent_2 * total.tangent_2;
+        let end = (contact.first_point + contact.point_count) as usize;
+        let at_points = self.totals[contact.first_point as usize..end].iter();
+        let at_patch = if self.has_patches() { friction(&self.totals[end]) } else { Vec3::ZERO };
+        at_points.fold(at_patch, |sum, total| sum + (normal * total.normal + friction(total)))
     }
 }
 

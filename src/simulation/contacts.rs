@@ -66,13 +66,6 @@ pub(super) fn contact(stages: &Stages, world: &World, row: usize) -> Option<Cont
             ContactPoint { position: on_a.midpoint(on_b), separation: problem.points[first + k].separation, impulse };
     }
     let [a, b] = sides.map(|side| collider_of(world, side));
-    let (tangent_1, tangent_2) = from.tangents();
-    let friction = |i: usize| tangent_1 * problem.totals[i].tangent_1 + tangent_2 * problem.totals[i].tangent_2;
-    let mut impulse = Vec3::ZERO;
-    if !problem.totals.is_empty() {
-        let at_points = (first..first + count).map(|i| manifold.normal * problem.totals[i].normal + friction(i));
-        let at_patch = if problem.has_patches() { friction(first + count) } else { Vec3::ZERO };
-        impulse = at_points.fold(at_patch, |sum, impulse| sum + impulse);
-    }
+    let impulse = if problem.totals.is_empty() { Vec3::ZERO } else { problem.total_impulse(from) };
     Some(Contact { a, b, normal: manifold.normal, impulse, points, count })
 }

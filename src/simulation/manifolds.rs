@@ -113,9 +113,7 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         for (point, total) in points.iter_mut().zip(totals) {
             point.summed = Some(Summed { normal: total.normal, friction: friction(total) });
         }
-        let at_patch = if problem.has_patches() { friction(&problem.totals[first + count]) } else { Vec3::ZERO };
-        let at_points = totals.iter().map(|total| manifold.normal * total.normal + friction(total));
-        summed = Some(at_points.fold(at_patch, |sum, impulse| sum + impulse));
+        summed = Some(problem.total_impulse(contact));
     }
     // With friction per manifold the row after the points is the patch's.
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };

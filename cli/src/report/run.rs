@@ -166,7 +166,7 @@ impl RunReport {
             scene: scene.name.clone(),
             backend: backend.name().into(),
             adapter: backend.adapter(),
-            worlds: scene.world.worlds().len(),
+            worlds: scene.world.world_count(),
             bodies: scene.world.dynamic_count(),
             dt: scene.dt,
             config: config.clone(),

@@ -214,7 +214,7 @@ impl Case {
                 adapter: way.pool.install(move || backend.adapter()),
                 threads: way.pool.current_num_threads(),
                 settings: settings::unusual(config, &["sleep_after"]).join(" "),
-                worlds: world.worlds().len(),
+                worlds: world.world_count(),
                 bodies: world.dynamic_count(),
                 manifolds: stats.manifolds,
                 points: stats.points,
