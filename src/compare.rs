@@ -2,13 +2,13 @@
 
 use crate::backend::Backend;
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::plan::{Pass, StepPlan};
 use crate::problem::{JointSystems, StepProblem};
 use crate::scenes::Scene;
 use crate::scenes::Spawners;
 use crate::simulation::Simulation;
-use crate::world::World;
+use crate::world::{Body, World};
 
 /// How far two worlds are apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,24 +27,91 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Between two worlds with the same bodies. NaN on one side only makes a difference of infinity.
+    /// Between two worlds. NaN on one side only makes a difference of infinity. A body that is in one world only differs.
     pub fn between(a: &World, b: &World) -> Self {
         let mut all = Self::default();
-        for (a, b) in a.bodies.iter().zip(&b.bodies) {
-            let mut differs = false;
-            let mut widen = |largest: &mut f64, x: &[f32], y: &[f32]| {
-                for (x, y) in x.iter().zip(y) {
-                    differs |= x.to_bits() != y.to_bits();
-                    *largest = largest.max(distance(*x, *y));
-                }
-            };
-            widen(&mut all.position, &a.position.to_array(), &b.position.to_array());
-            widen(&mut all.rotation, &a.rotation.to_array(), &b.rotation.to_array());
-            widen(&mut all.velocity, &a.linear_velocity.to_array(), &b.linear_velocity.to_array());
-            widen(&mut all.angular_velocity, &a.angular_velocity.to_array(), &b.angular_velocity.to_array());
+        for (i, (body_a, body_b)) in a.bodies.iter().zip(&b.bodies).enumerate() {
+            let mut differs = a.bodies.handle(i) != b.bodies.handle(i);
+            for (k, (x, y)) in numbers(body_a).into_iter().zip(numbers(body_b)).enumerate() {
+                differs |= x.to_bits() != y.to_bits();
+                let largest = match k {
+                    0..3 => &mut all.position,
+                    3..7 => &mut all.rotation,
+                    7..10 => &mut all.velocity,
+                    _ => &mut all.angular_velocity,
+                };
+                *largest = largest.max(distance(x, y));
+            }
             all.bodies += usize::from(differs);
         }
+        all.bodies += a.bodies.len().abs_diff(b.bodies.len());
         all
+    }
+}
+
+/// Pose and velocities of a body, in the order of [`QUANTITIES`].
+fn numbers(body: &Body) -> [f32; 13] {
+    let mut all = [0.0; 13];
+    let parts: [&[f32]; 4] = [
+        &body.position.to_array(),
+        &body.rotation.to_array(),
+        &body.linear_velocity.to_array(),
+        &body.angular_velocity.to_array(),
+    ];
+    all.iter_mut().zip(parts.concat()).for_each(|(number, part)| *number = part);
+    all
+}
+
+/// The names of the numbers of a body.
+const QUANTITIES: [&str; 13] = [
+    "position.x",
+    "position.y",
+    "position.z",
+    "rotation.x",
+    "rotation.y",
+    "rotation.z",
+    "rotation.w",
+    "velocity.x",
+    "velocity.y",
+    "velocity.z",
+    "angular velocity.x",
+    "angular velocity.y",
+    "angular velocity.z",
+];
+
+/// A number of a body that is not the same in two worlds.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct BodyDifference {
+    /// Index of the body.
+    pub body: usize,
+    /// The number: `position.x`; `presence` where the body is in one world only, or another body has its index.
+    pub quantity: &'static str,
+    /// The number in each world; for a presence 1 where a body has this index and 0 where none has.
+    pub values: [f32; 2],
+}
+
+impl BodyDifference {
+    /// The first number of the first body that differs in any bit.
+    pub fn first(a: &World, b: &World) -> Option<Self> {
+        let all = 0..a.bodies.len().max(b.bodies.len());
+        all.into_iter().find_map(|body| {
+            let handles = [a, b].map(|world| world.bodies.handle(body));
+            if handles[0] != handles[1] {
+                let values = handles.map(|handle| f32::from(u8::from(handle.is_some())));
+                return Some(Self { body, quantity: "presence", values });
+            }
+            let (x, y) = (numbers(a.bodies.get(body)?), numbers(b.bodies.get(body)?));
+            let k = x.iter().zip(&y).position(|(x, y)| x.to_bits() != y.to_bits())?;
+            Some(Self { body, quantity: QUANTITIES[k], values: [x[k], y[k]] })
+        })
+    }
+}
+
+impl std::fmt::Display for BodyDifference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y] = self.values;
+        write!(f, "body {}, {}: {x:?} and {y:?}", self.body, self.quantity)
     }
 }
 
@@ -65,6 +132,9 @@ fn distance(x: f32, y: f32) -> f64 {
 pub struct FirstDifference {
     /// Step, from 1.
     pub step: u32,
+    /// The first number that differs after that step.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub body: BodyDifference,
     /// Where in that step.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub stage: Stage,
@@ -97,7 +167,7 @@ pub enum Stage {
 
 impl std::fmt::Display for FirstDifference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "step {}, ", self.step)?;
+        write!(f, "step {}, {}; ", self.step, self.body)?;
         match &self.stage {
             Stage::Rows { rows } => write!(f, "before the first pass: {rows} of the problem"),
             Stage::Pass { pass, passes, kernel } => write!(f, "pass {pass} of {passes}, {kernel}"),
@@ -108,20 +178,27 @@ impl std::fmt::Display for FirstDifference {
     }
 }
 
-/// The result of a comparison.
+/// The result of a comparison of every step.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Comparison {
     /// After each step.
     pub steps: Vec<Difference>,
-    /// Where it began, if anywhere.
+    /// Where it began, if anywhere. A difference that is gone after later steps stays one.
     pub first: Option<FirstDifference>,
+}
+
+impl Comparison {
+    /// Number of steps after which any bit differs.
+    pub fn differing_steps(&self) -> usize {
+        self.steps.iter().filter(|step| step.bodies > 0).count()
+    }
 }
 
 /// Runs `scene` on two backends for `steps` steps, each from its own results, and calls `after_step` after each.
 ///
 /// # Errors
-/// A backend cannot run.
+/// A backend cannot run, or loses its device.
 pub fn compare(
     scene: &Scene,
     config: &SolverConfig,
@@ -134,18 +211,23 @@ pub fn compare(
         Simulation::new(scene.world.clone(), config.clone(), open(1)?)?,
     ];
     let mut spawners = [Spawners::new(scene), Spawners::new(scene)];
-    let mut comparison = Comparison::default();
+    let (mut comparison, mut first) = (Comparison::default(), None);
     for _ in 0..steps {
         for (simulation, spawners) in simulations.iter_mut().zip(&mut spawners) {
             spawners.before_step(&mut simulation.world, scene.dt);
-            simulation.step(scene.dt)?;
+            // Another backend would be compared from here on.
+            if let Some(fault) = simulation.step(scene.dt)?.fault {
+                return Err(Error::Lost(fault));
+            }
         }
-        comparison.steps.push(Difference::between(&simulations[0].world, &simulations[1].world));
+        let [a, b] = [&simulations[0].world, &simulations[1].world];
+        first = first.or_else(|| Some((comparison.steps.len(), BodyDifference::first(a, b)?)));
+        comparison.steps.push(Difference::between(a, b));
         after_step();
     }
-    if let Some(step) = comparison.steps.iter().position(|d| d.bodies > 0) {
+    if let Some((step, body)) = first {
         let stage = first_stage(scene, config, open, step)?;
-        comparison.first = Some(FirstDifference { step: step as u32 + 1, stage });
+        comparison.first = Some(FirstDifference { step: step as u32 + 1, body, stage });
     }
     Ok(comparison)
 }

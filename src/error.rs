@@ -23,7 +23,10 @@ pub enum Error {
     /// No adapter, or one that cannot do what is asked.
     #[error("{0}")]
     Adapter(String),
-    /// The problem is larger than the adapter's buffers.
+    /// The device was lost in the course of the work.
+    #[error("{0}")]
+    Lost(String),
+    /// The problem is larger than the adapter's buffers or than its memory.
     #[error("{0}")]
     TooLarge(String),
 }
@@ -52,7 +55,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) | Self::File { .. } => 2,
-            Self::Adapter(_) | Self::TooLarge(_) => 3,
+            Self::Adapter(_) | Self::Lost(_) | Self::TooLarge(_) => 3,
         }
     }
 }

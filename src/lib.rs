@@ -27,6 +27,7 @@
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
 //! | hear of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
+//! | check an adapter and its driver | `conform` |
 //! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
 //!
 //! The stages one by one, which tests and measurements need, are in [`stages`].
@@ -44,6 +45,8 @@ pub mod backend;
 mod collide;
 mod compare;
 pub mod config;
+#[cfg(feature = "gpu")]
+pub mod conform;
 pub mod contacts;
 mod effort;
 mod error;

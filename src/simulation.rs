@@ -30,6 +30,15 @@ pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
 
+/// A step that is assembled and did not run. It is not assembled again if the caller changes nothing, because preloads and efforts follow
+/// the impulses of the step before only once.
+struct Unfinished {
+    dt: f32,
+    /// The world and the settings, as bytes.
+    state: Vec<u8>,
+    stats: StepStats,
+}
+
 /// A world that moves.
 ///
 /// ```
@@ -57,6 +66,8 @@ pub struct Simulation {
     stages: Stages,
     /// Whether the backend keeps the rows of the last step on a device.
     on_device: bool,
+    /// The step that is assembled and did not run, because the backend failed.
+    unfinished: Option<Box<Unfinished>>,
     /// How often the simulation went back to a snapshot.
     restored: u64,
 }
@@ -70,7 +81,15 @@ impl Simulation {
         config.check()?;
         world.check()?;
         world.raise_inertias();
-        Ok(Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false, restored: 0 })
+        Ok(Self {
+            stages: Stages::new(&world, &config),
+            world,
+            config,
+            backend,
+            on_device: false,
+            unfinished: None,
+            restored: 0,
+        })
     }
 
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
@@ -93,7 +112,7 @@ impl Simulation {
     /// The approach speed is no number, or below 0; what the simulation listens to is then as it was.
     pub fn listen(&mut self, listen: Listen) -> Result<()> {
         listen.check()?;
-        self.leave_device();
+        self.on_device = false;
         self.stages.events.listen(listen);
         Ok(())
     }
@@ -148,7 +167,7 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
         }
-        self.leave_device();
+        self.on_device = false;
         let mut stats = StepStats::default();
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
@@ -186,16 +205,23 @@ impl Simulation {
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         self.stages.events.all.clear();
         check_step_length(dt)?;
+        if let Some(unfinished) = self.unfinished.take()
+            && unfinished.dt == dt
+            && unfinished.state == self.world_and_settings()
+        {
+            *stats = unfinished.stats;
+            return Ok(true);
+        }
         let changes = timed(&mut stats.times.detect, || self.changes(dt))?;
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
-            self.leave_device();
+            self.on_device = false;
         }
         self.stages.follow(&self.world, &self.config, dt, &changes);
         if self.stages.is_everything_still(&self.world, stats) {
             return Ok(false);
         }
         if self.stages.find(&self.world, &self.config, dt, stats) {
-            self.leave_device();
+            self.on_device = false;
         }
         self.stages.prepare(&self.world, &self.config, dt, self.on_device, stats);
         Ok(true)
@@ -209,10 +235,7 @@ impl Simulation {
         let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
         if let Err(error) = ran {
             self.on_device = false;
-            if carry.on_device {
-                stages.problem.forget_impulses();
-            }
-            return Err(error);
+            return self.repeat_step(error, dt, stats);
         }
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
@@ -225,13 +248,29 @@ impl Simulation {
         Ok(())
     }
 
+    /// Lets another backend repeat a step whose device was lost. Other errors leave the step to the caller.
+    fn repeat_step(&mut self, error: Error, dt: f32, stats: &mut StepStats) -> Result<()> {
+        self.stages.contacts.carry.on_device = false;
+        let is_lost = matches!(error, Error::Lost(_));
+        let successor = if is_lost { self.backend.successor() } else { None };
+        let Some(successor) = successor else {
+            let state = self.world_and_settings();
+            self.unfinished = Some(Box::new(Unfinished { dt, state, stats: stats.clone() }));
+            return Err(error);
+        };
+        let before = stats.fault.take().map_or(String::new(), |line| format!("{line}; "));
+        let (name, adapter) = (successor.name(), successor.adapter());
+        stats.fault = Some(format!("{before}{error}; {name} ({adapter}) repeats the step and goes on"));
+        self.backend = successor;
+        self.end_step(dt, stats)
+    }
+
     /// The next step of `dt` seconds as values, the problem and its plan. The call changes nothing of the run.
     ///
     /// # Errors
     /// As [`Simulation::step`], the backend apart.
     pub fn next_problem(&mut self, dt: f32) -> Result<(StepProblem, StepPlan)> {
         check_step_length(dt)?;
-        self.fetch();
         let changes = self.changes(dt)?;
         let mut next = self.stages.clone();
         next.follow(&self.world, &self.config, dt, &changes);
@@ -239,20 +278,6 @@ impl Simulation {
         next.find(&self.world, &self.config, dt, &mut StepStats::default());
         next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
         Ok((next.problem, next.plan))
-    }
-
-    /// Brings impulses and preloads that only the backend has to the problem. The problem forgets those of a lost device.
-    fn fetch(&mut self) {
-        if self.on_device && self.backend.fetch(&mut self.stages.problem).is_err() {
-            self.on_device = false;
-            self.stages.problem.forget_impulses();
-        }
-    }
-
-    /// Lets the next step begin from the problem as it is here.
-    fn leave_device(&mut self) {
-        self.fetch();
-        self.on_device = false;
     }
 
     /// The bodies as they are now, for questions: rays, shapes that move, points, boxes. In the tree of the last step, so that this costs
@@ -315,7 +340,6 @@ impl Simulation {
 
     /// The manifolds of the last step, with their impulses.
     pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
-        self.fetch();
         let Stages { detector, contacts, problem, .. } = &self.stages;
         manifolds::of(detector, contacts, problem, self.stages.least_substeps())
     }
@@ -385,7 +409,7 @@ impl Simulation {
 
     /// Changes what runs the steps, from the next one on; returns what ran them so far.
     pub fn set_backend(&mut self, backend: Box<dyn Backend>) -> Box<dyn Backend> {
-        self.leave_device();
+        self.on_device = false;
         std::mem::replace(&mut self.backend, backend)
     }
 
@@ -396,7 +420,6 @@ impl Simulation {
 
     /// The last step's problem, with the impulses that solved it.
     pub fn problem(&mut self) -> &StepProblem {
-        self.fetch();
         &self.stages.problem
     }
 

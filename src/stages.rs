@@ -66,6 +66,12 @@ pub mod compare {
     pub use crate::compare::*;
 }
 
+/// The parts of [`conform`](crate::conform) that tests share: random problems, all kernels, differences.
+#[cfg(feature = "gpu")]
+pub mod conform {
+    pub use crate::conform::{difference, passes, random};
+}
+
 /// Whether what is asked for fits into memory.
 pub mod memory {
     pub use crate::memory::*;

@@ -47,6 +47,8 @@ pub struct StepStats {
     pub kernels: Vec<KernelTime>,
     /// The first body whose pose or velocity is not finite, if any.
     pub first_non_finite: Option<usize>,
+    /// One line where a device was lost in this step: the reason, and the backend that repeated the step and goes on.
+    pub fault: Option<String>,
 }
 
 /// Number of classes of effort: 4096 substeps are the most that the settings take.
@@ -86,6 +88,10 @@ pub struct Traffic {
     pub down: u64,
     /// Dispatches, those included that bring rows to their places; 0 without a device.
     pub dispatches: usize,
+    /// Submissions: several where one would hold the device for long.
+    pub submissions: usize,
+    /// Longest that one of them took, as the host saw it.
+    pub longest_submission: Duration,
 }
 
 /// Wall time of each stage of a step.

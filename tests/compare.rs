@@ -1,7 +1,7 @@
 //! The comparison of backends finds what a backend does wrong, and where.
 
 use drystone::stages::backend::CheckedStep;
-use drystone::stages::compare::{Difference, FirstDifference, Stage, compare, first_difference};
+use drystone::stages::compare::{BodyDifference, Difference, FirstDifference, Stage, compare, first_difference};
 use drystone::stages::problem::{JointImpulseRow, JointRow};
 use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
@@ -172,8 +172,75 @@ fn a_difference_that_no_pass_makes_is_still_a_difference() {
         Ok(if which == 0 { reference() } else { Box::new(Once(opened == 2)) })
     };
     let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 3, || ()).expect("both run");
-    let expected = FirstDifference { step: 1, stage: Stage::NotRepeated { not_repeated: true } };
-    assert_eq!((found.steps[0].bodies, found.first), (1, Some(expected)));
+    let first = found.first.clone().expect("a difference");
+    let last = scene.world.bodies.len() - 1;
+    let values = [first.body.values[0], first.body.values[0] + 1.0 / 60.0];
+    let body = BodyDifference { body: last, quantity: "position.x", values: [values[0], first.body.values[1]] };
+    assert_eq!(first, FirstDifference { step: 1, body, stage: Stage::NotRepeated { not_repeated: true } });
+    assert!((first.body.values[1] - values[1]).abs() < 1e-5, "{first}");
+    assert_eq!((found.steps[0].bodies, found.differing_steps()), (1, 3));
+}
+
+/// A reference that turns a body by a last bit in one step and takes it back in a later one.
+struct Healing(u32);
+
+impl Backend for Healing {
+    fn name(&self) -> &'static str {
+        "healing"
+    }
+
+    fn adapter(&self) -> String {
+        "a fault that heals".into()
+    }
+
+    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+        let (problem, passes) = step.into_parts();
+        self.0 += 1;
+        Reference::<f32>::new().run(problem, passes)?;
+        let v = &mut problem.bodies[1].v[2];
+        match self.0 {
+            3 => *v += 0.5,
+            20 => *v -= 0.5,
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_difference_that_heals_is_still_told_with_its_step_its_body_and_both_values() {
+    use drystone::{Body, Shape, World};
+    let mut world = World::new();
+    world.gravity = drystone::glam::Vec3::ZERO;
+    world.add(Body::fixed().shape(Shape::ball(1.0)).position(9.0, 0.0, 0.0));
+    // So far away that half a meter a second for seventeen steps is less than a last bit of the position.
+    world.add(Body::dynamic().shape(Shape::ball(1.0)).position(0.0, 0.0, 1e9));
+    let scene = Scene { world, ..pile() };
+    let mut open =
+        |which| -> Result<Box<dyn Backend>> { Ok(if which == 0 { reference() } else { Box::new(Healing(0)) }) };
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 50, || ()).expect("both run");
+    assert_eq!(found.steps[49], Difference::default(), "the difference healed");
+    assert_eq!(found.differing_steps(), 17);
+    let first = found.first.expect("a difference");
+    assert_eq!(first.step, 3);
+    assert_eq!(first.body, BodyDifference { body: 1, quantity: "velocity.z", values: [0.0, 0.5] });
+    assert!(first.to_string().starts_with("step 3, body 1, velocity.z: 0.0 and 0.5; "), "{first}");
+}
+
+#[test]
+fn a_body_that_is_in_one_world_only_differs() {
+    let world = pile().world;
+    let mut fewer = world.clone();
+    let gone = fewer.bodies.handle(7).expect("a box");
+    fewer.remove(gone);
+    let mut more = world.clone();
+    more.add(drystone::Body::dynamic().shape(drystone::Shape::ball(1.0)));
+    for (other, body, values) in [(&fewer, 7, [1.0, 0.0]), (&more, world.bodies.len(), [0.0, 1.0])] {
+        assert_eq!(Difference::between(&world, other).bodies, 1);
+        let first = BodyDifference { body, quantity: "presence", values };
+        assert_eq!(BodyDifference::first(&world, other), Some(first));
+    }
+    assert_eq!(BodyDifference::first(&world, &world), None);
 }
 
 /// A backend that leaves impulses behind which the next step begins with, but bodies as they should be.
@@ -202,7 +269,8 @@ fn rows_that_differ_before_the_first_pass_are_named() {
     let found = compare(&pile(), &SolverConfig::default().without_sleep(), &mut open, 40, || ()).expect("both run");
     let first = found.first.expect("a difference");
     assert_eq!(first.stage, Stage::Rows { rows: "contacts" }, "preloads follow from impulses");
-    assert_eq!(first.to_string(), format!("step {}, before the first pass: contacts of the problem", first.step));
+    let ending = "; before the first pass: contacts of the problem";
+    assert_eq!(first.to_string(), format!("step {}, {}{ending}", first.step, first.body));
 }
 
 #[test]

@@ -14,6 +14,7 @@ const LIBRARY: &[&[&str]] = &[
     &["backend", "solver"],
     &["simulation"],
     &["compare", "recording"],
+    &["conform"],
     &["stages"],
 ];
 

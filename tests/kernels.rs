@@ -5,7 +5,7 @@ mod common;
 
 use common::difference::{differing, largest};
 use common::gpu;
-use common::kernels::{accelerated_sweeps, color_by_color, every_kernel, has_patches, in_one_pass, sweep};
+use common::kernels::{accelerated_sweeps, color_by_color, every_kernel, has_patches, in_one_pass, sweep, ways_to_run};
 use common::{random, tolerance};
 use drystone::config::FrictionRule;
 use drystone::stages::kernels::Rules;
@@ -60,60 +60,6 @@ fn after(backend: &mut dyn Backend, problem: &StepProblem, passes: &[Pass]) -> S
 
 fn by_the_reference(problem: &StepProblem, passes: &[Pass]) -> StepProblem {
     after(&mut Reference::<f32>::new(), problem, passes)
-}
-
-/// What a kernel is run as: over all colors in one pass, and color by color; with a sweep after it if it writes rows that
-/// are not read back.
-fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
-    // What one leaves for the next is not read back.
-    match kernel {
-        Kernel::Extrapolate { measured, .. } => return vec![accelerated_sweeps(problem, measured)],
-        Kernel::MeasureStep | Kernel::UpdateMomentum => return vec![accelerated_sweeps(problem, false)],
-        _ => {}
-    }
-    let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
-    if matches!(
-        kernel,
-        Kernel::IntegrateTorques { from_start: false } | Kernel::IntegrateGyroscopic { from_start: false }
-    ) {
-        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
-        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
-    }
-    // Systems of joints: what one of these kernels leaves to the next is not read back.
-    if let Kernel::MeasureJoints(rules) | Kernel::SolveJointSystems(rules) | Kernel::ApplyJointChanges(rules) = kernel {
-        let sweep = system_sweep(rules, problem);
-        let changes = [Kernel::BeginChanges, Kernel::EndChanges].map(|kernel| in_one_pass(kernel, problem));
-        let [begin, end] = changes.map(|passes| if rules.from_start { passes } else { Vec::new() });
-        return vec![[begin, sweep, end].concat()];
-    }
-    if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
-        return vec![system_sweep(Rules::default(), problem)];
-    }
-    // What a warm start applies is what happened since it last ran.
-    if kernel == (Kernel::IntegrateVelocities { warm_start: true, from_start: false }) {
-        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
-        ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
-    }
-    // Changes are those since `BeginChanges`, and only their sums with the velocities from then stay.
-    if kernel.is_from_start() || kernel == Kernel::EndChanges {
-        let integrate = Kernel::IntegrateVelocities { warm_start: false, from_start: true };
-        let first = [Kernel::BeginChanges, integrate].map(|kernel| in_one_pass(kernel, problem)).concat();
-        let end = in_one_pass(Kernel::EndChanges, problem);
-        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &end].concat());
-    }
-    ways.dedup();
-    ways
-}
-
-/// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
-fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
-    let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
-    let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
-    let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
-    let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
-    let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
-    let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();
-    first.chain(sweep.clone()).chain(sweep).collect()
 }
 
 /// A random problem whose manifolds carry no patches, and one whose manifolds do.

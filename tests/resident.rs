@@ -249,9 +249,6 @@ impl Backend for Confused {
     fn keeps_rows(&self) -> bool {
         self.0.keeps_rows()
     }
-    fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
-        self.0.fetch(problem)
-    }
 }
 
 fn impulses_at_the_wrong_points_are_found() {
@@ -291,8 +288,8 @@ fn all_rows(problem: &StepProblem) -> usize {
 
 /// What comes back from every step.
 fn moved(problem: &StepProblem) -> u64 {
-    let sags = size_of_val(&problem.sags[..]);
-    (size_of_val(&problem.bodies[..]) + sags + size_of::<ConvergenceRow>() + size_of::<MomentumRow>()) as u64
+    let of_contacts = size_of_val(&problem.impulses[..]);
+    (size_of_val(&problem.bodies[..]) + of_contacts + size_of::<ConvergenceRow>() + size_of::<MomentumRow>()) as u64
 }
 
 fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() {

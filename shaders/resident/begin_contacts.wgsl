@@ -1,6 +1,6 @@
-// begin_contacts: one thread writes the separations of the points of one manifold, how deep it sags under the impulses of the step
-// before, and its preload, which follows from that. Reads colors, separations, masses. Writes contacts, points, impulses, sags; one thread a
-// manifold. Doubles: Writer::write_slot in src/problem/write.rs, yielding and preloaded in src/problem/carry.rs.
+// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the impulses of the
+// step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold. Doubles: Writer::write_slot in
+// src/problem/write.rs, yielding and preloaded in src/problem/carry.rs.
 
 fn yielding(share: f32, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
     let movable = resident.preload.movable_compliance;
@@ -28,7 +28,6 @@ fn begin_contact(at: u32) {
         mass += points[k].normal_mass;
     }
     let yields = yielding(contact.substep_share, both_movable, in_heap, pressed);
-    sags[i] = yields * (a + b);
     contacts[i].preload = preloaded(in_heap, contact.preload, yields * reciprocal(mass));
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];

@@ -3,7 +3,7 @@
 use super::Backend;
 use super::cpu::{Cpu, Reference};
 #[cfg(feature = "gpu")]
-use super::gpu::{AdapterChoice, Gpu};
+use super::gpu::{AdapterChoice, Gpu, GpuOptions};
 use crate::error::Result;
 use crate::names::named;
 
@@ -43,7 +43,7 @@ pub enum BackendKind {
 named!(BackendKind { F64 = "f64", Reference = "reference", Cpu = "cpu", Gpu = "gpu", });
 
 impl BackendKind {
-    /// Opens a backend of this kind. `exact` asks a GPU for the reference's bits.
+    /// Opens a backend of this kind, for measurements: a step fails where its device is lost. `exact` asks a GPU for the reference's bits.
     ///
     /// # Errors
     /// There is no adapter, or the adapter cannot give the reference's bits.
@@ -52,7 +52,7 @@ impl BackendKind {
             Self::F64 => Box::new(Reference::<f64>::new()),
             Self::Reference => Box::new(Reference::<f32>::new()),
             Self::Cpu => Box::new(Cpu::new()),
-            Self::Gpu => open_gpu(exact)?,
+            Self::Gpu => open_gpu(exact, false)?,
         })
     }
 }
@@ -75,7 +75,7 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
         BackendChoice::Reference => Ok((BackendKind::Reference.open(exact)?, "reference: asked for".into())),
         BackendChoice::Cpu => Ok(cpu("cpu: asked for".into())),
         BackendChoice::Gpu => {
-            let gpu = BackendKind::Gpu.open(exact)?;
+            let gpu = open_gpu(exact, true)?;
             let why = format!("gpu: asked for; {}", gpu.adapter());
             Ok((gpu, why))
         }
@@ -111,11 +111,11 @@ fn fastest(_: usize, _: bool) -> Result<(Option<Box<dyn Backend>>, String)> {
 }
 
 #[cfg(feature = "gpu")]
-fn open_gpu(exact: bool) -> Result<Box<dyn Backend>> {
-    Ok(Box::new(Gpu::new(AdapterChoice::Best, exact)?))
+fn open_gpu(exact: bool, goes_on: bool) -> Result<Box<dyn Backend>> {
+    Ok(Box::new(Gpu::open(GpuOptions { exact, goes_on, ..GpuOptions::default() })?))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open_gpu(_: bool) -> Result<Box<dyn Backend>> {
+fn open_gpu(_: bool, _: bool) -> Result<Box<dyn Backend>> {
     Err(crate::error::Error::Adapter(WITHOUT_GPU.into()))
 }

@@ -40,8 +40,8 @@ pub trait Backend: Send {
     fn run_checked(&mut self, step: CheckedStep) -> Result<()>;
 
     /// Runs the passes of a step that follows on the one before as `carry` says. A backend with a device of its own keeps the
-    /// rows there, sends what changed and brings back what moved: where `carry` says that the impulses are on the device, those
-    /// of the problem are not looked at, and where [`Self::keeps_rows`] says so afterwards, they are not written either.
+    /// rows there, sends what changed and brings back what moved. The problem is complete before the step and after it; a step that
+    /// fails leaves it as it was, so that another backend can repeat the step.
     ///
     /// # Errors
     /// As of [`Self::run_checked`].
@@ -49,17 +49,14 @@ pub trait Backend: Send {
         self.run_checked(step)
     }
 
-    /// Whether the rows of the last step are on a device, and its impulses and preloads nowhere else.
+    /// Whether the rows of the last step are on a device, so that the next step can go on from them.
     fn keeps_rows(&self) -> bool {
         false
     }
 
-    /// Brings to `problem`, that of the last step, what of it is only on the device.
-    ///
-    /// # Errors
-    /// The device is lost.
-    fn fetch(&mut self, _problem: &mut StepProblem) -> Result<()> {
-        Ok(())
+    /// The backend that goes on after this one lost its device ([`Error::Lost`](crate::Error::Lost)); none if there is no such backend.
+    fn successor(&mut self) -> Option<Box<dyn Backend>> {
+        None
     }
 
     /// The bytes that the last step moved to a device and back.

@@ -2,7 +2,7 @@
 //!
 //! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels. Only manifolds
 //! that were computed since are sent, with the points that their impulses belonged to, and how far the surfaces of all are apart now. The
-//! device computes the rows from them.
+//! device computes the rows from them. The host computes the same rows, so that nothing is lost with the device.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -12,8 +12,8 @@ use crate::math::{Lane, smaller};
 /// The changes since the last step, for a backend that has the rows of that step.
 #[derive(Debug, Default, PartialEq)]
 pub struct Carry {
-    /// Whether the device has the rows of the step before, and they alone have its impulses and preloads. Else the problem
-    /// is complete, and nothing else here counts.
+    /// Whether the device goes on from the rows of the step before. Else nothing else here counts. The problem is complete either way, so
+    /// that a backend without these rows can run the step instead.
     pub on_device: bool,
     /// The contacts whose rows were written again since, ascending.
     pub written: Vec<Written>,

@@ -306,6 +306,7 @@ impl ContactRows {
             masses,
             poses,
             carry,
+            brings_impulses: true,
             patches: *patches,
             may_jam: materials.may_jam,
         };

@@ -240,17 +240,6 @@ impl StepProblem {
         self.impulses.len() + self.joint_impulses.len()
     }
 
-    /// Lets the contacts that take part begin without impulses and preloads.
-    pub fn forget_impulses(&mut self) {
-        let patch = usize::from(self.has_patches());
-        for &row in &self.order[..self.rows_of(&self.contact_colors()).len()] {
-            let contact = &mut self.contacts[row as usize];
-            contact.preload = 0.0;
-            let first = contact.first_point as usize;
-            self.impulses[first..first + contact.point_count as usize + patch].fill(ImpulseRow::default());
-        }
-    }
-
     /// Whether each of some bodies has the same inverse inertia about all axes; it is zero where nothing turns a body.
     pub fn is_isotropic(&self, bodies: &[u32]) -> bool {
         bodies.iter().map(|&body| &self.masses[body as usize]).all(|mass| {

@@ -35,8 +35,10 @@ pub(super) struct Writer<'a> {
     pub bodies: &'a [BodyRow],
     pub masses: &'a [MassRow],
     pub poses: &'a [PoseRow],
-    /// The coefficients of the preloads, and whether a device computes preloads and impulses.
+    /// The coefficients of the preloads.
     pub carry: &'a Carry,
+    /// Whether rows that are written again bring impulses to the points that they have now; else impulses stay as they are.
+    pub brings_impulses: bool,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
     /// Whether a surface has so much friction that contacts may jam.
@@ -103,13 +105,11 @@ impl Writer<'_> {
             |contact: &ContactRow| contact.substep_share != 0.0 && self.share(contact) != contact.substep_share;
         let follows = self.effort_changes
             || written.all().iter().any(|&i| slots[i as usize].takes_part && changes_share(&rows.contacts[i as usize]));
-        // Where the rows are on a device, the kernel begin_contacts does this.
-        let loads = !self.carry.on_device;
         if !follows {
             for &i in written.all().iter().filter(|&&i| slots[i as usize].takes_part) {
                 rows.contacts[i as usize].substep_share = self.share(&rows.contacts[i as usize]);
             }
-            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads });
+            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads: true });
         } else {
             self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads: false });
             for &i in begun.all() {
@@ -117,9 +117,7 @@ impl Writer<'_> {
                 let (points, impulses) = (&rows.points[own.clone()], &mut rows.impulses[own]);
                 self.follow_effort(&mut rows.contacts[i as usize], points, impulses);
             }
-            if loads {
-                self.prepare(&mut rows, begun.all(), What::Begin { separations: false, loads });
-            }
+            self.prepare(&mut rows, begun.all(), What::Begin { separations: false, loads: true });
         }
         if self.carry.approach {
             for &i in begun.all() {
@@ -184,7 +182,7 @@ impl Writer<'_> {
             let (r_a, r_b) = (p.r_a.to_array(), p.r_b.to_array());
             *point = PointRow { r_a, r_b, separation: p.separation, ..PointRow::default() };
         }
-        if !self.carry.on_device {
+        if self.brings_impulses {
             let impulses = &mut rows.impulses[i * stride..(i + 1) * stride];
             self.bring_impulses(slot.write, &before, contact, manifold, impulses);
         }

@@ -42,7 +42,7 @@ impl Simulation {
     /// ```
     pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
         let Snapshot { world, config, stages } = self.snapshot();
-        Self { world, config, backend, stages: *stages, on_device: false, restored: 0 }
+        Self { world, config, backend, stages: *stages, on_device: false, unfinished: None, restored: 0 }
     }
 
     /// The state between two steps, to go back to.
@@ -61,14 +61,12 @@ impl Simulation {
     /// # Ok::<(), drystone::Error>(())
     /// ```
     pub fn snapshot(&mut self) -> Snapshot {
-        self.fetch();
-        let Self { world, config, stages, backend: _, on_device: _, restored: _ } = self;
+        let Self { world, config, stages, backend: _, on_device: _, unfinished: _, restored: _ } = self;
         Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
     }
 
     /// The same, in place of another state, with its memory.
     pub fn snapshot_into(&mut self, snapshot: &mut Snapshot) {
-        self.fetch();
         snapshot.world.clone_from(&self.world);
         snapshot.config.clone_from(&self.config);
         (*snapshot.stages).clone_from(&self.stages);
@@ -81,6 +79,7 @@ impl Simulation {
         self.config.clone_from(&snapshot.config);
         self.stages.clone_from(&*snapshot.stages);
         self.on_device = false;
+        self.unfinished = None;
         self.restored += 1;
     }
 
@@ -91,7 +90,6 @@ impl Simulation {
     /// [`Simulation::problem`] and [`Simulation::plan`] of it lack what each step writes anew, and [`Simulation::manifolds`] says how far points
     /// were apart when their manifolds were computed.
     pub fn save(&mut self) -> Vec<u8> {
-        self.fetch();
         let mut writer = Writer::default();
         writer.bytes.extend_from_slice(&[0; HEADER]);
         let written = self.walk(&mut writer);
@@ -132,16 +130,24 @@ impl Simulation {
         let damaged = || refused("damaged or cut short: the hash of its content is another").to_string();
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
-        let mut simulation =
-            Self { stages: Stages::new(&world, &config), world, config, backend, on_device: false, restored: 0 };
+        let stages = Stages::new(&world, &config);
+        let mut simulation = Self { stages, world, config, backend, on_device: false, unfinished: None, restored: 0 };
         let mut reader = Reader::new(content);
         simulation.walk(&mut reader).map_err(refused)?;
         ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
         Ok(simulation)
     }
 
+    /// The world and the settings as bytes, to be compared.
+    pub(super) fn world_and_settings(&mut self) -> Vec<u8> {
+        let mut writer = Writer::default();
+        let written = self.world.walk(&mut writer).and_then(|()| self.config.walk(&mut writer));
+        debug_assert!(written.is_ok(), "{written:?}");
+        writer.bytes
+    }
+
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { world, config, backend: _, stages, on_device: _, restored: _ } = self;
+        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, restored: _ } = self;
         world.walk(archive)?;
         config.walk(archive)?;
         if A::READS {

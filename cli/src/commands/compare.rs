@@ -47,22 +47,26 @@ impl CompareArgs {
         if self.scene.json {
             return print_json(&serde_json::json!({
                 "scene": scene.name, "backends": named, "exact": exact, "bodies": bodies, "dt": scene.dt,
-                "config": config, "steps": found.steps, "first": found.first,
+                "config": config, "steps": found.steps, "first": found.first, "differing_steps": found.differing_steps(),
             }));
         }
         print(format_args!("{} against {}, {bodies} dynamic bodies", named[1], named[0]))?;
         print("  step   differ   position m     rotation        v m/s      w rad/s")?;
         for (step, d) in (1..).zip(&found.steps) {
-            // The first four steps, every tenth part of the run, and the last step.
-            if step <= 4 || step % (scene.steps / 10).max(1) == 0 || step == scene.steps {
+            // The first four steps, the first that differs, every tenth part of the run, and the last step.
+            let is_first = found.first.as_ref().is_some_and(|first| first.step == step);
+            if is_first || step <= 4 || step % (scene.steps / 10).max(1) == 0 || step == scene.steps {
                 print(format_args!(
                     "{step:>6} {:>8} {:>12.3e} {:>12.3e} {:>12.3e} {:>12.3e}",
                     d.bodies, d.position, d.rotation, d.velocity, d.angular_velocity
                 ))?;
             }
         }
-        match found.first {
-            Some(first) => print(format_args!("first difference: {first}")),
+        match &found.first {
+            Some(first) => {
+                print(format_args!("first difference: {first}"))?;
+                print(format_args!("{} of {} steps differ", found.differing_steps(), found.steps.len()))
+            }
             None => print("no difference in any bit"),
         }
     }

@@ -2,6 +2,7 @@
 
 mod bench;
 mod compare;
+mod conform;
 #[cfg(feature = "fclib")]
 mod export;
 mod hard;
@@ -44,6 +45,8 @@ enum Command {
     Run(run::RunArgs),
     /// Run a scene on two backends and show how far apart they are.
     Compare(compare::CompareArgs),
+    /// Check an adapter and its driver: kernels, scenes, limits, long plans, lost devices.
+    Conform(conform::ConformArgs),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
     /// Run a scene in a window.
@@ -126,7 +129,7 @@ fn arguments() -> Cli {
     })
 }
 
-/// Runs the command line. Exit codes: 0, 2 for bad input, 3 for a missing adapter or too little memory, 130 after Ctrl-C.
+/// Runs the command line. Exit codes: 0, 1 where a check of `conform` failed, 2 for bad input, 3 for a missing adapter or too little memory, 130 after Ctrl-C.
 pub fn main() -> std::process::ExitCode {
     let cli = arguments();
     // Ctrl-C removes unfinished files. The call fails only if a handler is set already.
@@ -137,6 +140,11 @@ pub fn main() -> std::process::ExitCode {
     let result = match cli.command {
         Command::Run(args) => args.run(),
         Command::Compare(args) => args.run(),
+        Command::Conform(args) => match args.run() {
+            Ok(true) => Ok(()),
+            Ok(false) => return 1.into(),
+            Err(error) => Err(error),
+        },
         Command::Solve(args) => args.run(),
         Command::View(args) => args.run(),
         #[cfg(feature = "fclib")]

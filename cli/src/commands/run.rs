@@ -125,6 +125,9 @@ impl RunArgs {
                     },
                 };
                 report.add(&stats);
+                if stats.fault.is_some() {
+                    report.faults.last().iter().for_each(say);
+                }
                 bar.inc();
             }
             if let Some(trajectory) = trajectory.as_mut().filter(|_| step % self.every == 0) {

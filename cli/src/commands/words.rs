@@ -5,6 +5,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::Method;
+use drystone::conform::Group;
 use drystone::preset::Preset;
 use drystone::solver::Order;
 
@@ -25,6 +26,16 @@ impl Named for Preset {
         ("balanced", "8 substeps"),
         ("accurate", "32 substeps"),
         ("reference", "128 substeps: for comparison with the others"),
+    ];
+}
+
+impl Named for Group {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("kernels", "Every kernel on random problems, against its double in Rust"),
+        ("scenes", "Every scene of the catalogue, small and short, against the reference"),
+        ("limits", "Large buffers, and problems beyond the limits of buffers and memory"),
+        ("long-dispatch", "Plans that would hold the device for long"),
+        ("device-lost", "Devices that are lost between and during steps"),
     ];
 }
 

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod comparison;
 mod convergence;
 pub mod hard_cases;
+pub mod junit;
 pub mod number;
 mod performance;
 mod plot;

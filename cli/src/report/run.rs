@@ -76,6 +76,8 @@ pub struct RunReport {
     /// Bytes to the device and back.
     pub bytes_up: u64,
     pub bytes_down: u64,
+    /// One line for each loss of a device: the step, the reason and the backend that went on.
+    pub faults: Vec<String>,
     /// Overlaps at the end: the deepest, the one that 95 % of the contacts do not exceed, and the mean (m).
     pub penetration_max: f64,
     pub penetration_p95: f64,
@@ -182,6 +184,7 @@ impl RunReport {
         let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
         let step_ms = ms(stats.times.total());
         self.steps += 1;
+        self.faults.extend(stats.fault.iter().map(|line| format!("step {}: {line}", self.steps)));
         self.step_ms.push(step_ms);
         self.asleep = stats.asleep;
         if self.asleep > 0 {

@@ -57,11 +57,20 @@ fn wanted() -> String {
     std::env::var("DRYSTONE_ADAPTER").unwrap_or_default()
 }
 
-pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSummary)> {
-    let mut usable = found().into_iter().filter(|(_, s)| choice == AdapterChoice::Best || s.hardware);
-    usable.next().ok_or_else(|| {
-        let named = Some(wanted()).filter(|name| !name.is_empty());
-        let named = named.map_or(String::new(), |name| format!("one that DRYSTONE_ADAPTER={name} names, for "));
+/// The best adapter of those that `choice` allows and whose summary contains `name`.
+pub(super) fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, AdapterSummary)> {
+    let lower = name.to_lowercase();
+    let fits = |s: &AdapterSummary| {
+        (choice == AdapterChoice::Best || s.hardware) && s.to_string().to_lowercase().contains(&lower)
+    };
+    found().into_iter().find(|(_, s)| fits(s)).ok_or_else(|| {
+        let variable = format!("DRYSTONE_ADAPTER={}", wanted());
+        let named = match (name, &wanted()[..]) {
+            ("", "") => String::new(),
+            ("", _) => format!("one that {variable} names, for "),
+            (_, "") => format!("one that {name:?} names, for "),
+            _ => format!("one that {name:?} and {variable} name, for "),
+        };
         Error::Adapter(format!(
             "no adapter found; looked for {named}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}"
         ))
@@ -73,7 +82,7 @@ pub(super) fn find(choice: AdapterChoice) -> Result<(wgpu::Adapter, AdapterSumma
 /// # Errors
 /// No such adapter, or it cannot be opened.
 pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
-    let (adapter, summary) = find(choice)?;
+    let (adapter, summary) = find(choice, "")?;
     let (device, queue) = open(&adapter, false)?;
     Ok((device, queue, summary))
 }

@@ -55,7 +55,7 @@ bindings! {
     Contacts "contacts": "array<Contact>", ReadByPlans;
     /// Points of the manifolds.
     Points "points": "array<Point>", ReadByPlans;
-    /// Impulses of the points; read back when the simulation asks.
+    /// Impulses of the points; read back.
     Impulses "impulses": "array<Impulse>", Write;
     /// Their sums over the substeps; read back where the problem has room for them.
     Totals "totals": "array<Impulse>", Write;
@@ -100,8 +100,6 @@ bindings! {
     WrittenArms "written_arms": "array<f32>", Read;
     /// Separations of the points when the step begins.
     Separations "separations": "array<f32>", Read;
-    /// How deep each manifold sags under what it bore in the step before; read back.
-    Sags "sags": "array<f32>", Write;
     /// The passes of a plan that one dispatch follows.
     Passes "passes": "array<vec4u, PASS_ROWS>", Uniform;
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::bindings::Binding;
+use super::submissions::Submissions;
 use crate::error::{Error, Result};
 
 /// Bytes that are compared and sent together.
@@ -15,6 +16,8 @@ pub(super) struct Buffers {
     adapter: String,
     /// Largest buffer that a kernel can be given (B).
     limit: u64,
+    /// Most memory that all buffers take together (B).
+    memory: u64,
     slots: Vec<Slot>,
     /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back before the next
     /// submission.
@@ -32,11 +35,11 @@ struct Slot {
 }
 
 impl Buffers {
-    pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String) -> Self {
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue, adapter: String, [limit, memory]: [u64; 2]) -> Self {
         let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        Self { device, queue, adapter, limit, slots, staging: None, generation: 0, sent: 0 }
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(limit);
+        Self { device, queue, adapter, limit, memory, slots, staging: None, generation: 0, sent: 0 }
     }
 
     /// The buffer of a binding.
@@ -49,41 +52,40 @@ impl Buffers {
         if bytes as u64 <= self.limit {
             return Ok(());
         }
-        let (mib, limit, adapter, name) = (bytes >> 20, self.limit >> 20, &self.adapter, binding.name());
+        let (bytes, limit, adapter, name) =
+            (SizeText(bytes as u64), SizeText(self.limit), &self.adapter, binding.name());
         Err(Error::TooLarge(format!(
-            "the {name} of this problem take {mib} MiB; a buffer of {adapter} holds at most {limit} MiB: use --backend cpu"
+            "the {name} of this problem take {bytes}; a buffer of {adapter} holds at most {limit}: use --backend cpu"
         )))
     }
 
     /// Makes room for `size` bytes; the content may be lost.
-    pub fn reserve(&mut self, binding: Binding, size: usize) {
+    pub fn reserve(&mut self, binding: Binding, size: usize) -> Result<()> {
         let size = size as u64;
         let slot = &mut self.slots[binding as usize];
         if slot.buffer.as_ref().is_some_and(|b| b.size() >= size.max(16)) {
-            return;
+            return Ok(());
         }
         slot.known.clear();
-        slot.buffer = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(binding.name()),
-            size: size_of_buffer(size, self.limit),
-            usage: wgpu::BufferUsages::UNIFORM
-                | wgpu::BufferUsages::STORAGE
-                | wgpu::BufferUsages::COPY_DST
-                | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        }));
+        let usage = wgpu::BufferUsages::UNIFORM
+            | wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_DST
+            | wgpu::BufferUsages::COPY_SRC;
+        self.slots[binding as usize].buffer = Some(self.create(binding.name(), size, self.limit, usage)?);
         self.generation += 1;
+        Ok(())
     }
 
     /// Makes room for `size` bytes; the first `kept` bytes stay.
-    pub fn grow(&mut self, binding: Binding, kept: usize, size: usize) {
+    pub fn grow(&mut self, binding: Binding, kept: usize, size: usize) -> Result<()> {
         let before = self.slots[binding as usize].buffer.clone();
-        self.reserve(binding, size);
+        self.reserve(binding, size)?;
         if let Some(before) = before.filter(|b| b != self.get(binding)) {
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.copy_buffer_to_buffer(&before, 0, self.get(binding), 0, kept as u64);
             self.queue.submit([encoder.finish()]);
         }
+        Ok(())
     }
 
     /// Sends rows that begin at the byte `at`.
@@ -98,16 +100,17 @@ impl Buffers {
     }
 
     /// Sends all rows of a binding.
-    pub fn send(&mut self, binding: Binding, bytes: &[u8]) {
-        self.reserve(binding, bytes.len());
+    pub fn send(&mut self, binding: Binding, bytes: &[u8]) -> Result<()> {
+        self.reserve(binding, bytes.len())?;
         if !bytes.is_empty() {
             self.write(binding, 0, bytes);
         }
+        Ok(())
     }
 
     /// Sends the rows of a binding that the device does not have yet.
-    pub fn update(&mut self, binding: Binding, bytes: &[u8]) {
-        self.reserve(binding, bytes.len());
+    pub fn update(&mut self, binding: Binding, bytes: &[u8]) -> Result<()> {
+        self.reserve(binding, bytes.len())?;
         let known = std::mem::take(&mut self.slots[binding as usize].known);
         let blocks = (0..bytes.len()).step_by(BLOCK).map(|at| at..(at + BLOCK).min(bytes.len()));
         let mut changed = blocks.filter(|block| known.get(block.clone()) != bytes.get(block.clone())).peekable();
@@ -119,6 +122,7 @@ impl Buffers {
         }
         self.slots[binding as usize].known = known;
         self.note(binding, bytes);
+        Ok(())
     }
 
     /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.
@@ -128,24 +132,27 @@ impl Buffers {
         known.extend_from_slice(bytes);
     }
 
-    /// Submits the encoder with copies of the `wanted` bindings, and of the first bytes of another buffer `more`. Waits, writes the
-    /// copies to `wanted`, and returns those of `more` as numbers.
+    /// Submits the encoder, which has work on so many `rows`, with copies of the `wanted` bindings, and of the first bytes of another buffer
+    /// `more`. Waits, writes the copies to `wanted`, and returns those of `more` as numbers. Nothing is written where anything fails.
     pub fn read_back(
         &mut self,
-        mut encoder: wgpu::CommandEncoder,
+        submissions: &mut Submissions,
+        (mut encoder, rows): (wgpu::CommandEncoder, usize),
         wanted: &mut [(Binding, &mut [u8])],
         more: Option<(&wgpu::Buffer, u64)>,
     ) -> Result<Vec<u64>> {
         let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
         // The numbers are aligned to 8 bytes.
         let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
+        if size == 0 {
+            submissions.submit(encoder);
+            submissions.wait(rows)?;
+            return Ok(Vec::new());
+        }
         if self.staging.as_ref().is_none_or(|b| b.size() < size) {
-            self.staging = Some(self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("read back"),
-                size: size_of_buffer(size, self.device.limits().max_buffer_size),
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }));
+            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+            self.staging = None;
+            self.staging = Some(self.create("read back", size, self.device.limits().max_buffer_size, usage)?);
         }
         let staging = self.staging.as_ref().expect("made above");
         let mut at = 0;
@@ -156,17 +163,13 @@ impl Buffers {
         if let Some((buffer, bytes)) = more {
             encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
         }
-        self.queue.submit([encoder.finish()]);
-        if size == 0 {
-            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
-            return Ok(Vec::new());
-        }
+        submissions.submit(encoder);
         let slice = staging.slice(..size);
         let (sender, receiver) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
-        receiver.recv().map_err(lost)?.map_err(lost)?;
-        let mapped = slice.get_mapped_range().map_err(lost)?;
+        submissions.wait(rows)?;
+        receiver.try_recv().map_err(|e| submissions.lost(e))?.map_err(|e| submissions.lost(e))?;
+        let mapped = slice.get_mapped_range().map_err(|e| submissions.lost(e))?;
         let mut rest = &mapped[..];
         for (_, rows) in wanted {
             rows.copy_from_slice(rest.split_off(..rows.len()).expect("as long as all rows"));
@@ -176,11 +179,37 @@ impl Buffers {
         staging.unmap();
         Ok(numbers)
     }
+
+    /// A buffer for `size` bytes.
+    fn create(&self, name: &str, size: u64, limit: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let size = size_of_buffer(size, limit);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
+        let all = self.slots.iter().filter_map(|slot| slot.buffer.as_ref()).chain(&self.staging);
+        let is_full = all.map(wgpu::Buffer::size).sum::<u64>() + size > self.memory;
+        match pollster::block_on(scope.pop()) {
+            None if !is_full => Ok(buffer),
+            _ => {
+                let (size, adapter) = (SizeText(size), &self.adapter);
+                Err(Error::TooLarge(format!("{adapter} has no {size} of memory for the {name}: use --backend cpu")))
+            }
+        }
+    }
 }
 
-/// The error of a device that no longer answers.
-pub(super) fn lost(reason: impl std::fmt::Display) -> Error {
-    Error::Adapter(format!("the device was lost: {reason}"))
+/// A size (B) for people.
+struct SizeText(u64);
+
+impl std::fmt::Display for SizeText {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(bytes) = self;
+        if *bytes < 1 << 20 { write!(f, "{bytes} B") } else { write!(f, "{} MiB", bytes >> 20) }
+    }
 }
 
 /// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::pipelines::Pipelines;
+use super::submissions::ROWS_OF_A_DISPATCH;
 use super::timer::Timer;
 use super::wgsl::{Program, WORKGROUP};
 use crate::kernels::momentum::IMPULSES_PER_CHUNK;
@@ -13,7 +14,9 @@ use crate::problem::{PassRow, StepProblem};
 pub(super) struct Dispatch {
     pub program: Program,
     /// Rows that its threads share.
-    rows: usize,
+    pub rows: usize,
+    /// Rows that one thread or all together go over, and what a dispatch costs besides.
+    pub work: usize,
     /// Offset of the row of the pass in its buffer (B).
     pub pass_row: u32,
 }
@@ -21,7 +24,7 @@ pub(super) struct Dispatch {
 impl Dispatch {
     /// A dispatch over so many rows.
     pub fn over(program: Program, rows: usize) -> Self {
-        Self { program, rows, pass_row: 0 }
+        Self { program, rows, work: rows + ROWS_OF_A_DISPATCH, pass_row: 0 }
     }
 
     /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes more rows.
@@ -48,13 +51,14 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
         // The order of the rows of some kernels does not matter.
         let is_ordered =
             !matches!(pass.kernel, Kernel::ClearImpulses | Kernel::SumImpulses { .. } | Kernel::MeasureJoints(_));
-        let (program, rows) = if pass.colors.len() > 1 && is_ordered {
+        let pass_row = place(pass);
+        let dispatch = Dispatch { pass_row, ..Dispatch::over(Program::Pass(pass.kernel), rows_of(problem, pass)) };
+        if pass.colors.len() > 1 && is_ordered {
             // One workgroup.
-            (Program::Fused(pass.kernel), 1)
+            Dispatch { program: Program::Fused(pass.kernel), rows: 1, ..dispatch }
         } else {
-            (Program::Pass(pass.kernel), rows_of(problem, pass))
-        };
-        Dispatch { pass_row: place(pass), ..Dispatch::over(program, rows) }
+            dispatch
+        }
     };
     let dispatches = passes.iter().map(dispatch).collect();
     (dispatches, bytes)
@@ -71,6 +75,16 @@ fn rows_of(problem: &StepProblem, pass: &Pass) -> usize {
     }
 }
 
+/// How many of the dispatches one submission with room for so many rows takes: at least one.
+pub(super) fn first_part(dispatches: &[Dispatch], room: usize) -> usize {
+    let mut work = 0;
+    let fits = dispatches.iter().take_while(|dispatch| {
+        work += dispatch.work;
+        work <= room
+    });
+    fits.count().max(1)
+}
+
 /// Encodes dispatches as one compute pass. A thread goes over `rows_a_thread` rows where there are that many for each.
 pub(super) fn encode(
     encoder: &mut wgpu::CommandEncoder,
@@ -80,7 +94,6 @@ pub(super) fn encode(
     mut timer: Option<&mut Timer>,
 ) {
     let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-    timer.iter_mut().for_each(|timer| timer.begin());
     for run in dispatches.chunk_by(|a, b| a.program == b.program) {
         if let Some(timer) = &mut timer {
             timer.before(&mut compute, &run[0].program);

@@ -4,29 +4,32 @@
 //! workgroup, no optional features. Only buffers may be as large as the adapter allows.
 //!
 //! [`Backend::run`] sends all rows of a problem and reads back all rows that the plan changes. [`Backend::step`] goes on from the
-//! rows that the step before left on the device (`resident.rs`): it sends the rows that changed and reads back poses and velocities.
-//! The impulses stay on the device until the simulation asks for them.
+//! rows that the step before left on the device (`resident.rs`): it sends the rows that changed and reads back poses, velocities and
+//! impulses. A step ends when all of its results are on the host, so that nothing is lost with a device: a step that fails leaves the
+//! problem as it was, and another device or the processor repeats it.
 //!
-//! A step is one submission and one read-back. The host waits for the read-back: the next step begins with detection, and
-//! detection needs the poses of all bodies.
+//! A step is one submission and one read-back, and several submissions where one would hold the device for long (`submissions.rs`). The
+//! host waits for the read-back: the next step begins with detection, and detection needs the poses of all bodies.
 
 mod adapter;
 pub(crate) mod bindings;
 mod buffers;
 mod dispatch;
 mod one_dispatch;
+mod options;
 mod pipelines;
 pub(crate) mod reflect;
 pub(crate) mod resident;
 pub(crate) mod rows;
 pub(crate) mod spirv_exact;
+mod submissions;
 mod timer;
 pub(crate) mod wgsl;
 
 pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_device, open_for_surface};
+pub use options::{Faults, GpuOptions, Loss};
 
-use std::sync::{Arc, Mutex};
-
+use super::cpu::Cpu;
 use super::{Backend, CheckedStep};
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass, StepPlan};
@@ -38,22 +41,29 @@ use buffers::Buffers;
 use dispatch::Dispatch;
 use pipelines::Pipelines;
 use resident::ResidentRows;
+use submissions::{ROWS_OF_A_DISPATCH, Submissions};
 use timer::Timer;
 
 /// Rows that a thread of a software adapter goes over. llvmpipe starts every thread of a workgroup anew, which costs it more than the loop
 /// to another row: a step of a settled pile of 1,000 takes 13.1 ms with 1 row a thread and 11.7 ms with 4.
 const SOFTWARE_ROWS_A_THREAD: u32 = 4;
 
+/// Devices of one run: after so many losses the processor goes on.
+const MOST_DEVICES: usize = 3;
+
 /// Follows plans on a device through wgpu.
 pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
     summary: AdapterSummary,
-    exact: bool,
+    options: GpuOptions,
+    /// Number of devices that were lost before this one.
+    lost: usize,
     /// Rows that a thread of a dispatch goes over.
     rows_a_thread: u32,
     pipelines: Pipelines,
     buffers: Buffers,
+    submissions: Submissions,
     timer: Option<Timer>,
     times: Vec<KernelTime>,
     traffic: Traffic,
@@ -64,8 +74,6 @@ pub struct Gpu {
     colors: Vec<u32>,
     systems: Vec<u32>,
     states: Vec<BodyRow>,
-    /// First error that the device reported outside a call.
-    device_error: Arc<Mutex<Option<String>>>,
 }
 
 impl Gpu {
@@ -75,26 +83,39 @@ impl Gpu {
     /// # Errors
     /// No such adapter; it cannot be opened; or exact shaders are asked of one that cannot take SPIR-V.
     pub fn new(choice: AdapterChoice, exact: bool) -> Result<Self> {
-        let (adapter, summary) = adapter::find(choice)?;
+        Self::open(GpuOptions { adapter: choice, exact, ..GpuOptions::default() })
+    }
+
+    /// Opens an adapter as `options` say.
+    ///
+    /// # Errors
+    /// As of [`Gpu::new`].
+    pub fn open(options: GpuOptions) -> Result<Self> {
+        Self::open_after(0, options)
+    }
+
+    /// Opens an adapter after so many devices were lost.
+    fn open_after(lost: usize, options: GpuOptions) -> Result<Self> {
+        let Faults { shader, losses } = &options.faults;
+        let (adapter, summary) = adapter::find(options.adapter, &options.name)?;
+        let (exact, loss) = (options.exact, losses.get(lost).copied());
         if exact && !summary.exact {
             let name = &summary.name;
             return Err(Error::Adapter(format!("exact mode needs an adapter that takes SPIR-V; {name} does not")));
         }
         let (device, queue) = adapter::open(&adapter, exact)?;
-        let device_error = Arc::new(Mutex::new(None));
-        let first_error = Arc::clone(&device_error);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            first_error.lock().expect("no panic holds it").get_or_insert(error.to_string());
-        }));
+        let name = || summary.name.clone();
         Ok(Self {
-            pipelines: Pipelines::new(device.clone(), exact),
-            buffers: Buffers::new(device.clone(), queue.clone(), summary.name.clone()),
+            pipelines: Pipelines::new(device.clone(), exact, *shader),
+            buffers: Buffers::new(device.clone(), queue.clone(), name(), [options.buffer_limit, options.memory]),
+            submissions: Submissions::new(device.clone(), queue.clone(), name(), options.submission, loss),
             timer: None,
             device,
             queue,
             rows_a_thread: if summary.hardware { 1 } else { SOFTWARE_ROWS_A_THREAD },
             summary,
-            exact,
+            options,
+            lost,
             times: Vec::new(),
             traffic: Traffic::default(),
             rows: None,
@@ -102,7 +123,6 @@ impl Gpu {
             colors: Vec::new(),
             systems: Vec::new(),
             states: Vec::new(),
-            device_error,
         })
     }
 
@@ -119,7 +139,7 @@ impl Gpu {
 
     /// Whether its results are the reference's to the last bit.
     pub fn is_exact(&self) -> bool {
-        self.exact
+        self.options.exact
     }
 
     /// Sends every row, also those that the device has.
@@ -128,15 +148,12 @@ impl Gpu {
         for (binding, _) in rows::small(problem, &[], &[]) {
             self.buffers.note(binding, &[]);
         }
-        self.update_small_rows(problem);
-        for (binding, bytes) in rows::of_contacts(problem) {
-            self.buffers.send(binding, bytes);
-        }
-        Ok(())
+        self.update_small_rows(problem)?;
+        rows::of_contacts(problem).into_iter().try_for_each(|(binding, bytes)| self.buffers.send(binding, bytes))
     }
 
     /// Sends the small rows that the device does not have yet.
-    fn update_small_rows(&mut self, problem: &StepProblem) {
+    fn update_small_rows(&mut self, problem: &StepProblem) -> Result<()> {
         // One buffer holds where each color begins, and then the rows of the colors.
         let shift = problem.colors.len() as u32;
         self.colors.clear();
@@ -144,12 +161,13 @@ impl Gpu {
         self.colors.extend_from_slice(&problem.order);
         rows::pack_systems(problem, &mut self.systems);
         for (binding, bytes) in rows::small(problem, &self.colors, &self.systems) {
-            self.buffers.update(binding, bytes);
+            self.buffers.update(binding, bytes)?;
         }
         if !problem.turning.is_empty() {
             // This step turns those on the device.
             self.buffers.note(Binding::Masses, &[]);
         }
+        Ok(())
     }
 
     /// Refuses a problem that is too large, before any row is sent. Makes room for the buffers that stay on the device.
@@ -161,32 +179,35 @@ impl Gpu {
         let accelerated = passes.iter().any(|p| matches!(p.kernel, Kernel::Extrapolate { .. }));
         for (binding, size) in rows::scratch_sizes(problem, accelerated) {
             self.buffers.check(binding, size)?;
-            self.buffers.reserve(binding, size);
+            self.buffers.reserve(binding, size)?;
         }
         Ok(())
     }
 
-    /// The dispatches `first`, then the passes, ready for submission. With `together` the passes of a small world are one dispatch.
+    /// The dispatches `first`, then the passes, and the rows that they go over, ready for submission. With `together` the passes of a small
+    /// world are one dispatch. Of a plan that would hold the device for long, all but the last part is submitted here.
     fn encoded(
         &mut self,
         problem: &StepProblem,
         first: Vec<Dispatch>,
         passes: &[Pass],
         together: bool,
-    ) -> Result<wgpu::CommandEncoder> {
+    ) -> Result<(wgpu::CommandEncoder, usize)> {
         let mut all = first;
         let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-        // The timer measures each kernel by itself.
-        match one_dispatch::of(problem, passes).filter(|_| together && self.timer.is_none()) {
+        // The timer measures each kernel by itself. A long plan is cut, and one dispatch cannot be cut.
+        let work = passes.len() * ROWS_OF_A_DISPATCH;
+        let together = together && self.timer.is_none() && work <= self.submissions.room();
+        match one_dispatch::of(problem, passes).filter(|_| together) {
             Some((program, table)) => {
-                self.buffers.update(Binding::Passes, bytemuck::cast_slice(&table));
+                self.buffers.update(Binding::Passes, bytemuck::cast_slice(&table))?;
                 let (_, rows) = dispatch::of_passes(problem, &passes[..1], stride);
-                self.buffers.update(Binding::PassRow, &rows);
-                all.push(Dispatch::over(program, 1));
+                self.buffers.update(Binding::PassRow, &rows)?;
+                all.push(Dispatch { work, ..Dispatch::over(program, 1) });
             }
             None => {
                 let (dispatches, rows) = dispatch::of_passes(problem, passes, stride);
-                self.buffers.update(Binding::PassRow, &rows);
+                self.buffers.update(Binding::PassRow, &rows)?;
                 all.extend(dispatches);
             }
         }
@@ -194,9 +215,20 @@ impl Gpu {
         for dispatch in &all {
             self.pipelines.prepare(&dispatch.program, &self.buffers)?;
         }
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        dispatch::encode(&mut encoder, &all, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
-        Ok(encoder)
+        self.timer.iter_mut().for_each(Timer::begin);
+        let mut rest = &all[..];
+        loop {
+            let (part, later) = rest.split_at(dispatch::first_part(rest, self.submissions.room()));
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            dispatch::encode(&mut encoder, part, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
+            let rows = part.iter().map(|dispatch| dispatch.work).sum();
+            if later.is_empty() {
+                return Ok((encoder, rows));
+            }
+            self.submissions.submit(encoder);
+            self.submissions.wait(rows)?;
+            rest = later;
+        }
     }
 
     /// Adds the bytes that kernels moved to their times.
@@ -212,17 +244,36 @@ impl Gpu {
         }
     }
 
-    /// Submits, waits, and reads the `wanted` rows back.
-    fn finish(&mut self, mut encoder: wgpu::CommandEncoder, wanted: &mut [(Binding, &mut [u8])]) -> Result<()> {
+    /// Runs the dispatches `first`, then the passes, and reads back all that they changed.
+    fn run_all(
+        &mut self,
+        problem: &mut StepProblem,
+        first: Vec<Dispatch>,
+        passes: &[Pass],
+        together: bool,
+    ) -> Result<()> {
+        let work = self.encoded(problem, first, passes, together)?;
+        let [mut impulses, mut totals] = [&mut problem.impulses, &mut problem.totals].map(std::mem::take);
+        let mut wanted = rows::moved(problem);
+        wanted.push((Binding::Impulses, bytemuck::cast_slice_mut(&mut impulses)));
+        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
+        let finished = self.finish(work, &mut wanted);
+        (problem.impulses, problem.totals) = (impulses, totals);
+        finished
+    }
+
+    /// Submits work on so many rows, waits, and reads the `wanted` rows back.
+    fn finish(
+        &mut self,
+        (mut encoder, rows): (wgpu::CommandEncoder, usize),
+        wanted: &mut [(Binding, &mut [u8])],
+    ) -> Result<()> {
         let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
-        let read = self.buffers.read_back(encoder, wanted, times);
-        if let Some(message) = self.device_error.lock().expect("no panic holds it").take() {
-            return Err(Error::Adapter(format!("{}: {message}", self.summary.name)));
-        }
-        let ticks = read?;
+        let ticks = self.buffers.read_back(&mut self.submissions, (encoder, rows), wanted, times)?;
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
-        self.traffic = Traffic { up: self.buffers.take_sent(), down, ..self.traffic };
+        let (submissions, longest_submission) = self.submissions.take_taken();
+        self.traffic = Traffic { up: self.buffers.take_sent(), down, submissions, longest_submission, ..self.traffic };
         Ok(())
     }
 }
@@ -233,31 +284,23 @@ impl Backend for Gpu {
     }
 
     fn adapter(&self) -> String {
-        format!("{}{}", self.summary, if self.exact { ", exact" } else { "" })
+        format!("{}{}", self.summary, if self.options.exact { ", exact" } else { "" })
     }
 
     fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
         let (problem, passes) = step.into_parts();
         self.rows = None;
         self.send_all(problem, passes)?;
-        let encoder = self.encoded(problem, Vec::new(), passes, false)?;
-        let [mut impulses, mut totals] = [&mut problem.impulses, &mut problem.totals].map(std::mem::take);
-        let mut wanted = rows::moved(problem);
-        wanted.push((Binding::Impulses, bytemuck::cast_slice_mut(&mut impulses)));
-        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
-        let finished = self.finish(encoder, &mut wanted);
-        (problem.impulses, problem.totals) = (impulses, totals);
-        finished
+        self.run_all(problem, Vec::new(), passes, false)
     }
 
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
         let (problem, passes) = step.into_parts();
         let before = self.rows.take().filter(|_| carry.on_device);
-        let goes_on = before.is_some();
         let first = match before {
             Some(before) => {
                 self.check(problem, passes)?;
-                self.update_small_rows(problem);
+                self.update_small_rows(problem)?;
                 resident::begin(&mut self.buffers, problem, carry, before, &mut self.separations)?
             }
             None => {
@@ -265,17 +308,7 @@ impl Backend for Gpu {
                 Vec::new()
             }
         };
-        let encoder = self.encoded(problem, first, passes, true)?;
-        let (mut sags, mut totals) = (std::mem::take(&mut problem.sags), std::mem::take(&mut problem.totals));
-        let mut wanted = rows::moved(problem);
-        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
-        // Else the host computed them.
-        if goes_on && !sags.is_empty() {
-            wanted.push((Binding::Sags, bytemuck::cast_slice_mut(&mut sags)));
-        }
-        let finished = self.finish(encoder, &mut wanted);
-        (problem.sags, problem.totals) = (sags, totals);
-        finished?;
+        self.run_all(problem, first, passes, true)?;
         self.count_bytes(problem, passes);
         for (binding, bytes) in rows::moved(problem) {
             self.buffers.note(binding, bytes);
@@ -292,19 +325,22 @@ impl Backend for Gpu {
         self.rows.is_some()
     }
 
-    fn fetch(&mut self, problem: &mut StepProblem) -> Result<()> {
-        let Some(mut rows) = self.rows.filter(|rows| !rows.fetched) else { return Ok(()) };
-        self.timer.iter_mut().for_each(Timer::begin);
-        let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let StepProblem { contacts, impulses, .. } = &mut *problem;
-        let mut wanted = [
-            (Binding::Impulses, bytemuck::cast_slice_mut::<_, u8>(impulses)),
-            (Binding::Contacts, bytemuck::cast_slice_mut(contacts)),
-        ];
-        self.finish(encoder, &mut wanted)?;
-        rows.fetched = true;
-        self.rows = Some(rows);
-        Ok(())
+    fn successor(&mut self) -> Option<Box<dyn Backend>> {
+        if !self.options.goes_on {
+            return None;
+        }
+        let lost = self.lost + 1;
+        let opened = if lost < MOST_DEVICES { Self::open_after(lost, self.options.clone()).ok() } else { None };
+        Some(match opened {
+            Some(mut gpu) => {
+                gpu.rows_a_thread = self.rows_a_thread;
+                if self.timer.is_some() {
+                    gpu.timer = Timer::new(&gpu.device, &gpu.queue);
+                }
+                Box::new(gpu)
+            }
+            None => Box::new(Cpu::new()),
+        })
     }
 
     fn traffic(&self) -> Traffic {
@@ -312,7 +348,7 @@ impl Backend for Gpu {
     }
 
     fn time_kernels(&mut self) -> Result<Option<f64>> {
-        let bandwidth = timer::copy_bandwidth(&self.device, &self.queue)?;
+        let bandwidth = timer::copy_bandwidth(&self.device, &mut self.submissions)?;
         self.timer = Timer::new(&self.device, &self.queue);
         Ok(self.timer.as_ref().map(|_| bandwidth))
     }

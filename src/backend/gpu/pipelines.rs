@@ -14,6 +14,8 @@ use crate::problem::PassRow;
 pub(super) struct Pipelines {
     device: wgpu::Device,
     exact: bool,
+    /// Changes shaders on purpose ([`Faults`](super::Faults)).
+    fault: Option<fn(&str, String) -> String>,
     compiled: HashMap<Program, Compiled>,
 }
 
@@ -36,8 +38,8 @@ impl Compiled {
 }
 
 impl Pipelines {
-    pub fn new(device: wgpu::Device, exact: bool) -> Self {
-        Self { device, exact, compiled: HashMap::new() }
+    pub fn new(device: wgpu::Device, exact: bool, fault: Option<fn(&str, String) -> String>) -> Self {
+        Self { device, exact, fault, compiled: HashMap::new() }
     }
 
     /// A prepared pipeline.
@@ -54,7 +56,10 @@ impl Pipelines {
             }
             return Ok(());
         }
-        let (name, source) = (program.name(), program.source());
+        let (name, mut source) = (program.name(), program.source());
+        if let Some(fault) = self.fault {
+            source = fault(name, source);
+        }
         let reflected = Reflected::new(name, &source)?;
         let layout = layout(&self.device, &reflected);
         let module = if self.exact {

@@ -20,14 +20,12 @@ const _: () = assert!(NO_POINT as usize == MAX_POINTS);
 pub(super) struct ResidentRows {
     /// Bytes of the rows of contacts, in the order of `rows::of_contacts`.
     sizes: [usize; 4],
-    /// Whether the problem on the host has the same impulses and preloads.
-    pub fetched: bool,
 }
 
 impl ResidentRows {
     /// Those of a problem that just ran.
     pub fn of(problem: &StepProblem) -> Self {
-        Self { sizes: rows::of_contacts(problem).map(|(_, rows)| rows.len()), fetched: false }
+        Self { sizes: rows::of_contacts(problem).map(|(_, rows)| rows.len()) }
     }
 }
 
@@ -118,28 +116,27 @@ pub(super) fn begin(
         tangents: carry.tangents.into(),
         ..ResidentParams::default()
     };
-    buffers.update(Binding::Resident, bytemuck::bytes_of(&params));
+    buffers.update(Binding::Resident, bytemuck::bytes_of(&params))?;
     let mut programs = vec![Dispatch::over(Program::BeginBodies, problem.bodies.len())];
     if problem.contacts.is_empty() {
         return Ok(programs);
     }
-    buffers.reserve(Binding::Sags, size_of_val(&problem.sags[..]));
     for ((binding, rows), kept) in rows::of_contacts(problem).into_iter().zip(before.sizes) {
-        buffers.grow(binding, kept, rows.len());
+        buffers.grow(binding, kept, rows.len())?;
     }
     if !carry.written.is_empty() {
         send_written(buffers, problem, carry)?;
         programs.push(Dispatch::over(Program::WriteContacts, carry.written.len()));
     }
     if carry.approach {
-        buffers.send(Binding::Points, bytemuck::cast_slice(&problem.points));
+        buffers.send(Binding::Points, bytemuck::cast_slice(&problem.points))?;
     }
     separations.clear();
     for &row in swept {
         let first = problem.contacts[row as usize].first_point as usize;
         separations.extend(problem.points[first..first + MAX_POINTS].iter().map(|point| point.separation));
     }
-    buffers.send(Binding::Separations, bytemuck::cast_slice(separations));
+    buffers.send(Binding::Separations, bytemuck::cast_slice(separations))?;
     programs.push(Dispatch::over(Program::BeginContacts, swept.len()));
     Ok(programs)
 }
@@ -164,8 +161,5 @@ fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> 
     for (binding, bytes) in rows {
         buffers.check(binding, bytes.len())?;
     }
-    for (binding, bytes) in rows {
-        buffers.send(binding, bytes);
-    }
-    Ok(())
+    rows.into_iter().try_for_each(|(binding, bytes)| buffers.send(binding, bytes))
 }

@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::buffers::lost;
+use super::submissions::Submissions;
 use super::wgsl::Program;
 use crate::error::Result;
 use crate::stats::KernelTime;
@@ -18,7 +18,10 @@ pub(super) const FEATURES: wgpu::Features =
 /// Runs of one program that are timed in one submission: one less than the queries that a set can have.
 const MOST: u32 = 4095;
 
-/// Timestamps of one submission.
+/// The name of the time between two submissions.
+const PAUSE: &str = "";
+
+/// Timestamps of one step.
 pub(super) struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -48,7 +51,7 @@ impl Timer {
         Some(Self { queries, resolved, period: queue.get_timestamp_period(), runs: Vec::new() })
     }
 
-    /// Forgets the last submission.
+    /// Forgets the last step.
     pub fn begin(&mut self) {
         self.runs.clear();
     }
@@ -61,9 +64,12 @@ impl Timer {
         }
     }
 
-    /// Notes the time after the last run.
-    pub fn end(&self, pass: &mut wgpu::ComputePass) {
+    /// Notes the time after the last run of a submission. The time from there to the next submission counts for no kernel.
+    pub fn end(&mut self, pass: &mut wgpu::ComputePass) {
         pass.write_timestamp(&self.queries, self.runs.len() as u32);
+        if self.runs.len() < MOST as usize {
+            self.runs.push(PAUSE);
+        }
     }
 
     /// Writes the times to a buffer that can be copied from. Returns the buffer and the number of its bytes.
@@ -71,7 +77,8 @@ impl Timer {
         if self.runs.is_empty() {
             return None;
         }
-        let count = self.runs.len() as u32 + 1;
+        // The last run is a pause, whose end nobody notes.
+        let count = self.runs.len() as u32;
         encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
         Some((&self.resolved, u64::from(count) * wgpu::QUERY_SIZE as u64))
     }
@@ -79,7 +86,7 @@ impl Timer {
     /// Time of each program from the ticks that were read back, in the order of the first runs.
     pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
         let mut times: Vec<KernelTime> = Vec::new();
-        for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)) {
+        for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)).filter(|(kernel, _)| **kernel != PAUSE) {
             let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(self.period);
             let time = Duration::from_nanos(nanoseconds as u64);
             match times.iter_mut().find(|t| t.kernel == kernel) {
@@ -95,7 +102,7 @@ impl Timer {
 ///
 /// # Errors
 /// The device is lost.
-pub(super) fn copy_bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64> {
+pub(super) fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submissions) -> Result<f64> {
     // Larger than caches are, where the adapter has such buffers.
     let size = device.limits().max_storage_buffer_binding_size.min(256 << 20);
     let buffer = || {
@@ -107,12 +114,12 @@ pub(super) fn copy_bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Resu
         })
     };
     let (from, to) = (buffer(), buffer());
-    let seconds = |copies: u32| -> Result<f64> {
+    let mut seconds = |copies: u32| -> Result<f64> {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
         let start = Instant::now();
-        queue.submit([encoder.finish()]);
-        device.poll(wgpu::PollType::wait_indefinitely()).map_err(lost)?;
+        submissions.submit(encoder);
+        submissions.wait(0)?;
         Ok(start.elapsed().as_secs_f64())
     };
     // The first copy touches the memory. The difference leaves out what a submission costs.

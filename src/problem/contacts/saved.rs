@@ -127,12 +127,7 @@ impl ContactRows {
             (0..if all_there { bodies } else { 0 }).into_par_iter().with_min_len(256).map(mass).collect();
         let poses = vec![PoseRow::default(); masses.len()];
         let rule = config.friction_rule();
-        let carry = Carry {
-            // Impulses stay.
-            on_device: true,
-            tangents: matches!(rule, FrictionRule::Box | FrictionRule::Disc),
-            ..Carry::default()
-        };
+        let carry = Carry { tangents: matches!(rule, FrictionRule::Box | FrictionRule::Disc), ..Carry::default() };
         let writer = Writer {
             world,
             detector,
@@ -144,6 +139,7 @@ impl ContactRows {
             masses: &masses,
             poses: &poses,
             carry: &carry,
+            brings_impulses: false,
             patches: *patches,
             may_jam: materials.unwrap_or_else(|| Materials::of(world)).may_jam,
         };

@@ -186,6 +186,9 @@ impl Case {
                 (0..TURN).try_for_each(|_| {
                     spawners.before_step(&mut simulation.world, *dt);
                     *last = simulation.step(*dt)?;
+                    if let Some(fault) = last.fault.take() {
+                        return Err(Error::Lost(fault));
+                    }
                     steps.push(stage_times(last));
                     Ok(())
                 })

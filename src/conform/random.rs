@@ -1,25 +1,27 @@
 //! Random problems: every row is valid, no two make a scene.
-// Only the crate can name the padding of a row, so rows are made empty and filled.
 #![allow(clippy::field_reassign_with_default)]
 
-use drystone::StepProblem;
-use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
-use drystone::stages::problem::softness::softness;
-use drystone::stages::problem::{
+use glam::{Mat3, Quat, Vec3};
+
+use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use crate::problem::StepProblem;
+use crate::problem::softness::softness;
+use crate::problem::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
     PointRow, Substep, TorqueRow, TurningRow,
 };
-use drystone::stages::random::SplitMix64;
-use glam::{Mat3, Quat, Vec3};
+use crate::random::SplitMix64;
 
 /// SplitMix64, with the numbers that problems need.
 pub struct Random(SplitMix64);
 
 impl Random {
+    /// The stream of a seed.
     pub fn new(seed: u64) -> Self {
         Self(SplitMix64::new(seed))
     }
 
+    /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
         self.0.bits()
     }
@@ -34,14 +36,17 @@ impl Random {
         self.within(0.0, 1.0) < chance
     }
 
+    /// A number from `least` to `most`.
     pub fn within(&mut self, least: f32, most: f32) -> f32 {
         least + (most - least) * ((self.bits() >> 40) as f32 / (1 << 24) as f32)
     }
 
+    /// A vector in a cube of half extent `size`.
     pub fn vector(&mut self, size: f32) -> Vec3 {
         Vec3::from_array([(); 3].map(|()| self.within(-size, size)))
     }
 
+    /// A rotation; any may come, and not all as often.
     pub fn rotation(&mut self) -> Quat {
         let q = Quat::from_array([(); 4].map(|()| self.within(-1.0, 1.0)));
         if q.length() > 0.1 { q.normalize() } else { Quat::IDENTITY }

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use drystone::StepProblem;
-use drystone::config::FrictionRule;
-use drystone::stages::kernels::Rules;
-use drystone::stages::plan::{Kernel, Pass};
+use crate::config::FrictionRule;
+use crate::kernels::Rules;
+use crate::plan::{Kernel, Pass};
+use crate::problem::StepProblem;
 
 /// Every combination of rules that differ in what they do.
 pub fn every_rules() -> Vec<Rules> {
@@ -148,4 +148,58 @@ pub fn color_by_color(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
         return in_one_pass(kernel, problem);
     }
     colors.map(|c| Pass { kernel, block: 0, colors: c..c + 1 }).collect()
+}
+
+/// What a kernel is run as: over all colors in one pass, and color by color; with a sweep after it if it writes rows that
+/// are not read back.
+pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
+    // What one leaves for the next is not read back.
+    match kernel {
+        Kernel::Extrapolate { measured, .. } => return vec![accelerated_sweeps(problem, measured)],
+        Kernel::MeasureStep | Kernel::UpdateMomentum => return vec![accelerated_sweeps(problem, false)],
+        _ => {}
+    }
+    let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
+    if matches!(
+        kernel,
+        Kernel::IntegrateTorques { from_start: false } | Kernel::IntegrateGyroscopic { from_start: false }
+    ) {
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
+        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
+    }
+    // Systems of joints: what one of these kernels leaves to the next is not read back.
+    if let Kernel::MeasureJoints(rules) | Kernel::SolveJointSystems(rules) | Kernel::ApplyJointChanges(rules) = kernel {
+        let sweep = system_sweep(rules, problem);
+        let changes = [Kernel::BeginChanges, Kernel::EndChanges].map(|kernel| in_one_pass(kernel, problem));
+        let [begin, end] = changes.map(|passes| if rules.from_start { passes } else { Vec::new() });
+        return vec![[begin, sweep, end].concat()];
+    }
+    if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
+        return vec![system_sweep(Rules::default(), problem)];
+    }
+    // What a warm start applies is what happened since it last ran.
+    if kernel == (Kernel::IntegrateVelocities { warm_start: true, from_start: false }) {
+        let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
+        ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
+    }
+    // Changes are those since `BeginChanges`, and only their sums with the velocities from then stay.
+    if kernel.is_from_start() || kernel == Kernel::EndChanges {
+        let integrate = Kernel::IntegrateVelocities { warm_start: false, from_start: true };
+        let first = [Kernel::BeginChanges, integrate].map(|kernel| in_one_pass(kernel, problem)).concat();
+        let end = in_one_pass(Kernel::EndChanges, problem);
+        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &end].concat());
+    }
+    ways.dedup();
+    ways
+}
+
+/// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
+fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
+    let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
+    let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
+    let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
+    let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
+    let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
+    let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();
+    first.chain(sweep.clone()).chain(sweep).collect()
 }

@@ -1,6 +1,6 @@
 //! How far apart two backends leave one problem: the rows that a backend gives back.
 
-use drystone::StepProblem;
+use crate::problem::StepProblem;
 
 /// Everything that a backend gives back, as numbers.
 fn numbers(problem: &StepProblem) -> Vec<f32> {

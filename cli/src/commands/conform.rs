@@ -1,0 +1,93 @@
+//! `drystone conform`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::output::{print, replacing, say};
+use super::scene::OUTPUT;
+use super::words;
+use crate::files;
+use crate::report::junit;
+use drystone::Result;
+use drystone::backend::gpu::GpuOptions;
+use drystone::conform::{Check, ConformOptions, Conformance, Group, Mode, Verdict, conform};
+use serde_json::{Value, json};
+
+/// Check an adapter and its driver.
+///
+/// One line a check: verdict, mode, group, name, and what was measured. Exit code 0 where no check failed, 1 where one failed, 2 for bad
+/// arguments or a file that cannot be written, 3 where there is no such adapter.
+#[derive(Args)]
+pub struct ConformArgs {
+    /// Check the first adapter whose name, API or driver contains this; `drystone adapters` lists them.
+    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    adapter: String,
+    /// Check exact shaders only.
+    #[arg(long, conflicts_with = "plain")]
+    exact: bool,
+    /// Check plain WGSL only.
+    #[arg(long)]
+    plain: bool,
+    /// Check these groups only.
+    #[arg(long, value_name = "GROUP", value_parser = words::of::<Group>(), value_delimiter = ',', num_args = 1..)]
+    group: Vec<Group>,
+    /// Check fewer variants of kernels and fewer steps of scenes.
+    #[arg(long)]
+    short: bool,
+    /// Write a report in JUnit's XML.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    junit: Option<PathBuf>,
+    /// Write a report in JSON.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    json: Option<PathBuf>,
+}
+
+impl ConformArgs {
+    /// Whether no check failed.
+    pub fn run(&self) -> Result<bool> {
+        let all = ConformOptions::default();
+        let options = ConformOptions {
+            gpu: GpuOptions { name: self.adapter.clone(), ..GpuOptions::default() },
+            modes: match (self.exact, self.plain) {
+                (true, _) => vec![Mode::Exact],
+                (_, true) => vec![Mode::Plain],
+                _ => all.modes,
+            },
+            groups: if self.group.is_empty() { all.groups } else { self.group.clone() },
+            short: self.short,
+        };
+        let mut printed = Ok(());
+        let found = conform(&options, &mut |check| {
+            if printed.is_ok() {
+                printed = print(line(check));
+            }
+        })?;
+        printed?;
+        if let Some(path) = &self.junit {
+            replacing(path, || files::write(path, junit::text(&found).as_bytes()))?;
+        }
+        if let Some(path) = &self.json {
+            let text = serde_json::to_string_pretty(&as_json(&found)).expect("a report serializes");
+            replacing(path, || files::write(path, text.as_bytes()))?;
+        }
+        let [passed, failed, skipped] = Verdict::ALL.map(|verdict| found.count(verdict));
+        say(format_args!("{}: {passed} passed, {failed} failed, {skipped} skipped", found.adapter));
+        Ok(failed == 0)
+    }
+}
+
+fn line(check: &Check) -> String {
+    let Check { group, mode, name, verdict, figure, seconds } = check;
+    format!("{:<7} {:<5} {:<13} {name:<42} {seconds:>6.2} s  {figure}", verdict.name(), mode.name(), group.name())
+}
+
+fn as_json(found: &Conformance) -> Value {
+    let adapter = &found.adapter;
+    let [passed, failed, skipped] = Verdict::ALL.map(|verdict| found.count(verdict));
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "adapter": {"name": adapter.name, "api": adapter.api, "driver": adapter.driver, "kind": adapter.kind},
+        "passed": passed, "failed": failed, "skipped": skipped, "checks": found.checks,
+    })
+}

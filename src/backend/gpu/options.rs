@@ -1,0 +1,68 @@
+//! How a device is opened and used.
+
+use std::time::Duration;
+
+use super::adapter::AdapterChoice;
+
+/// How a device is opened and used: [`Gpu::open`](super::Gpu::open).
+///
+/// ```no_run
+/// use drystone::Gpu;
+/// use drystone::backend::gpu::GpuOptions;
+///
+/// let gpu = Gpu::open(GpuOptions { name: "llvmpipe".into(), exact: true, ..GpuOptions::default() })?;
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct GpuOptions {
+    /// Which adapter to open.
+    pub adapter: AdapterChoice,
+    /// A part of the name, the API or the driver of the adapter; empty for any.
+    pub name: String,
+    /// Whether no driver may reassociate or fuse arithmetic, so that results are the reference's to the last bit.
+    pub exact: bool,
+    /// Largest buffer (B); the limit of the adapter counts where it is lower.
+    pub buffer_limit: u64,
+    /// Most memory that all buffers take together (B).
+    pub memory: u64,
+    /// Longest that one submission is meant to hold the device (s). A longer plan is cut into several submissions. Watchdogs of drivers
+    /// and desktops end work that holds a device for two seconds and more.
+    pub submission: Duration,
+    /// Whether another device, or the processor, goes on after the device was lost. Else the step fails: so measurements end.
+    pub goes_on: bool,
+    /// Faults on purpose, for tests.
+    pub faults: Faults,
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        Self {
+            adapter: AdapterChoice::Best,
+            name: String::new(),
+            exact: false,
+            buffer_limit: u64::MAX,
+            memory: u64::MAX,
+            submission: Duration::from_millis(100),
+            goes_on: true,
+            faults: Faults::default(),
+        }
+    }
+}
+
+/// Faults on purpose, so that tests can show that checks find them and that runs survive them.
+#[derive(Clone, Debug, Default)]
+pub struct Faults {
+    /// Changes the WGSL of the program of this name before it is compiled.
+    pub shader: Option<fn(&str, String) -> String>,
+    /// When each device that is opened is lost, the first one first; devices beyond the last entry stay.
+    pub losses: Vec<Loss>,
+}
+
+/// When a device is lost on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loss {
+    /// The submission, from 1.
+    pub submission: u32,
+    /// Whether the device is lost while it works on the submission; else after that.
+    pub during: bool,
+}

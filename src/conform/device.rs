@@ -1,0 +1,183 @@
+//! Limits, long plans and lost devices.
+
+use std::time::Duration;
+
+use super::difference::{differing, largest as largest_difference};
+use super::scenes::Warm;
+use super::{Ended, Group, Outcome, PLAIN_PASS, PLAIN_STEP, Run, failed};
+use crate::backend::Backend;
+use crate::backend::cpu::{Cpu, Reference};
+use crate::backend::gpu::{Gpu, GpuOptions, Loss};
+use crate::compare::{BodyDifference, Difference};
+use crate::error::{Error, Result};
+use crate::plan::{Kernel, Pass};
+use crate::problem::{BodyRow, MassRow, StepProblem, Substep};
+
+/// Longest that a submission may hold a device. Watchdogs end work after two seconds and more.
+const LONGEST: Duration = Duration::from_millis(500);
+
+/// Steps that a pile of 27 boxes falls until its boxes touch.
+const LANDED: u32 = 60;
+
+fn open(options: GpuOptions) -> Result<Box<dyn Backend>> {
+    Ok(Box::new(Gpu::open(options)?))
+}
+
+/// A pile that lies, small enough for one dispatch.
+fn pile() -> Result<Warm> {
+    Warm::of("pile", &["n=27"], LANDED)
+}
+
+pub(super) fn check_limits(run: &mut Run) {
+    run.check(Group::Limits, "large buffers", large_buffers);
+    run.check(Group::Limits, "a buffer beyond the limit is refused", |run| {
+        let options = GpuOptions { buffer_limit: 4096, ..run.gpu_options() };
+        refused(run, options)
+    });
+    run.check(Group::Limits, "memory that is not there is refused", |run| {
+        let options = GpuOptions { memory: 10_000, ..run.gpu_options() };
+        refused(run, options)
+    });
+}
+
+/// As many bodies as fit into a large buffer move for a step.
+fn large_buffers(run: &mut Run) -> Outcome {
+    let gpu = Gpu::open(run.gpu_options())?;
+    let most = gpu.summary().buffer_limit.min(if run.options.short { 16 << 20 } else { 128 << 20 });
+    let count = (most as usize / size_of::<MassRow>().max(size_of::<BodyRow>())).min(1 << 21);
+    let mut random = crate::random::SplitMix64::new(7);
+    let mut number = || random.symmetric() as f32;
+    let bodies = (0..count).map(|_| BodyRow { v: [number(), number(), number()], ..BodyRow::AT_REST }).collect();
+    let pull = MassRow { acceleration: [0.3, -9.81, 0.1], inv_mass: 1.0, ..MassRow::default() };
+    let mut problem = StepProblem { bodies, masses: vec![pull; count], ..StepProblem::default() };
+    problem.params.body_count = count as u32;
+    problem.in_one_block(0, Substep { length: 0.013, inverse_length: 1.0 / 0.013, ..Substep::default() });
+    let block = &problem.blocks[0];
+    let colors = block.bodies..block.bodies + 1;
+    let kernels = [
+        Kernel::IntegrateVelocities { warm_start: false, from_start: false },
+        Kernel::IntegratePositions { from_start: false },
+    ];
+    let passes = kernels.map(|kernel| Pass { kernel, block: 0, colors: colors.clone() });
+    let mut results = [problem.clone(), problem];
+    Reference::<f32>::new().run(&mut results[0], &passes)?;
+    let mut gpu: Box<dyn Backend> = Box::new(gpu);
+    gpu.run(&mut results[1], &passes)?;
+    let [ours, theirs] = &results;
+    let (count_of_numbers, apart) = (differing(ours, theirs), largest_difference(ours, theirs));
+    let mib = (count * size_of::<BodyRow>()) >> 20;
+    if if run.is_exact() { count_of_numbers > 0 } else { apart > PLAIN_PASS } {
+        return failed!("{count} bodies in {mib} MiB: {count_of_numbers} numbers differ, by {apart:.1e}");
+    }
+    Ok(format!("{count} bodies in {mib} MiB, apart by {apart:.1e}"))
+}
+
+/// A step that the device of these options refuses in one line, and that the processor does instead.
+fn refused(run: &mut Run, options: GpuOptions) -> Outcome {
+    let mut warm = pile()?;
+    let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options)?));
+    let line = match theirs.step() {
+        Err(Error::TooLarge(line)) => line,
+        Err(error) => return failed!("{error}"),
+        Ok(_) => return failed!("it was not refused"),
+    };
+    theirs.simulation.set_backend(Box::new(Cpu::new()));
+    ours.step()?;
+    theirs.step()?;
+    same_worlds(&ours, &theirs)?;
+    // The device has room for the same step without these limits.
+    let mut again = warm.fork(open(run.gpu_options())?);
+    again.step()?;
+    near(run, &ours, &again)?;
+    Ok(line)
+}
+
+pub(super) fn check_long_plans(run: &mut Run) {
+    run.check(Group::LongDispatch, "a plan in several submissions", |run| {
+        let mut warm = pile()?;
+        let options = GpuOptions { submission: Duration::from_micros(50), ..run.gpu_options() };
+        let [mut ours, mut whole, mut cut] =
+            [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, open(run.gpu_options())?, open(options)?]
+                .map(|backend| warm.fork(backend));
+        let mut submissions = 0;
+        for _ in 0..4 {
+            [&mut ours, &mut whole, &mut cut].into_iter().try_for_each(|warm| warm.step().map(drop))?;
+            submissions = submissions.max(cut.simulation.backend().traffic().submissions);
+            same_worlds(&whole, &cut)?;
+        }
+        if run.is_exact() {
+            same_worlds(&ours, &cut)?;
+        } else {
+            near(run, &ours, &cut)?;
+        }
+        if submissions > 1 {
+            Ok(format!("{submissions} submissions, the bits of one"))
+        } else {
+            failed!("it was not cut")
+        }
+    });
+    run.check(Group::LongDispatch, "no submission takes half a second", |run| {
+        let mut warm = Warm::of("pile", &["n=125"], LANDED)?;
+        let mut config = warm.simulation.config().clone();
+        (config.substeps, config.fuse_colors_below) = (if run.options.short { 60 } else { 400 }, 0);
+        warm.simulation.set_config(config)?;
+        let (mut ours, mut theirs) = (warm.fork(Box::new(Cpu::new())), warm.fork(open(run.gpu_options())?));
+        ours.step()?;
+        theirs.step()?;
+        if run.is_exact() {
+            same_worlds(&ours, &theirs)?;
+        }
+        let traffic = theirs.simulation.backend().traffic();
+        let (submissions, longest, dispatches) = (traffic.submissions, traffic.longest_submission, traffic.dispatches);
+        let figure = format!("{dispatches} dispatches in {submissions} submissions, the longest {longest:.1?}");
+        if longest < LONGEST { Ok(figure) } else { failed!("{figure}") }
+    });
+}
+
+pub(super) fn check_losses(run: &mut Run) {
+    let cases: [(&str, &[(u32, bool)], &str); 3] = [
+        ("a device lost between two steps", &[(1, false)], "gpu"),
+        ("a device lost during a step", &[(2, true)], "gpu"),
+        ("the processor goes on after three devices", &[(1, true), (1, false), (1, true)], "cpu"),
+    ];
+    for (name, losses, goes_on) in cases {
+        run.check(Group::DeviceLost, name, |run| {
+            let mut options = run.gpu_options();
+            options.faults.losses = losses.iter().map(|&(submission, during)| Loss { submission, during }).collect();
+            let mut warm = pile()?;
+            let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options)?));
+            let mut lines = Vec::new();
+            for _ in 0..4 {
+                ours.step()?;
+                lines.extend(theirs.step()?);
+                if run.is_exact() {
+                    same_worlds(&ours, &theirs)?;
+                } else {
+                    near(run, &ours, &theirs)?;
+                }
+            }
+            match (lines.first(), theirs.simulation.backend().name()) {
+                (None, _) => failed!("the loss was not noticed"),
+                (Some(_), name) if name != goes_on => {
+                    failed!("{name} goes on, and not {goes_on}: {}", lines.join("; "))
+                }
+                (Some(line), _) => Ok(line.clone()),
+            }
+        });
+    }
+}
+
+/// Fails unless two runs have the same bits.
+fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Ended> {
+    BodyDifference::first(&a.simulation.world, &b.simulation.world).map_or(Ok(()), |first| failed!("{first}"))
+}
+
+/// Fails unless a run is as near to the reference as few steps of plain WGSL are; the same bits in exact mode.
+fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Ended> {
+    if run.is_exact() {
+        return same_worlds(ours, theirs);
+    }
+    let apart = Difference::between(&ours.simulation.world, &theirs.simulation.world);
+    let apart = apart.velocity.max(apart.angular_velocity);
+    if apart <= 10.0 * PLAIN_STEP { Ok(()) } else { failed!("velocities are {apart:.1e} m/s apart") }
+}

@@ -1,0 +1,85 @@
+//! Every kernel on random problems, against its double in Rust.
+
+use super::difference::{differing, largest};
+use super::passes::{every_kernel, has_patches, ways_to_run};
+use super::{Group, Outcome, PLAIN_PASS, Run, failed, random};
+use crate::backend::Backend;
+use crate::backend::cpu::Reference;
+use crate::plan::{Kernel, Pass};
+use crate::problem::StepProblem;
+
+/// Variants of a kernel in a short run.
+const FEW: usize = 3;
+
+/// Scales of problems whose numbers, or their squares, are subnormal.
+const TINY: [f32; 3] = [1e-20, 1e-22, 1e-40];
+
+pub(super) fn check(run: &mut Run) {
+    let all = every_kernel();
+    let mut names: Vec<&str> = Vec::new();
+    for kernel in &all {
+        if !names.contains(&kernel.name()) {
+            names.push(kernel.name());
+        }
+    }
+    let seeds = if run.options.short { 0..1 } else { 0..2 };
+    let problems: Vec<_> = seeds.flat_map(|seed| [random::problem(seed, false), random::problem(seed, true)]).collect();
+    for name in names {
+        let own: Vec<_> = all.iter().filter(|kernel| kernel.name() == name).copied().collect();
+        run.check(Group::Kernels, name, |run| of_kernel(run, &some(run, own), &problems));
+    }
+    if run.is_exact() {
+        let tiny: Vec<_> = [false, true]
+            .into_iter()
+            .flat_map(|patches| TINY.map(|scale| random::scaled(random::problem(0, patches), scale)))
+            .collect();
+        // Variants differ in what they do, and hardly in the numbers.
+        let few = |name: &&str| all.iter().find(|kernel| kernel.name() == *name).copied();
+        let few: Vec<_> = ["solve_contacts", "solve_joints", "integrate_positions"].iter().filter_map(few).collect();
+        run.check(Group::Kernels, "subnormal numbers", |run| of_kernel(run, &few, &tiny));
+    }
+}
+
+/// All variants, or some that lie evenly among them.
+fn some(run: &Run, all: Vec<Kernel>) -> Vec<Kernel> {
+    let step = if run.options.short { all.len().div_ceil(FEW).max(1) } else { 1 };
+    all.into_iter().step_by(step).collect()
+}
+
+/// Runs variants of a kernel on the device and on the reference, on those of the problems that have what each needs.
+fn of_kernel(run: &mut Run, kernels: &[Kernel], problems: &[StepProblem]) -> Outcome {
+    let mut gpu = run.take_gpu()?;
+    let (mut worst, mut count) = (0.0_f64, 0);
+    for &kernel in kernels {
+        for problem in problems.iter().filter(|problem| problem.has_patches() == has_patches(kernel)) {
+            for passes in ways_to_run(kernel, problem) {
+                let [ours, theirs] =
+                    [after(&mut Reference::<f32>::new(), problem, &passes), after(&mut *gpu, problem, &passes)];
+                let (ours, theirs) = (ours?, theirs?);
+                let (count_of_numbers, apart) = (differing(&ours, &theirs), largest(&ours, &theirs));
+                worst = worst.max(apart);
+                count += 1;
+                let is_wrong = if run.is_exact() { count_of_numbers > 0 } else { apart > PLAIN_PASS };
+                if is_wrong {
+                    run.give_back(gpu);
+                    return failed!(
+                        "{kernel} in {} passes: {count_of_numbers} numbers differ, by {apart:.1e} of 1 plus their size",
+                        passes.len()
+                    );
+                }
+            }
+        }
+    }
+    run.give_back(gpu);
+    Ok(if run.is_exact() {
+        format!("{count} runs, the same bits")
+    } else {
+        format!("{count} runs, apart by {worst:.1e} of {PLAIN_PASS:.0e}")
+    })
+}
+
+fn after(backend: &mut dyn Backend, problem: &StepProblem, passes: &[Pass]) -> crate::error::Result<StepProblem> {
+    let mut result = problem.clone();
+    backend.run(&mut result, passes)?;
+    Ok(result)
+}

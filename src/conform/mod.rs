@@ -1,0 +1,241 @@
+//! Whether an adapter and its driver are fit: kernels on random problems, scenes, limits, long plans, lost devices.
+//!
+//! ```no_run
+//! use drystone::conform::{ConformOptions, Verdict, conform};
+//!
+//! let found = conform(&ConformOptions::default(), &mut |check| println!("{} {}", check.verdict, check.name))?;
+//! assert_eq!(found.count(Verdict::Failed), 0, "{} is not fit", found.adapter);
+//! # Ok::<(), drystone::Error>(())
+//! ```
+
+mod device;
+pub mod difference;
+mod kernels;
+pub mod passes;
+pub mod random;
+mod scenes;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use crate::backend::Backend;
+use crate::backend::gpu::{AdapterSummary, Gpu, GpuOptions};
+use crate::error::{Error, Result};
+use crate::names::named;
+
+/// Largest difference of a number after one kernel of plain WGSL, relative to 1 plus its size ([`difference::largest`]). Measured over
+/// 24 seeds on software Vulkan: 3.9e-6, a sweep of joints; five times that. An impulse of 0.1 that is one percent off: 9e-4.
+pub const PLAIN_PASS: f64 = 2e-5;
+
+/// One step of plain WGSL, in the middle one of some moments: largest difference of a velocity (m/s) or angular velocity (rad/s).
+/// Measured on software Vulkan during the fall of a pile: up to 1.3e-6; eight times that. A step that lacks one sweep of one color:
+/// 2.4e-2.
+pub const PLAIN_STEP: f64 = 1e-5;
+
+/// What a check is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
+pub enum Group {
+    /// Every kernel on random problems, against its double in Rust.
+    Kernels,
+    /// Every scene of the catalogue, small and short, against the reference.
+    Scenes,
+    /// Large buffers, and problems beyond the limits of buffers and memory.
+    Limits,
+    /// Plans that would hold the device for long.
+    LongDispatch,
+    /// Devices that are lost between and during steps.
+    DeviceLost,
+}
+
+named!(Group {
+    Kernels = "kernels",
+    Scenes = "scenes",
+    Limits = "limits",
+    LongDispatch = "long-dispatch",
+    DeviceLost = "device-lost",
+});
+
+/// How shaders reach the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+pub enum Mode {
+    /// SPIR-V whose arithmetic no driver may change: results are the reference's to the last bit.
+    Exact,
+    /// Plain WGSL: results are near those of the reference.
+    Plain,
+}
+
+named!(Mode { Exact = "exact", Plain = "plain", });
+
+/// What became of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+pub enum Verdict {
+    /// The adapter does what it should.
+    Passed,
+    /// It does not.
+    Failed,
+    /// The adapter or its driver does not offer what the check needs.
+    Skipped,
+}
+
+named!(Verdict { Passed = "passed", Failed = "failed", Skipped = "skipped", });
+
+/// A check and its verdict.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Check {
+    /// What it is about.
+    pub group: Group,
+    /// How shaders reached the driver.
+    pub mode: Mode,
+    /// Kernel, scene, or what is asked of the device.
+    pub name: String,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// What was measured, or why it failed or was skipped: one line.
+    pub figure: String,
+    /// How long it took (s).
+    pub seconds: f64,
+}
+
+/// What to check.
+#[derive(Clone, Debug)]
+pub struct ConformOptions {
+    /// The adapter, and faults on purpose. Each check sets `exact` and what it needs itself.
+    pub gpu: GpuOptions,
+    /// How shaders reach the driver.
+    pub modes: Vec<Mode>,
+    /// What the checks are about.
+    pub groups: Vec<Group>,
+    /// Fewer variants of kernels, fewer steps of scenes, smaller buffers.
+    pub short: bool,
+}
+
+impl Default for ConformOptions {
+    fn default() -> Self {
+        let (modes, groups) = (Mode::ALL.to_vec(), Group::ALL.to_vec());
+        Self { gpu: GpuOptions::default(), modes, groups, short: false }
+    }
+}
+
+/// All checks of an adapter.
+#[derive(Clone, Debug)]
+pub struct Conformance {
+    /// The adapter.
+    pub adapter: AdapterSummary,
+    /// The checks, in the order in which they ran.
+    pub checks: Vec<Check>,
+}
+
+impl Conformance {
+    /// How many checks have this verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.checks.iter().filter(|check| check.verdict == verdict).count()
+    }
+}
+
+/// Runs the checks that `options` name, and calls `each` after each.
+///
+/// # Errors
+/// There is no such adapter, or it cannot be opened; or exact mode alone is asked of an adapter without it.
+pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
+    let only_exact = options.modes == [Mode::Exact];
+    let opened = Gpu::open(GpuOptions { exact: only_exact, ..options.gpu.clone() })?;
+    let adapter = opened.summary().clone();
+    drop(opened);
+    let mut run = Run { options, mode: Mode::Plain, gpu: None, checks: Vec::new(), each };
+    for &mode in &options.modes {
+        run.mode = mode;
+        run.gpu = None;
+        for &group in &options.groups {
+            if mode == Mode::Exact && !adapter.exact {
+                run.check(group, "exact mode", |_| Err(Ended::Skipped("the adapter takes no SPIR-V".into())));
+                continue;
+            }
+            match group {
+                Group::Kernels => kernels::check(&mut run),
+                Group::Scenes => scenes::check(&mut run),
+                Group::Limits => device::check_limits(&mut run),
+                Group::LongDispatch => device::check_long_plans(&mut run),
+                Group::DeviceLost => device::check_losses(&mut run),
+            }
+        }
+    }
+    Ok(Conformance { adapter, checks: run.checks })
+}
+
+/// Why a check ended without passing.
+enum Ended {
+    Failed(String),
+    Skipped(String),
+}
+
+impl From<Error> for Ended {
+    fn from(error: Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// What a check measured, in words.
+type Outcome = std::result::Result<String, Ended>;
+
+/// An [`Ended::Failed`] with a text as of `format!`.
+macro_rules! failed {
+    ($($text:tt)*) => { Err($crate::conform::Ended::Failed(format!($($text)*))) };
+}
+use failed;
+
+/// The checks that ran so far, and the device of the present mode.
+struct Run<'a> {
+    options: &'a ConformOptions,
+    mode: Mode,
+    /// A device that compiled some kernels already; none before the first check and after one that failed.
+    gpu: Option<Box<dyn Backend>>,
+    checks: Vec<Check>,
+    each: &'a mut dyn FnMut(&Check),
+}
+
+impl Run<'_> {
+    fn is_exact(&self) -> bool {
+        self.mode == Mode::Exact
+    }
+
+    /// The options of a device of the present mode.
+    fn gpu_options(&self) -> GpuOptions {
+        GpuOptions { exact: self.is_exact(), ..self.options.gpu.clone() }
+    }
+
+    /// The device of the present mode. A check gives it back by [`Run::give_back`].
+    fn take_gpu(&mut self) -> Result<Box<dyn Backend>> {
+        match self.gpu.take() {
+            Some(gpu) => Ok(gpu),
+            None => Ok(Box::new(Gpu::open(self.gpu_options())?)),
+        }
+    }
+
+    fn give_back(&mut self, gpu: Box<dyn Backend>) {
+        self.gpu = Some(gpu);
+    }
+
+    /// Runs a check and notes its verdict. A panic of a driver's layer is a check that failed.
+    fn check(&mut self, group: Group, name: &str, body: impl FnOnce(&mut Self) -> Outcome) {
+        let start = Instant::now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| body(self)));
+        let (verdict, figure) = match outcome {
+            Ok(Ok(figure)) => (Verdict::Passed, figure),
+            Ok(Err(Ended::Failed(why))) => (Verdict::Failed, why),
+            Ok(Err(Ended::Skipped(why))) => (Verdict::Skipped, why),
+            Err(panic) => {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+                (Verdict::Failed, format!("a panic: {}", text.unwrap_or("without a message")))
+            }
+        };
+        let figure = figure.split_whitespace().collect::<Vec<_>>().join(" ");
+        let seconds = start.elapsed().as_secs_f64();
+        self.checks.push(Check { group, mode: self.mode, name: name.into(), verdict, figure, seconds });
+        (self.each)(&self.checks[self.checks.len() - 1]);
+    }
+}

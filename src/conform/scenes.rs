@@ -1,0 +1,122 @@
+//! Every scene of the catalogue, small and short, against the reference.
+
+use super::difference::of_velocities;
+use super::{Group, Outcome, PLAIN_STEP, Run, failed};
+use crate::backend::Backend;
+use crate::backend::cpu::{Cpu, Reference};
+use crate::compare::BodyDifference;
+use crate::config::SolverConfig;
+use crate::error::Result;
+use crate::scenes::{CATALOGUE, Scene, Spawners};
+use crate::simulation::Simulation;
+use crate::stats::{largest, median};
+
+/// Parameters of scenes that are large without them.
+const SMALL: [(&str, &[&str]); 14] = [
+    ("pile", &["n=64"]),
+    ("pile-mixed", &["n=64"]),
+    ("pyramid", &["base=6"]),
+    ("many-pyramids", &["n=4", "base=4"]),
+    ("wall", &["rows=6", "columns=5"]),
+    ("coins", &["n=10"]),
+    ("tallest", &["n=8"]),
+    ("joint-grid", &["n=6"]),
+    ("aqueduct", &["arches=1"]),
+    ("kapla", &["storeys=2"]),
+    ("dominoes", &["n=10"]),
+    ("pyramid-heavy", &["base=5"]),
+    ("drum", &["n=40"]),
+    ("card-house", &["storeys=2"]),
+];
+
+/// A scene that ran on the processor for a while, so that bodies touch.
+pub(super) struct Warm {
+    pub simulation: Simulation,
+    spawners: Spawners,
+    dt: f32,
+}
+
+impl Warm {
+    /// Runs a scene for so many steps.
+    pub fn of(name: &str, parameters: &[&str], steps: u32) -> Result<Self> {
+        let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
+        let scene = Scene::find(name, &parameters)?;
+        let config = SolverConfig::default().without_sleep();
+        let spawners = Spawners::new(&scene);
+        let mut warm =
+            Self { dt: scene.dt, simulation: Simulation::new(scene.world, config, Box::new(Cpu::new()))?, spawners };
+        (0..steps).try_for_each(|_| warm.step().map(drop))?;
+        Ok(warm)
+    }
+
+    /// The same from here on another backend.
+    pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
+        Self { simulation: self.simulation.fork(backend), spawners: self.spawners.clone(), dt: self.dt }
+    }
+
+    /// One step; returns the line of a device that was lost.
+    pub fn step(&mut self) -> Result<Option<String>> {
+        self.spawners.before_step(&mut self.simulation.world, self.dt);
+        Ok(self.simulation.step(self.dt)?.fault)
+    }
+
+    /// Takes the backend back.
+    fn into_backend(mut self) -> Box<dyn Backend> {
+        self.simulation.set_backend(Box::new(Cpu::new()))
+    }
+}
+
+pub(super) fn check(run: &mut Run) {
+    for entry in CATALOGUE {
+        let parameters = SMALL.iter().find(|(name, _)| *name == entry.name).map_or(&[][..], |(_, own)| own);
+        run.check(Group::Scenes, entry.name, |run| {
+            let steps = if run.options.short { 45 } else { 60 };
+            let warm = Warm::of(entry.name, parameters, steps)?;
+            if run.is_exact() { of_steps(run, warm) } else { of_single_steps(run, warm) }
+        });
+    }
+}
+
+/// Steps one after another, which have the bits of the reference.
+fn of_steps(run: &mut Run, mut warm: Warm) -> Outcome {
+    let steps = if run.options.short { 8 } else { 40 };
+    let (mut ours, gpu) = (warm.fork(Box::new(Reference::<f32>::new())), run.take_gpu()?);
+    let mut theirs = warm.fork(gpu);
+    for step in 1..=steps {
+        ours.step()?;
+        if let Some(fault) = theirs.step()? {
+            return failed!("step {step}: {fault}");
+        }
+        if let Some(first) = BodyDifference::first(&ours.simulation.world, &theirs.simulation.world) {
+            run.give_back(theirs.into_backend());
+            return failed!("step {step}, {first}");
+        }
+    }
+    let bodies = theirs.simulation.world.dynamic_count();
+    run.give_back(theirs.into_backend());
+    Ok(format!("{bodies} bodies, {steps} steps, the same bits"))
+}
+
+/// Single steps, each from the state of the reference, because trajectories part.
+fn of_single_steps(run: &mut Run, mut ours: Warm) -> Outcome {
+    let moments = if run.options.short { 3 } else { 9 };
+    let mut gpu = run.take_gpu()?;
+    let (mut apart, mut speed) = (Vec::new(), 1.0);
+    for _ in 0..moments {
+        let (problem, plan) = ours.simulation.next_problem(ours.dt)?;
+        let mut results = [problem.clone(), problem];
+        Reference::<f32>::new().run(&mut results[0], &plan.passes)?;
+        gpu.run(&mut results[1], &plan.passes)?;
+        let [a, b] = &results;
+        apart.push(of_velocities(a, b));
+        speed = largest(
+            speed,
+            a.bodies.iter().flat_map(|body| body.v.into_iter().chain(body.w)).map(|x| f64::from(x.abs())),
+        );
+        (0..3).try_for_each(|_| ours.step().map(drop))?;
+    }
+    run.give_back(gpu);
+    let (middle, most) = (median(&apart) / speed, PLAIN_STEP);
+    let figure = format!("apart by {middle:.1e} of the largest speed in the middle step, of {most:.0e}");
+    if middle <= most { Ok(figure) } else { failed!("{figure}") }
+}
