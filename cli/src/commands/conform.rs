@@ -10,8 +10,8 @@ use super::words;
 use crate::files;
 use crate::report::junit;
 use drystone::Result;
-use drystone::backend::gpu::GpuOptions;
-use drystone::conform::{Check, ConformOptions, Conformance, Group, Mode, Verdict, conform};
+use drystone::backend::gpu::{Faults, GpuOptions};
+use drystone::conform::{Check, ConformOptions, Conformance, Group, Mode, Verdict, conform, one_percent_off};
 use serde_json::{Value, json};
 
 /// Check an adapter and its driver.
@@ -32,6 +32,12 @@ pub struct ConformArgs {
     /// Check these groups only.
     #[arg(long, value_name = "GROUP", value_parser = words::of::<Group>(), value_delimiter = ',', num_args = 1..)]
     group: Vec<Group>,
+    /// Make checks whose name contains one of these only.
+    #[arg(long, value_name = "TEXT", value_delimiter = ',', num_args = 1..)]
+    name: Vec<String>,
+    /// Put arithmetic of kernels one percent off, to see that the checks find it.
+    #[arg(long)]
+    perturb: bool,
     /// Check fewer variants of kernels and fewer steps of scenes.
     #[arg(long)]
     short: bool,
@@ -47,14 +53,17 @@ impl ConformArgs {
     /// Whether no check failed.
     pub fn run(&self) -> Result<bool> {
         let all = ConformOptions::default();
+        let shader = self.perturb.then_some(one_percent_off as fn(&str, String) -> String);
+        let faults = Faults { shader, ..Faults::default() };
         let options = ConformOptions {
-            gpu: GpuOptions { name: self.adapter.clone(), ..GpuOptions::default() },
+            gpu: GpuOptions { name: self.adapter.clone(), faults, ..GpuOptions::default() },
             modes: match (self.exact, self.plain) {
                 (true, _) => vec![Mode::Exact],
                 (_, true) => vec![Mode::Plain],
                 _ => all.modes,
             },
             groups: if self.group.is_empty() { all.groups } else { self.group.clone() },
+            names: self.name.clone(),
             short: self.short,
         };
         let mut printed = Ok(());
