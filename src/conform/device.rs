@@ -152,8 +152,12 @@ pub(super) fn check_long_plans(run: &mut Run) {
     });
 }
 
+/// Submissions, and whether the device is lost during each or after it.
+type Losses = &'static [(u32, bool)];
+
 pub(super) fn check_losses(run: &mut Run) {
-    let cases: [(&str, &[(u32, bool)], &str); 3] = [
+    // The name of the check, the submission and the moment of each loss, and the backend that goes on.
+    let cases: [(&str, Losses, &str); 3] = [
         ("a device lost between two steps", &[(1, false)], "gpu"),
         ("a device lost during a step", &[(2, true)], "gpu"),
         ("the processor goes on after three devices", &[(1, true), (1, false), (1, true)], "cpu"),

@@ -1,7 +1,7 @@
 //! Every scene of the catalogue, small and short, against the reference.
 
 use super::difference::of_velocities;
-use super::{Group, Outcome, PLAIN_STEP, Run, failed};
+use super::{Group, Outcome, Run, failed};
 use crate::backend::Backend;
 use crate::backend::cpu::{Cpu, Reference};
 use crate::compare::BodyDifference;
@@ -28,6 +28,11 @@ const SMALL: [(&str, &[&str]); 14] = [
     ("drum", &["n=40"]),
     ("card-house", &["storeys=2"]),
 ];
+
+/// Largest difference of a velocity of single steps of plain WGSL, relative to the largest speed, in the middle one of some steps. Measured on
+/// software Vulkan over the catalogue: up to 7.4e-6, of boxes that tumble in a drum; seven times that. Contacts whose impulses are one percent off:
+/// 2.5e-4 for a chain, 8e-4 and more for piles.
+const PLAIN_SCENE: f64 = 5e-5;
 
 /// A scene that ran on the processor for a while, so that bodies touch.
 pub(super) struct Warm {
@@ -116,7 +121,7 @@ fn of_single_steps(run: &mut Run, mut ours: Warm) -> Outcome {
         (0..3).try_for_each(|_| ours.step().map(drop))?;
     }
     run.give_back(gpu);
-    let (middle, most) = (median(&apart) / speed, PLAIN_STEP);
+    let (middle, most) = (median(&apart) / speed, PLAIN_SCENE);
     let figure = format!("apart by {middle:.1e} of the largest speed in the middle step, of {most:.0e}");
     if middle <= most { Ok(figure) } else { failed!("{figure}") }
 }
