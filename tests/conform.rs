@@ -83,7 +83,8 @@ fn arithmetic_in_another_order_fails_in_exact_mode_and_passes_as_plain_wgsl() {
 }
 
 fn a_driver_that_panics_or_refuses_a_shader_fails_in_one_line() {
-    let faults: [(fn(&str, String) -> String, &str); 2] = [
+    type Mistake = fn(&str, String) -> String;
+    let faults: [(Mistake, &str); 2] = [
         (|_, _| std::panic::resume_unwind(Box::new("a defect of the driver")), "a defect of the driver"),
         (|_, _| "fn main( {".into(), "shader"),
     ];

@@ -196,7 +196,8 @@ fn memory_that_is_not_there_is_refused_in_one_line() {
 
 fn a_mistake_in_a_shader_is_one_line() {
     let scene = pile(27);
-    let mistakes: [(fn(&str, String) -> String, &str); 2] = [
+    type Mistake = fn(&str, String) -> String;
+    let mistakes: [(Mistake, &str); 2] = [
         // More threads than any device promises: wgpu refuses the pipeline.
         (|_, source| source.replace("@workgroup_size(WORKGROUP)", "@workgroup_size(4096)"), "workgroup"),
         (|_, source| source.replace("fn main(", "fn other("), "main"),

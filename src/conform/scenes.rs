@@ -30,7 +30,7 @@ const SMALL: [(&str, &[&str]); 14] = [
 ];
 
 /// Largest difference of a velocity of single steps of plain WGSL, relative to the largest speed, in the middle one of some steps. Measured on
-/// software Vulkan over the catalogue: up to 7.4e-6, of boxes that tumble in a drum; seven times that. Contacts whose impulses are one percent off:
+/// software Vulkan over the catalogue: up to 6.8e-6, of boxes that tumble in a drum; seven times that. Contacts whose impulses are one percent off:
 /// 2.5e-4 for a chain, 8e-4 and more for piles.
 const PLAIN_SCENE: f64 = 5e-5;
 
