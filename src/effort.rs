@@ -117,15 +117,13 @@ impl Saved for Effort {
             heaps.resize(bodies, false);
             heaps_before.resize(bodies, false);
         }
-        for i in 0..bodies {
-            archive.repeated(|archive| {
-                classes[i].walk(archive)?;
-                calm_for[i].walk(archive)?;
-                heaps[i].walk(archive)?;
-                heaps_before[i].walk(archive)
-            })?;
-            ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))?;
-        }
+        archive.runs(bodies, |i, archive| {
+            classes[i].walk(archive)?;
+            calm_for[i].walk(archive)?;
+            heaps[i].walk(archive)?;
+            heaps_before[i].walk(archive)?;
+            ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))
+        })?;
         restless.walk(archive)?;
         restless_need.walk(archive)?;
         heaps_change.walk(archive)?;

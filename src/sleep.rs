@@ -118,27 +118,37 @@ impl Sleep {
             left.resize(bodies, Snapshot::default());
             next.resize(bodies, 0);
         }
-        for i in 0..bodies {
-            let now = world.bodies.get(i).map(|_| Snapshot::of(world, i)).unwrap_or_default();
-            let mut is_left = match left[i].bits() == now.bits() {
-                _ if kinds[i] == BodyKind::Dynamic && !asleep[i] => Left::Unused,
-                true => Left::AsTheBody,
-                false => Left::Other,
-            };
-            archive.repeated(|archive| {
-                asleep[i].walk(archive)?;
-                activity[i].walk(archive)?;
-                slow_for[i].walk(archive)?;
-                reach[i].walk(archive)?;
-                is_left.walk(archive)
-            })?;
+        let now = |i: usize| world.bodies.get(i).map(|_| Snapshot::of(world, i)).unwrap_or_default();
+        let mut are_left = vec![Left::Unused; bodies];
+        archive.runs(bodies, |i, archive| {
+            if !A::READS && (kinds[i] != BodyKind::Dynamic || asleep[i]) {
+                are_left[i] = if left[i].bits() == now(i).bits() { Left::AsTheBody } else { Left::Other };
+            }
+            asleep[i].walk(archive)?;
+            activity[i].walk(archive)?;
+            slow_for[i].walk(archive)?;
+            reach[i].walk(archive)?;
+            are_left[i].walk(archive)
+        })?;
+        for ((i, left), is_left) in left.iter_mut().enumerate().zip(are_left) {
             match is_left {
-                Left::Other => left[i].walk(archive)?,
-                _ if A::READS => left[i] = now,
+                Left::Other => left.walk(archive)?,
+                _ if A::READS => *left = now(i),
                 _ => {}
             }
-            archive.index(&mut next[i], i as u32)?;
-            ensure((next[i] as usize) < bodies, || format!("body {} of {bodies} sleeps", next[i]))?;
+        }
+        let rings = archive.chunks(bodies, 1, |range, columns| {
+            let walk = |i: usize| {
+                let mut own = next[i];
+                columns.index(0, &mut own, i as u32)?;
+                ensure((own as usize) < bodies, || format!("body {own} of {bodies} sleeps"))?;
+                Ok(own)
+            };
+            range.map(walk).collect::<Result<Vec<_>>>()
+        })?;
+        if A::READS {
+            next.clear();
+            next.extend(rings.into_iter().flatten());
         }
         *count = asleep.iter().filter(|asleep| **asleep).count();
         Ok(())

@@ -66,30 +66,38 @@ impl Detector {
             self.groups.resize(bodies, Groups::ALL);
             self.left.resize(bodies, Left::default());
         }
-        // Whether the colliders of a body are still those of the world.
-        let mut are_current = vec![false; bodies];
-        let mut next = KnownBody::default();
-        for (i, current) in are_current.iter_mut().enumerate() {
+        // Whether the colliders of a body are still those of the world, and whether the body is where it was left.
+        let (mut are_current, mut are_left) = (vec![false; bodies], vec![false; bodies]);
+        let mut end = 0;
+        archive.runs(bodies, |i, archive| {
             let mut known = self.known[i];
-            let body = world.bodies.get(i);
-            let mut is_left = !A::READS && body.is_some_and(|body| self.left[i].is_of(body));
-            let mut is_current = !A::READS && body.is_some_and(|body| self.has_shapes_of(i, known, body));
-            archive.repeated(|archive| {
-                known.generation.walk(archive)?;
-                known.world.walk(archive)?;
-                archive.index(&mut known.colliders.first, next.colliders.first)?;
-                known.colliders.count.walk(archive)?;
-                self.kinds[i].walk(archive)?;
-                self.groups[i].walk(archive)?;
-                is_left.walk(archive)?;
-                is_current.walk(archive)
-            })?;
-            match body.filter(|_| is_left) {
-                Some(body) => self.left[i] = Left::of(body),
-                None => self.left[i].walk(archive)?,
+            if let Some(body) = world.bodies.get(i).filter(|_| !A::READS) {
+                (are_current[i], are_left[i]) = (self.has_shapes_of(i, known, body), self.left[i].is_of(body));
             }
-            next.colliders.first = known.colliders.first.wrapping_add(known.colliders.count);
-            (self.known[i], *current) = (known, is_current);
+            known.generation.walk(archive)?;
+            known.world.walk(archive)?;
+            known.colliders.count.walk(archive)?;
+            // Most bodies have their colliders behind those of the body before.
+            let mut is_behind = known.colliders.first == end;
+            is_behind.walk(archive)?;
+            if !is_behind {
+                known.colliders.first.walk(archive)?;
+            } else {
+                known.colliders.first = end;
+            }
+            self.kinds[i].walk(archive)?;
+            self.groups[i].walk(archive)?;
+            are_left[i].walk(archive)?;
+            are_current[i].walk(archive)?;
+            end = known.colliders.first.wrapping_add(known.colliders.count);
+            self.known[i] = known;
+            Ok(())
+        })?;
+        for (i, left) in self.left.iter_mut().enumerate() {
+            match world.bodies.get(i).filter(|_| are_left[i]) {
+                Some(body) => *left = Left::of(body),
+                None => left.walk(archive)?,
+            }
         }
         self.jointed.walk(archive)?;
         let parts = archive.count(self.worlds.len())?;

@@ -100,15 +100,29 @@ impl Pairs {
         self.tracks.par_extend(new.map(|pair| Track::of(pair, colliders)));
     }
 
+    /// Pairs, and what the tests of them read.
+    pub fn of((all, tracks): (Vec<Pair>, Vec<Track>)) -> Self {
+        Self { all, tracks }
+    }
+
     /// A pair and what the test of it reads.
     pub fn with_track(&self, place: usize) -> (&Pair, &Track) {
         (&self.all[place], &self.tracks[place])
     }
 
-    /// Adds one.
-    pub fn push(&mut self, pair: Pair, track: Track) {
-        self.all.push(pair);
-        self.tracks.push(track);
+    /// The same, to change both.
+    pub fn with_track_mut(&mut self, place: usize) -> (&mut Pair, &mut Track) {
+        (&mut self.all[place], &mut self.tracks[place])
+    }
+
+    /// What the tests of all read.
+    pub fn tracks(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// The same, to change it.
+    pub fn tracks_mut(&mut self) -> &mut [Track] {
+        &mut self.tracks
     }
 
     /// Ends a pair; the last takes its place.

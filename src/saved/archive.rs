@@ -2,9 +2,11 @@
 
 use std::any::Any;
 use std::collections::HashMap;
+use std::ops::Range;
 
-use glam::Vec3;
+use rayon::prelude::*;
 
+use super::columns::Columns;
 use crate::error::{Result, ensure, input};
 
 /// Bytes that a walk writes, or reads back.
@@ -21,7 +23,7 @@ pub(crate) trait Archive: Sized {
     /// Writes a number in groups of seven bits, or reads one.
     fn number(&mut self, number: &mut u64) -> Result<()>;
 
-    /// Writes the number of things that take a byte or more each, or reads it: no more than bytes are left.
+    /// Writes the number of things that take a bit or more each, or reads it: no more than there are bits in all.
     fn count(&mut self, count: usize) -> Result<usize>;
 
     /// Writes a value by `walk`, or reads it: values of the same address are written once, and read they share one address again.
@@ -35,28 +37,24 @@ pub(crate) trait Archive: Sized {
     /// Writes or reads what `walk` does. What has the same bytes as before takes a byte or two.
     fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
 
-    /// Writes a number that is near a guess, or reads it: the nearer, the fewer bytes.
-    fn index(&mut self, value: &mut u32, guess: u32) -> Result<()> {
-        let apart = value.wrapping_sub(guess) as i32;
-        let mut folded = u64::from((apart << 1 ^ apart >> 31) as u32);
-        self.number(&mut folded)?;
-        let folded = u32::try_from(folded).map_err(|_| input!("the number {folded} is too large"))?;
-        *value = guess.wrapping_add((folded >> 1) ^ 0_u32.wrapping_sub(folded & 1));
-        Ok(())
-    }
+    /// Does what `walk` does for each of so many things. What follows on the same bytes, and has them too, takes none.
+    fn runs(&mut self, count: usize, walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()>;
 
-    /// The same by the bits.
-    fn near(&mut self, value: &mut f32, guess: f32) -> Result<()> {
-        let mut bits = value.to_bits();
-        self.index(&mut bits, guess.to_bits())?;
-        *value = f32::from_bits(bits);
-        Ok(())
-    }
+    /// Writes so many things in columns, or reads them: [`CHUNK`] neighbors at a time, on all threads. Returns what `walk` makes of each chunk.
+    fn chunks<T: Send>(
+        &mut self,
+        count: usize,
+        columns: usize,
+        walk: impl Fn(Range<usize>, &mut Columns) -> Result<T> + Sync,
+    ) -> Result<Vec<T>>;
+}
 
-    /// The same of all components.
-    fn near_vector(&mut self, value: &mut Vec3, guess: Vec3) -> Result<()> {
-        (0..3).try_for_each(|k| self.near(&mut value[k], guess[k]))
-    }
+/// Things in columns that one task goes over. The bytes are the same for any number of threads.
+const CHUNK: usize = 2048;
+
+/// The chunks of so many things.
+fn chunks_of(count: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
+    (0..count.div_ceil(CHUNK)).into_par_iter().map(move |chunk| chunk * CHUNK..((chunk + 1) * CHUNK).min(count))
 }
 
 /// Writes.
@@ -134,6 +132,48 @@ impl Archive for Writer {
         }
         Ok(())
     }
+
+    /// Each run is its length, and then its bytes as [`Self::repeated`] writes them.
+    fn runs(&mut self, count: usize, mut walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()> {
+        let (mut run, mut own, mut next) = (0_u64, Vec::new(), Vec::new());
+        for i in 0..=count {
+            next.clear();
+            if i < count {
+                std::mem::swap(&mut self.bytes, &mut next);
+                let walked = walk(i, self);
+                std::mem::swap(&mut self.bytes, &mut next);
+                walked?;
+            }
+            if run > 0 && (i == count || next != own) {
+                self.number(&mut run)?;
+                self.repeated(|writer| writer.bytes(&mut own))?;
+                run = 0;
+            }
+            std::mem::swap(&mut own, &mut next);
+            run += 1;
+        }
+        Ok(())
+    }
+
+    fn chunks<T: Send>(
+        &mut self,
+        count: usize,
+        columns: usize,
+        walk: impl Fn(Range<usize>, &mut Columns) -> Result<T> + Sync,
+    ) -> Result<Vec<T>> {
+        let write = |range| {
+            let mut own = Columns::new(columns, CHUNK);
+            let made = walk(range, &mut own)?;
+            Ok((made, own.to_bytes()))
+        };
+        let all = chunks_of(count).map(write).collect::<Result<Vec<_>>>()?;
+        let put = |(made, bytes): (T, Vec<u8>)| {
+            self.count(bytes.len())?;
+            self.bytes.extend_from_slice(&bytes);
+            Ok(made)
+        };
+        all.into_iter().map(put).collect()
+    }
 }
 
 /// A value that several things share.
@@ -142,6 +182,8 @@ type Shared = Box<dyn Any + Send + Sync>;
 /// Reads.
 pub(crate) struct Reader<'a> {
     rest: &'a [u8],
+    /// The number of all bytes.
+    length: usize,
     shared: Vec<Shared>,
     repeated: Vec<&'a [u8]>,
 }
@@ -149,12 +191,12 @@ pub(crate) struct Reader<'a> {
 impl<'a> Reader<'a> {
     /// Reads these bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, shared: Vec::new(), repeated: Vec::new() }
+        Self { rest: bytes, length: bytes.len(), shared: Vec::new(), repeated: Vec::new() }
     }
 
     /// Reads these bytes, behind those of another one in which shared values stood.
     pub fn behind(other: Reader, bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, shared: other.shared, repeated: Vec::new() }
+        Self { rest: bytes, length: bytes.len(), shared: other.shared, repeated: Vec::new() }
     }
 
     /// Whether all is read.
@@ -189,7 +231,7 @@ impl Archive for Reader<'_> {
     fn count(&mut self, _: usize) -> Result<usize> {
         let mut count = 0;
         self.number(&mut count)?;
-        ensure(count <= self.rest.len() as u64, || format!("{count} things in {} bytes", self.rest.len()))?;
+        ensure(count <= 8 * self.length as u64, || format!("{count} things in {} bytes", self.length))?;
         Ok(count as usize)
     }
 
@@ -225,6 +267,54 @@ impl Archive for Reader<'_> {
         let walked = walk(self);
         self.rest = rest;
         walked
+    }
+
+    fn runs(&mut self, count: usize, mut walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()> {
+        let mut first = 0;
+        while first < count {
+            let mut run = 0;
+            self.number(&mut run)?;
+            ensure(0 < run && run <= (count - first) as u64, || format!("{run} of {} things", count - first))?;
+            let end = first + run as usize;
+            self.repeated(|reader| {
+                let from = reader.rest;
+                walk(first, reader)?;
+                let own = &from[..from.len() - reader.rest.len()];
+                let rest = reader.rest;
+                for i in first + 1..end {
+                    reader.rest = own;
+                    walk(i, reader)?;
+                }
+                reader.rest = rest;
+                Ok(())
+            })?;
+            first = end;
+        }
+        Ok(())
+    }
+
+    fn chunks<T: Send>(
+        &mut self,
+        count: usize,
+        columns: usize,
+        walk: impl Fn(Range<usize>, &mut Columns) -> Result<T> + Sync,
+    ) -> Result<Vec<T>> {
+        let mut slice = |_| {
+            let mut length = 0;
+            self.number(&mut length)?;
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            let (own, rest) = self.rest.split_at_checked(length).ok_or_else(cut_short)?;
+            self.rest = rest;
+            Ok(own)
+        };
+        let slices = (0..count.div_ceil(CHUNK)).map(&mut slice).collect::<Result<Vec<_>>>()?;
+        let read = |(range, bytes): (Range<usize>, &[u8])| {
+            let mut own = Columns::read(columns, bytes)?;
+            let made = walk(range, &mut own)?;
+            ensure(own.are_at_end(), || "more numbers than things".to_owned())?;
+            Ok(made)
+        };
+        chunks_of(count).zip(slices).map(read).collect()
     }
 }
 

@@ -4,9 +4,12 @@
 //! later does not compile until it is saved, or named as scratch: memory that every step uses again.
 
 mod archive;
+mod code;
+mod columns;
 mod plain;
 
 pub(crate) use archive::{Archive, Reader, Writer};
+pub(crate) use columns::Columns;
 
 use crate::error::Result;
 

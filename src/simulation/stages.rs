@@ -75,7 +75,7 @@ impl Saved for Key {
         config.walk(archive)?;
         let bodies = archive.count(surfaces.len())?;
         surfaces.resize(bodies, (MassProperties::IMMOVABLE, Material::default()));
-        surfaces.iter_mut().try_for_each(|surface| archive.repeated(|archive| surface.walk(archive)))?;
+        archive.runs(bodies, |i, archive| surfaces[i].walk(archive))?;
         scale.walk(archive)
     }
 }

@@ -3,7 +3,11 @@
 use std::ops::{Deref, DerefMut, Index, IndexMut};
 use std::slice;
 
+use glam::{Quat, Vec3};
+
 use super::body::Body;
+use crate::error::Result;
+use crate::saved::{Archive, Columns, Saved};
 
 /// Names one body for as long as the body is in its world. The handle of a body that was removed names nothing from then on: the next body
 /// at the same index has another handle.
@@ -37,7 +41,85 @@ pub struct Bodies {
     pub(super) vacant: Vec<Vec<u32>>,
 }
 
-crate::saved::state!(Bodies { all, generations, worlds, vacant });
+crate::saved::cloned!(Bodies { all, generations, worlds, vacant });
+
+/// The columns of poses and velocities: where bodies are, two of rotations, whether they move, and how.
+const PLACE: usize = 0;
+const ROTATION: usize = 3;
+const MOVES: usize = 5;
+const VELOCITY: usize = 6;
+
+impl Saved for Bodies {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let Self { all, generations, worlds, vacant } = self;
+        let count = archive.count(all.len())?;
+        if A::READS {
+            all.resize(count, Body::fixed());
+            generations.resize(count, 0);
+            worlds.resize(count, 0);
+        }
+        archive.runs(count, |i, archive| {
+            generations[i].walk(archive)?;
+            worlds[i].walk(archive)?;
+            all[i].walk_rest(archive)
+        })?;
+        let motions = archive.chunks(count, VELOCITY + 2, |range, columns| {
+            let mut motions = Vec::new();
+            let mut last = Motion { place: Vec3::ZERO, rotation: Quat::IDENTITY, velocities: [Vec3::ZERO; 2] };
+            for body in &all[range] {
+                let mut motion =
+                    if columns.reads() { Motion { velocities: [Vec3::ZERO; 2], ..last } } else { Motion::of(body) };
+                motion.walk(&last, columns)?;
+                last = motion;
+                if columns.reads() {
+                    motions.push(motion);
+                }
+            }
+            Ok(motions)
+        })?;
+        for (body, motion) in all.iter_mut().zip(motions.into_iter().flatten()) {
+            (body.position, body.rotation) = (motion.place, motion.rotation);
+            [body.linear_velocity, body.angular_velocity] = motion.velocities;
+        }
+        vacant.walk(archive)
+    }
+}
+
+/// Pose and velocity of a body.
+#[derive(Clone, Copy)]
+struct Motion {
+    place: Vec3,
+    rotation: Quat,
+    velocities: [Vec3; 2],
+}
+
+impl Motion {
+    fn of(body: &Body) -> Self {
+        let velocities = [body.linear_velocity, body.angular_velocity];
+        Self { place: body.position, rotation: body.rotation, velocities }
+    }
+
+    /// Writes or reads it, near that of the body before.
+    fn walk(&mut self, last: &Self, columns: &mut Columns) -> Result<()> {
+        let Self { place, rotation, velocities } = self;
+        for k in 0..3 {
+            columns.near(PLACE + k, &mut place[k], last.place[k])?;
+        }
+        columns.near_rotation(ROTATION, rotation, last.rotation)?;
+        let mut moves = u8::from(velocities.iter().flat_map(|v| v.to_array()).any(|x| x.to_bits() != 0));
+        columns.byte(MOVES, &mut moves)?;
+        if moves != 0 {
+            for (column, velocity) in (VELOCITY..).zip(velocities) {
+                (0..3).try_for_each(|k| columns.float(column, &mut velocity[k]))?;
+            }
+        }
+        Ok(())
+    }
+}
 
 impl Bodies {
     /// Puts a body into one of the worlds, or into the world after the last.

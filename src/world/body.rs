@@ -135,15 +135,25 @@ impl Saved for Body {
         Self::new(BodyKind::Fixed)
     }
 
-    /// Pose and velocity are each body's own; most bodies share the rest.
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        archive.repeated(|archive| self.walk_rest(archive))?;
+        self.position.walk(archive)?;
+        self.rotation.walk(archive)?;
+        self.linear_velocity.walk(archive)?;
+        self.angular_velocity.walk(archive)
+    }
+}
+
+impl Body {
+    /// Writes what most bodies share, or reads it: all but pose and velocity.
+    pub(super) fn walk_rest<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let Self {
             name,
             kind,
-            position,
-            rotation,
-            linear_velocity,
-            angular_velocity,
+            position: _,
+            rotation: _,
+            linear_velocity: _,
+            angular_velocity: _,
             force,
             torque,
             gravity_scale,
@@ -155,33 +165,19 @@ impl Saved for Body {
             applied_force,
             applied_torque,
         } = self;
-        let mut velocities = [*linear_velocity, *angular_velocity];
-        let mut moves = velocities.iter().flat_map(|v| v.to_array()).any(|x| x.to_bits() != 0);
-        archive.repeated(|archive| {
-            moves.walk(archive)?;
-            name.walk(archive)?;
-            kind.walk(archive)?;
-            for load in [&mut *force, &mut *torque, &mut *applied_force, &mut *applied_torque] {
-                load.walk(archive)?;
-            }
-            gravity_scale.walk(archive)?;
-            mass.walk(archive)?;
-            material.walk(archive)?;
-            groups.walk(archive)?;
-            colliders.walk(archive)?;
-            density.walk(archive)
-        })?;
-        position.walk(archive)?;
-        rotation.walk(archive)?;
-        if moves {
-            velocities.walk(archive)?;
-            [*linear_velocity, *angular_velocity] = velocities;
+        name.walk(archive)?;
+        kind.walk(archive)?;
+        for load in [force, torque, applied_force, applied_torque] {
+            load.walk(archive)?;
         }
-        Ok(())
+        gravity_scale.walk(archive)?;
+        mass.walk(archive)?;
+        material.walk(archive)?;
+        groups.walk(archive)?;
+        colliders.walk(archive)?;
+        density.walk(archive)
     }
-}
 
-impl Body {
     /// A body of this kind, without shapes.
     pub(crate) fn new(kind: BodyKind) -> Self {
         Self {
