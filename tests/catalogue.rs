@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};
-use drystone::scenes::Spawners;
+use drystone::scenes::{CATALOGUE, Spawners};
 use drystone::{Backend, Body, BodyKind, Bounds, Cpu, Event, Reference, Scene, Simulation, SolverConfig};
 
 /// A scene of the catalogue, and its simulation after some steps.
@@ -51,6 +51,17 @@ fn bears_its_weight(name: &str, simulation: &mut Simulation) {
 
 fn energy(simulation: &Simulation) -> f64 {
     simulation.world.kinetic_energy() + simulation.world.potential_energy()
+}
+
+#[test]
+fn every_scene_stands_on_the_page_of_pictures() {
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let page = std::fs::read_to_string(docs.join("gallery.md")).expect("the page");
+    for entry in CATALOGUE {
+        let section = format!("## {}\n\n{}\n", entry.name, entry.summary);
+        assert!(page.contains(&section), "docs/gallery.md lacks {section}");
+        assert!(docs.join("gallery").join(format!("{}.png", entry.name)).is_file(), "no picture of {}", entry.name);
+    }
 }
 
 /// Colors that follow rows of bricks let a wall rattle at 23 mm/s for ever, although every brick stays in its place.
