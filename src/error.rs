@@ -6,6 +6,18 @@
 use std::path::PathBuf;
 
 /// One line that names what is wrong and where.
+///
+/// ```
+/// use drystone::{Error, Result};
+///
+/// fn refused() -> Result<()> {
+///     Err(Error::input("must be above 0").within("scene.json"))
+/// }
+/// let error = refused().expect_err("it is refused");
+/// assert_eq!((error.to_string().as_str(), error.exit_code()), ("scene.json: must be above 0", 2));
+/// let missing = std::fs::read("no such file").map_err(Error::file("no such file")).expect_err("no file");
+/// assert!(matches!(missing, Error::File { .. }) && missing.to_string().starts_with("no such file: "));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

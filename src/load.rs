@@ -21,6 +21,25 @@ const MOST_SUBSTEPS: f64 = 4096.0;
 const LEVEL: f64 = 0.1;
 
 /// The interface that sinks in deepest.
+///
+/// ```
+/// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, load::Load};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// for k in 0..3 {
+///     world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + k as f32, 0.0));
+/// }
+/// let config = SolverConfig::default();
+/// let interfaces = Load::all(&world, &config, |_, _| true);
+/// assert_eq!(interfaces.len(), 3);
+/// let load = Load::heaviest(&world, &config).expect("bodies bear bodies");
+/// assert!(load.force >= 2.0 * 9810.0 * 0.999);
+/// // Substeps for an overlap of 0.1 mm at most.
+/// let substeps = load.substeps(1e-4, 1.0 / 60.0, &config)?;
+/// assert!(load.overlap(substeps, 1.0 / 60.0, &config) <= 1e-4 && load.overlap(substeps - 1, 1.0 / 60.0, &config) > 1e-4);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Load {

@@ -6,6 +6,19 @@ use crate::stats::largest;
 use crate::world::{Body, BodyKind, World};
 
 /// Overlap over all touching pairs.
+///
+/// ```
+/// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, metrics::Penetration};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
+/// let Penetration { max, mean, .. } = Penetration::of_world(&world, &SolverConfig::default());
+/// assert!((max - 0.01).abs() < 1e-6 && max == mean);
+/// // Of two manifolds with separations of two points each (m).
+/// let both = Penetration::of([[-0.5_f32, 0.1].into_iter(), [0.0, 0.2].into_iter()]);
+/// assert_eq!((both.max, both.mean), (0.5, 0.25));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Penetration {
@@ -41,6 +54,15 @@ impl Penetration {
 }
 
 /// Speed of the fastest dynamic body (m/s) and its index; NaN counts as fastest.
+///
+/// ```
+/// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
+/// # let mut world = World::new();
+/// # for speed in [3.0, 4.0] {
+/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// # }
+/// assert_eq!(metrics::fastest(&world), (4.0, 1));
+/// ```
 pub fn fastest(world: &World) -> (f64, usize) {
     // Slower than any, so that a body at rest is named where all are.
     let mut best = (-1.0, 0);
@@ -54,12 +76,28 @@ pub fn fastest(world: &World) -> (f64, usize) {
 }
 
 /// Root of the mean square speed, weighted by mass: sqrt(2 E / m) (m/s). 0 for a world without dynamic bodies.
+///
+/// ```
+/// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
+/// # let mut world = World::new();
+/// # for speed in [3.0, 4.0] {
+/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// # }
+/// // Balls of one mass at 3 and 4 m/s.
+/// assert!((metrics::rms_speed(&world) - 12.5_f64.sqrt()).abs() < 1e-6);
+/// ```
 pub fn rms_speed(world: &World) -> f64 {
     let mass: f64 = world.bodies.iter().map(|b| f64::from(b.mass.mass)).sum();
     if mass > 0.0 { (2.0 * world.kinetic_energy() / mass).sqrt() } else { 0.0 }
 }
 
 /// Half of the height of the box along the world's axes around a body as it is (m); 0 without shapes.
+///
+/// ```
+/// use drystone::{Body, Shape, metrics::half_height};
+///
+/// assert_eq!(half_height(&Body::dynamic().shape(Shape::cuboid(2.0, 0.5, 1.0))), 0.5);
+/// ```
 pub fn half_height(body: &Body) -> f64 {
     let bounds = |c: &crate::world::Collider| {
         let (low, high) = c.bounds(body.position, body.rotation);
@@ -70,12 +108,31 @@ pub fn half_height(body: &Body) -> f64 {
 }
 
 /// Whether the center of mass of a body moved by less than half of the height that the body had.
+///
+/// ```
+/// use drystone::{Body, Shape, metrics::in_place};
+///
+/// let before = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
+/// assert!(in_place(&before, &before.clone().position(0.4, 0.0, 0.0)));
+/// assert!(!in_place(&before, &before.clone().position(0.0, -0.6, 0.0)));
+/// ```
 pub fn in_place(before: &Body, after: &Body) -> bool {
     let moved = before.center_of_mass().as_dvec3().distance(after.center_of_mass().as_dvec3());
     moved < half_height(before)
 }
 
 /// Largest horizontal distance of a dynamic body's center of mass from where it was `before` (m).
+///
+/// ```
+/// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
+/// # let mut world = World::new();
+/// # for speed in [3.0, 4.0] {
+/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// # }
+/// let mut after = world.clone();
+/// after.bodies[1].position += Vec3::new(3.0, -9.0, 4.0);
+/// assert_eq!(metrics::drift(&world, &after), 5.0);
+/// ```
 pub fn drift(before: &World, after: &World) -> f64 {
     let moved = |(was, is): (&Body, &Body)| (is.center_of_mass() - was.center_of_mass()).as_dvec3();
     let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);
@@ -83,6 +140,17 @@ pub fn drift(before: &World, after: &World) -> f64 {
 }
 
 /// Dynamic bodies of `after` that are in place, see [`in_place`].
+///
+/// ```
+/// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
+/// # let mut world = World::new();
+/// # for speed in [3.0, 4.0] {
+/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// # }
+/// let mut after = world.clone();
+/// after.bodies[1].position.y += 1.0;
+/// assert_eq!(metrics::in_place_count(&world, &after), 1);
+/// ```
 pub fn in_place_count(before: &World, after: &World) -> usize {
     let dynamic = before.bodies.iter().zip(&after.bodies).filter(|(was, _)| was.kind == BodyKind::Dynamic);
     dynamic.filter(|(was, is)| in_place(was, is)).count()

@@ -5,6 +5,14 @@ use crate::names::named;
 
 /// How much error is paid for with time: the same rules with more or fewer substeps, which measures best of all ways to spend
 /// a sweep (docs/speed-vs-error.md).
+///
+/// ```
+/// use drystone::preset::Preset;
+///
+/// let accurate: Preset = "accurate".parse().expect("one of four");
+/// assert_eq!(accurate.config().substeps, 32);
+/// assert!(accurate.promise().deepest < Preset::default().promise().deepest);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 #[non_exhaustive]
@@ -23,6 +31,13 @@ pub enum Preset {
 named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Reference = "reference", });
 
 /// The figures that a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
+///
+/// ```
+/// use drystone::preset::{Preset, Promise};
+///
+/// let Promise { tower, deepest, .. } = Preset::Balanced.promise();
+/// assert_eq!((tower, deepest), (400, 0.5e-3));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Promise {

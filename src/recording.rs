@@ -16,6 +16,14 @@ use crate::stats::StepStats;
 use crate::world::{World, WorldChange};
 
 /// How often a recording notes a hash of all bodies, and keeps a whole state (steps).
+///
+/// ```
+/// use drystone::RecordingIntervals;
+///
+/// // A replay names the step and the body of the first difference.
+/// let every_step = RecordingIntervals { hash: 1, ..RecordingIntervals::default() };
+/// assert_eq!(every_step.state, 600);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordingIntervals {
     /// Steps from hash to hash, 1 or more: with 1, a replay names the step and the body of the first difference.
@@ -185,6 +193,31 @@ fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
 }
 
 /// Where a replay first went another way than the recording.
+///
+/// ```
+/// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+/// # let mut world = World::new();
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let intervals = RecordingIntervals { hash: 1, state: 4 };
+/// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
+/// # let mut hashes = Vec::new();
+/// # for _ in 0..10 {
+/// #     recorder.step(&mut simulation, 0.01)?;
+/// #     hashes.push(simulation.hash());
+/// # }
+/// # let bytes = recorder.finish(&mut simulation)?;
+/// let mut replay = Replay::read(&bytes)?;
+/// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+/// replay.seek(&mut again, 6)?;
+/// // Someone meddles with the replay.
+/// again.world.bodies[0].linear_velocity.x = 1.0;
+/// replay.step(&mut again)?;
+/// let difference: drystone::ReplayDifference = replay.first_difference().expect("the bodies differ");
+/// assert_eq!((difference.step, difference.agreed, difference.body, difference.bodies), (7, 6, Some(0), 1));
+/// # let _ = hashes;
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ReplayDifference {
@@ -208,6 +241,32 @@ struct KeptState {
 }
 
 /// A recording that runs again, in a simulation of the caller.
+///
+/// ```
+/// # use drystone::{Body, Cpu, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+/// # let mut world = World::new();
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let intervals = RecordingIntervals { hash: 1, state: 4 };
+/// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
+/// # let mut hashes = Vec::new();
+/// # for _ in 0..10 {
+/// #     recorder.step(&mut simulation, 0.01)?;
+/// #     hashes.push(simulation.hash());
+/// # }
+/// # let bytes = recorder.finish(&mut simulation)?;
+/// assert!(Replay::is_recording(&bytes));
+/// let mut replay = Replay::read(&bytes)?;
+/// assert_eq!((replay.title(), replay.len(), replay.is_empty(), replay.dt()), ("a fall", 10, false, Some(0.01)));
+/// let mut again = replay.begin(Box::new(Cpu::new()))?;
+/// while replay.step(&mut again)?.is_some() {}
+/// assert!(again.hash() == hashes[9] && replay.first_difference().is_none());
+/// // Back to the fifth step, from the nearest state before it.
+/// replay.seek(&mut again, 5)?;
+/// assert_eq!((again.hash(), replay.step_number()), (hashes[4], 5));
+/// assert!((replay.time() - 0.05).abs() < 1e-6);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub struct Replay {
     title: String,
     /// Ascending by their steps.

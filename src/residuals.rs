@@ -9,6 +9,24 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 
 /// The errors of impulses. All numbers are NaN if any of them is not finite.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::residuals::Residuals;
+///
+/// // The ball stops to fall, and goes on sliding at 0.7 m/s against all friction there is.
+/// let solved = Residuals::of(&problem, &[DVec3::new(6.0, 0.0, -0.6)]);
+/// assert!(solved.e_vel < 1e-12 && solved.cone < 1e-12);
+/// // Without impulses it approaches the ground.
+/// assert_eq!(Residuals::of(&problem, &[DVec3::ZERO]).pen_rate, 3.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -48,6 +66,15 @@ impl Residuals {
 
     /// Of impulses of a problem without bodies, one a contact in its coordinates (N s). Nothing carries velocities, so nothing
     /// drifts.
+    ///
+    /// ```
+    /// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
+    /// # let rows = vec![vec![(0, DMat3::IDENTITY * 0.5)]];
+    /// # let problem = LocalProblem { name: "one contact".into(), friction: vec![0.1], free: vec![DVec3::X * -3.0], rows };
+    /// use drystone::residuals::Residuals;
+    ///
+    /// assert!(Residuals::of_blocks(&problem, &[DVec3::X * 6.0]).e_vel < 1e-12);
+    /// ```
     ///
     /// # Panics
     /// There is not one impulse a contact.
@@ -120,6 +147,22 @@ fn step(block: DMat3) -> f64 {
 }
 
 /// A problem with what does not depend on the impulses.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::{contacts::Operator, residuals::Measure};
+///
+/// let (measure, operator) = (Measure::new(&problem), Operator::new(&problem));
+/// let impulses = [DVec3::new(6.0, 0.0, -0.6)];
+/// assert!(measure.of(&impulses, &operator.velocities(&impulses)).e_vel < 1e-12);
+/// ```
 pub struct Measure<'a> {
     operator: Operator<'a>,
     /// rho of each contact: 3/trace(W_ii) (kg).

@@ -54,6 +54,43 @@ struct Unfinished {
 /// assert!((simulation.world.bodies[brick].position.y - 0.5).abs() < 0.01);
 /// # Ok::<(), drystone::Error>(())
 /// ```
+///
+/// ```
+/// use drystone::{Body, Joint, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
+/// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0).position(3.0, 2.0, 0.0));
+/// world.join(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+/// assert!(simulation.listening().impulses);
+/// for _ in 0..60 {
+///     simulation.step(1.0 / 60.0)?;
+/// }
+/// // Contacts as the last step left them, and how deep bodies overlap: as the step began, and now.
+/// let borne: f32 = simulation.manifolds().map(|manifold| manifold.normal_impulse()).sum();
+/// assert!((borne * 480.0 - 9810.0).abs() < 100.0, "{borne} N s in a substep of 1/480 s");
+/// assert!(simulation.solved_penetration().max < 1e-3 && simulation.penetration().max < 1e-3);
+/// assert_eq!((simulation.contacts().count(), simulation.overlaps().len()), (1, 0));
+/// // Joints: the lamp hangs on its hinge.
+/// assert!((simulation.joint_impulses()[0].length() * 480.0 - 19.62).abs() < 0.1);
+/// assert!(simulation.joint_angular_impulses()[0].length() < 1e-3);
+/// // What rests sleeps, and takes the substeps of the settings.
+/// assert!(simulation.is_asleep(brick) && simulation.substeps_of(brick) == simulation.config().substeps);
+/// simulation.wake(brick);
+/// assert!(!simulation.is_asleep(brick));
+/// // Settings and backend may change. The next step is a value.
+/// simulation.set_config(SolverConfig::default().with(|c| c.substeps = 4))?;
+/// let before = simulation.set_backend(Box::new(drystone::Cpu::new()));
+/// assert_eq!((before.name(), simulation.backend().name()), ("reference", "cpu"));
+/// let (problem, plan) = simulation.next_problem(1.0 / 60.0)?;
+/// assert_eq!((problem.contacts.len(), problem.joints.len()), (simulation.problem().contacts.len(), 1));
+/// assert!(plan.passes.len() < simulation.plan().passes.len(), "fewer substeps");
+/// assert_eq!(simulation.into_world().dynamic_count(), 2);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub struct Simulation {
     /// The bodies, with their moments of inertia raised where they are too small ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)).
     /// Between steps, all of it may change: bodies and joints may come and go, and gravity, poses, velocities, forces, masses, materials, kinds and
@@ -159,6 +196,17 @@ impl Simulation {
 
     /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
     /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
+    ///
+    /// ```
+    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let (problem, _) = simulation.step_with_contacts("a ball", 1.0 / 60.0)?;
+    /// assert_eq!((problem.name.as_str(), problem.contacts.len()), ("a ball", 1));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Simulation::step`], or the world has joints, which a contact problem has not.

@@ -3,6 +3,17 @@
 use std::time::{Duration, Instant};
 
 /// Times and counts of one step.
+///
+/// ```
+/// use drystone::{Reference, Scene, Simulation, SolverConfig, StepStats};
+///
+/// let scene = Scene::find("tower", &[])?;
+/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let stats: StepStats = simulation.step(scene.dt)?;
+/// assert_eq!((stats.manifolds, stats.points, stats.asleep, stats.first_non_finite), (10, 40, 0, None));
+/// assert!(stats.colors >= 2 && stats.overflow == 0);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct StepStats {
@@ -55,6 +66,20 @@ pub struct StepStats {
 pub const EFFORT_CLASSES: usize = 13;
 
 /// The contact that asks for most substeps.
+///
+/// ```
+/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
+/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut stats = simulation.step(scene.dt)?;
+/// # for _ in 0..10 {
+/// #     stats = simulation.step(scene.dt)?;
+/// # }
+/// // A tower whose top is a thousand times as heavy: the substeps of the settings would not do.
+/// let hardest: drystone::stats::HardestContact = stats.hardest.expect("a load");
+/// assert!(hardest.need > 1.0 && simulation.substeps_of(10) > simulation.config().substeps);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -67,6 +92,20 @@ pub struct HardestContact {
 }
 
 /// Time that a device spent at one kernel in one step.
+///
+/// ```
+/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
+/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut stats = simulation.step(scene.dt)?;
+/// # for _ in 0..10 {
+/// #     stats = simulation.step(scene.dt)?;
+/// # }
+/// // Kernels are timed by the clock of a device: see `Backend::time_kernels`.
+/// let times: &[drystone::stats::KernelTime] = &stats.kernels;
+/// assert!(times.is_empty());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct KernelTime {
@@ -79,6 +118,19 @@ pub struct KernelTime {
 }
 
 /// The bytes and dispatches of a step between the processor and a device.
+///
+/// ```
+/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
+/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut stats = simulation.step(scene.dt)?;
+/// # for _ in 0..10 {
+/// #     stats = simulation.step(scene.dt)?;
+/// # }
+/// // The reference has no device.
+/// assert_eq!(stats.traffic, drystone::stats::Traffic::default());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Traffic {
@@ -95,6 +147,20 @@ pub struct Traffic {
 }
 
 /// Wall time of each stage of a step.
+///
+/// ```
+/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
+/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut stats = simulation.step(scene.dt)?;
+/// # for _ in 0..10 {
+/// #     stats = simulation.step(scene.dt)?;
+/// # }
+/// let times: drystone::stats::StageTimes = stats.times;
+/// assert_eq!(times.stages().map(|stage| stage.0), ["detect", "color", "prepare", "run", "store"]);
+/// assert_eq!(times.total(), times.stages().iter().map(|stage| stage.1).sum());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct StageTimes {
@@ -137,16 +203,31 @@ pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
 }
 
 /// The largest of `from` and some numbers; NaN if any of these is, so that it spoils a check instead of passing unseen.
+///
+/// ```
+/// use drystone::stats::largest;
+///
+/// assert_eq!(largest(0.0, [1.0, 3.0, 2.0]), 3.0);
+/// assert!(largest(0.0, [1.0, f64::NAN]).is_nan());
+/// ```
 pub fn largest(from: f64, values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(from, |x, y| if y > x || y.is_nan() { y } else { x })
 }
 
 /// The middle of some numbers, the mean of the two middle ones if they are even in number; NaN for none.
+///
+/// ```
+/// assert_eq!(drystone::stats::median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
+/// ```
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
 /// The number that a share `q` of some numbers does not exceed, linear between neighbors; NaN for none.
+///
+/// ```
+/// assert_eq!(drystone::stats::quantile(&[1.0, 2.0, 3.0], 0.75), 2.5);
+/// ```
 pub fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -2,8 +2,8 @@
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};
-use drystone::scenes::Spawners;
-use drystone::{Body, BodyKind, Bounds, Cpu, Reference, Scene, Simulation, SolverConfig};
+use drystone::scenes::{CATALOGUE, Spawners};
+use drystone::{Backend, Body, BodyKind, Bounds, Cpu, Event, Reference, Scene, Simulation, SolverConfig};
 
 /// A scene of the catalogue, and its simulation after some steps.
 fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
@@ -51,6 +51,17 @@ fn bears_its_weight(name: &str, simulation: &mut Simulation) {
 
 fn energy(simulation: &Simulation) -> f64 {
     simulation.world.kinetic_energy() + simulation.world.potential_energy()
+}
+
+#[test]
+fn every_scene_stands_on_the_page_of_pictures() {
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let page = std::fs::read_to_string(docs.join("gallery.md")).expect("the page");
+    for entry in CATALOGUE {
+        let section = format!("## {}\n\n{}\n", entry.name, entry.summary);
+        assert!(page.contains(&section), "docs/gallery.md lacks {section}");
+        assert!(docs.join("gallery").join(format!("{}.png", entry.name)).is_file(), "no picture of {}", entry.name);
+    }
 }
 
 /// Colors that follow rows of bricks let a wall rattle at 23 mm/s for ever, although every brick stays in its place.
@@ -198,12 +209,21 @@ fn every_domino_falls() {
 }
 
 /// A scene with spawners, stepped as the program does; `tell` is called after each step with what came and left so far.
-fn flow(name: &str, parameters: &[&str], steps: u32, mut tell: impl FnMut(u32, &Simulation, &Spawners)) {
+fn flow(name: &str, parameters: &[&str], steps: u32, tell: impl FnMut(u32, &Simulation, &Spawners)) {
+    flow_on(Box::new(Reference::<f32>::new()), name, parameters, steps, tell);
+}
+
+fn flow_on(
+    backend: Box<dyn Backend>,
+    name: &str,
+    parameters: &[&str],
+    steps: u32,
+    mut tell: impl FnMut(u32, &Simulation, &Spawners),
+) {
     let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
     let scene = Scene::find(name, &parameters).expect(name);
     let mut spawners = Spawners::new(&scene);
-    let reference = Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), reference).expect(name);
+    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), backend).expect(name);
     for step in 0..steps {
         spawners.before_step(&mut simulation.world, scene.dt);
         simulation.step(scene.dt).expect("a step");
@@ -214,7 +234,7 @@ fn flow(name: &str, parameters: &[&str], steps: u32, mut tell: impl FnMut(u32, &
 /// A box rides from x = 0.6 m to the last roller at 8 m: 7.4 s at 1 m/s, and falls by a meter in 0.5 s.
 #[test]
 fn boxes_ride_on_a_conveyor_at_its_speed_and_as_many_leave_as_come() {
-    for (speed, every, most) in [(1.0, 120, 0.1), (2.0, 60, 0.3)] {
+    for (speed, every) in [(1.0, 120), (2.0, 60)] {
         let parameters = [format!("speed={speed}"), format!("every={every}")];
         let (mut carried, mut sum, mut left) = (0, 0.0, Vec::new());
         flow("conveyor", &[&parameters[0], &parameters[1]], 1500, |step, simulation, spawners| {
@@ -222,8 +242,9 @@ fn boxes_ride_on_a_conveyor_at_its_speed_and_as_many_leave_as_come() {
             left.push(spawners.left());
             for body in simulation.world.dynamic().filter(|b| (2.0..6.0).contains(&b.position.x)) {
                 let slip = (body.linear_velocity - Vec3::X * speed).length();
-                assert!(slip < most * speed, "step {step}: {slip} m/s");
-                assert!((body.position.y - 0.2).abs() < 1e-2 && body.position.z.abs() < 0.1, "{}", body.position);
+                // A box with straight edges hops over the rollers by 7 mm at 2 m/s, and slips by 0.33 m/s.
+                assert!(slip < 0.04 * speed, "step {step}: {slip} m/s");
+                assert!((body.position.y - 0.2).abs() < 1e-3 && body.position.z.abs() < 0.1, "{}", body.position);
                 (carried, sum) = (carried + 1, sum + body.linear_velocity.x);
             }
         });
@@ -262,6 +283,54 @@ fn every_ball_that_passes_a_turnstile_turns_its_cross_by_a_quarter_and_all_pass(
         });
         assert_eq!((passed, left), (12, 12), "every {every} steps");
     }
+}
+
+#[test]
+fn sensors_count_every_ball_of_a_board_once_on_any_backend() {
+    const BALLS: u32 = 30;
+    let counts = |backend: Box<dyn Backend>| {
+        let mut told: Vec<(u32, Event)> = Vec::new();
+        let parameters = [format!("n={BALLS}"), "every=12".into()];
+        flow_on(
+            backend,
+            "galton",
+            &[&parameters[0], &parameters[1]],
+            12 * BALLS + 300,
+            |step, simulation, spawners| {
+                told.extend(simulation.events().iter().map(|&event| (step, event)));
+                let world = &simulation.world;
+                let name = |body: drystone::BodyHandle| &*world.body(body).expect("all stay").name;
+                let count = |is: fn(&Event) -> bool, of: &str| {
+                    let sensor = |event: &Event| match *event {
+                        Event::Entered { sensor, .. } | Event::Left { sensor, .. } => name(sensor.body),
+                        _ => "",
+                    };
+                    told.iter().filter(|(_, event)| is(event) && sensor(event).starts_with(of)).count() as u32
+                };
+                let entered = |of: &str| count(|event| matches!(event, Event::Entered { .. }), of);
+                let left = |of: &str| count(|event| matches!(event, Event::Left { .. }), of);
+                // A ball falls from above the gate through the gate within half a second.
+                assert!(entered("gate") <= spawners.came() && entered("gate") + 3 >= spawners.came(), "step {step}");
+                assert!(left("gate") <= entered("gate") && entered("bin") <= left("gate"), "step {step}");
+                if step < 12 * BALLS + 300 {
+                    return;
+                }
+                assert_eq!((spawners.came(), entered("gate"), left("gate")), (BALLS, BALLS, BALLS));
+                assert_eq!((entered("bin"), left("bin")), (BALLS, 0));
+                let balls: Vec<_> = world.dynamic().map(|ball| ball.position).collect();
+                assert_eq!(balls.len() as u32, BALLS);
+                for bin in world.bodies.iter().filter(|body| body.name.starts_with("bin")) {
+                    let inside = balls.iter().filter(|at| (at.x - bin.position.x).abs() < 0.2).count() as u32;
+                    assert_eq!(entered(&bin.name), inside, "{}", bin.name);
+                }
+                let filled = (1..=9).map(|k| entered(&format!("bin {k}"))).filter(|&balls| balls > 0).count();
+                assert!(filled >= 4, "{filled} bins have balls");
+            },
+        );
+        told
+    };
+    let [reference, lanes] = [counts(Box::new(Reference::<f32>::new())), counts(Box::new(Cpu::new()))];
+    assert_eq!(reference, lanes);
 }
 
 /// The angle of a body about z, in the plane.

@@ -299,6 +299,8 @@ fn a_body_without_torque_keeps_its_bits_beside_one_with_torque() {
     for i in 0..5 {
         world.add(cube().position(0.0, 0.5 + i as f32, 0.0).velocity(Vec3::ZERO, -Vec3::ZERO));
     }
+    // It falls freely, so that nothing but its torque acts on the sign of its spin.
+    world.add(cube().position(20.0, 90.0, 0.0).velocity(Vec3::ZERO, -Vec3::ZERO));
     let lone = world.add(cube().position(50.0, 9.0, 0.0));
     let mut both = [0.0, 1.0].map(|torque| {
         let mut world = world.clone();

@@ -12,6 +12,7 @@ use common::gpu;
 use common::tolerance;
 use drystone::config::Method;
 use drystone::glam::Vec3;
+use drystone::scenes::Spawners;
 use drystone::stages::backend::{CheckedStep, crossover};
 use drystone::stages::compare::{Difference, compare};
 use drystone::stages::plan::Kernel;
@@ -19,7 +20,7 @@ use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
-    Backend, Body, Cpu, Error, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+    Backend, Body, Cpu, Error, Event, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
 use settings::set;
 
@@ -32,11 +33,13 @@ tests! {
         friction_per_manifold_without_friction_has_the_bits_of_the_reference,
         a_small_world_in_one_dispatch_has_the_bits_of_the_reference,
         joints_with_axes_have_the_bits_of_the_reference,
+        sensors_tell_what_they_tell_on_the_reference,
     }
     exact_and_timed_gpu {
         kernels_that_are_timed_have_the_bits_of_the_reference,
     }
     any_gpu {
+        plain_wgsl_lets_every_ball_pass_the_sensors,
         a_step_of_plain_wgsl_is_near_the_reference_during_a_fall,
         a_problem_too_large_for_the_adapter_is_refused_by_name,
         any_adapter_can_be_measured_against_the_processor,
@@ -302,6 +305,33 @@ fn joints_with_axes_have_the_bits_of_the_reference() {
     assert_same(&scene, &accelerated, 15, "ragdolls with momentum");
     let measured = config.with(|c| (c.tolerance, c.iterations) = (1e-3, 6));
     assert_same(&scene, &measured, 15, "ragdolls with a tolerance");
+}
+
+/// The events of a board whose bins count balls that come while it runs.
+fn told_by_a_board(backend: Box<dyn Backend>) -> Vec<(u32, Event)> {
+    const STEPS: u32 = 12 * 6 + 150;
+    let scene = Scene::find("galton", &["n=6".into(), "rows=2".into(), "every=12".into()]).expect("a scene");
+    let mut spawners = Spawners::new(&scene);
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend).expect("good settings");
+    let mut told = Vec::new();
+    for step in 0..STEPS {
+        spawners.before_step(&mut simulation.world, scene.dt);
+        simulation.step(scene.dt).expect("a step");
+        told.extend(simulation.events().iter().map(|&event| (step, event)));
+    }
+    told
+}
+
+fn sensors_tell_what_they_tell_on_the_reference() {
+    let (ours, theirs) = (told_by_a_board(reference()), told_by_a_board(Box::new(gpu::exact())));
+    assert_eq!(ours, theirs);
+}
+
+/// Six balls enter and leave the gate, and each enters a bin. Which one depends on the last bits.
+fn plain_wgsl_lets_every_ball_pass_the_sensors() {
+    let told = told_by_a_board(Box::new(gpu::plain()));
+    let entered = told.iter().filter(|(_, event)| matches!(event, Event::Entered { .. })).count();
+    assert_eq!((entered, told.len() - entered), (12, 6));
 }
 
 /// The kernels of the mixture, each in dispatches of its own because they are timed.

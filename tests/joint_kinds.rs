@@ -27,6 +27,7 @@ tests! {
         a_motor_reaches_its_speed,
         a_rod_keeps_its_length,
         a_rope_is_slack_and_then_holds,
+        a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine,
         a_slider_slides_as_on_an_incline_and_stops_at_its_limit,
         a_spring_swings_with_its_frequency,
         a_turning_spring_bears_a_load_at_the_angle_that_its_stiffness_says,
@@ -325,6 +326,26 @@ fn bodies_on_a_sliding_joint_keep_their_momentum(open: Open) {
     assert!(world.linear_momentum().distance(linear) < 1e-3 * linear.length(), "{}", world.linear_momentum());
     assert!(world.angular_momentum().distance(angular) < 5e-3 * angular.length(), "{}", world.angular_momentum());
     assert!(world.joint_gap() < 2e-3, "{}", world.joint_gap());
+}
+
+/// r'' = w² r on a rod that turns at w, and the axes of the joint turn with the rod: by 0.1 rad in a step.
+fn a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine(open: Open) {
+    const SPIN: f32 = 25.0;
+    const BEGIN: f32 = 0.5;
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    let bead = Body::dynamic().shape(Shape::ball(0.05)).position(BEGIN, 0.0, 0.0);
+    let bead = world.add(bead.velocity(Vec3::NEG_Z * SPIN * BEGIN, Vec3::Y * SPIN));
+    let rod = Body::kinematic().shape(Shape::cuboid(3.0, 0.01, 0.01));
+    let rod = world.add(rod.velocity(Vec3::ZERO, Vec3::Y * SPIN));
+    world.join(Joint::new(bead, Vec3::ZERO, rod, Vec3::ZERO).slider(Vec3::X));
+    let mut simulation = simulate(world, open);
+    let mut worst = 0.0_f32;
+    steps(&mut simulation, 0.075, |time, world| {
+        let exact = BEGIN * (SPIN * time).cosh();
+        worst = worst.max((place(world) / exact - 1.0).abs());
+        println!("{time} s: {} of {exact} m, gap {}", place(world), world.joint_gap());
+    });
+    assert!(worst < 0.02, "{worst}");
 }
 
 /// Two rods that rest on their limits; the joint of the first goes.

@@ -19,6 +19,9 @@ tests! {
         a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else,
         a_body_that_comes_lands_and_rests_on_what_sleeps,
         a_body_in_the_place_of_another_is_another_body,
+        a_twin_in_the_place_of_a_body_begins_without_its_impulses,
+        a_fixed_body_that_becomes_dynamic_lands_on_fixed_ground,
+        ground_without_bounds_that_goes_bears_nothing_more,
         kinds_and_shapes_change_between_steps,
         a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse,
         bodies_meet_only_those_of_their_groups,
@@ -126,6 +129,50 @@ fn a_body_in_the_place_of_another_is_another_body(open: Open) {
     run(&mut simulation, 240);
     assert!((simulation.world.body(new).expect("the cube").position.y - 0.5).abs() < 2e-3);
     assert!((simulation.world.body(towers[0][3]).expect("a cube").position.y - 3.5).abs() < 2e-3);
+}
+
+/// Nothing tells the twin from the body before but its handle.
+fn a_twin_in_the_place_of_a_body_begins_without_its_impulses(open: Open) {
+    let (world, towers) = towers(1);
+    let mut changed = simulation(&world, &SolverConfig::default().without_sleep(), open);
+    run(&mut changed, 120);
+    let mut unchanged = changed.fork(open());
+    let top = towers[0][4];
+    let twin = changed.world.remove(top).expect("a cube");
+    assert_eq!(changed.world.insert(twin).index(), top.index());
+    run(&mut changed, 1);
+    run(&mut unchanged, 1);
+    let [new, old] = [&changed, &unchanged].map(|s| bits(&s.world.bodies[top.index()]));
+    assert_ne!(new, old, "impulses of a contact at rest keep every bit");
+    run(&mut changed, 60);
+    assert!((changed.world.bodies[top.index()].position.y - 4.5).abs() < 2e-3);
+}
+
+/// Two fixed bodies make no pair, so that detection has to look again.
+fn a_fixed_body_that_becomes_dynamic_lands_on_fixed_ground(open: Open) {
+    let mut world = World::new();
+    world.add(ground());
+    let low = world.add(cube(0.0, 0.5));
+    world.bodies[low].kind = BodyKind::Fixed;
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 10);
+    simulation.world.bodies[low].kind = BodyKind::Dynamic;
+    run(&mut simulation, 60);
+    let y = simulation.world.bodies[low].position.y;
+    assert!((y - 0.5).abs() < 2e-3, "{y} m");
+}
+
+fn ground_without_bounds_that_goes_bears_nothing_more(open: Open) {
+    let mut world = World::new();
+    let plane = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let low = world.add(cube(0.0, 0.5));
+    let mut simulation = simulation(&world, &SolverConfig::default(), open);
+    run(&mut simulation, 60);
+    simulation.world.remove(plane);
+    run(&mut simulation, 30);
+    assert_eq!(simulation.manifolds().count(), 0);
+    let speed = simulation.world.bodies[low].linear_velocity.y;
+    assert!((speed + 0.5 * 9.81).abs() < 1e-3, "{speed} m/s");
 }
 
 fn kinds_and_shapes_change_between_steps(open: Open) {

@@ -96,6 +96,46 @@ fn a_run_reports_on_itself_as_rows() {
 }
 
 #[test]
+fn a_run_counts_what_comes_and_what_its_sensors_see() {
+    let folder = Folder::new();
+    let scene = "run galton -p n=5 -p rows=2 -p every=12";
+    let ran = folder.json(&format!("{scene} --json"));
+    assert_eq!((&ran["bodies"], &ran["came"], &ran["left"]), (&0.into(), &5.into(), &0.into()));
+    let counts: Vec<_> = array(&ran, "sensors")
+        .iter()
+        .map(|sensor| {
+            (sensor["sensor"].as_str().expect("a name"), ["entered", "left", "inside"].map(|key| sensor[key].as_u64()))
+        })
+        .collect();
+    assert_eq!(counts.iter().map(|count| count.0).collect::<Vec<_>>(), ["bin 1", "bin 2", "bin 3", "gate"]);
+    assert_eq!(counts[3].1, [Some(5), Some(5), Some(0)]);
+    assert_eq!(counts[..3].iter().map(|count| count.1[2].expect("a number")).sum::<u64>(), 5);
+    assert!(counts[..3].iter().all(|(_, [entered, left, inside])| entered == inside && *left == Some(0)));
+    let printed = folder.output(scene);
+    for part in ["5 came, 0 left, 5 dynamic bodies at the end", "4: 10 times entered, 5 times left", "all bodies after"]
+    {
+        assert!(printed.contains(part), "{part} is not in: {printed}");
+    }
+    let gate = printed.lines().find(|line| line.contains("  gate")).expect("a row for each sensor");
+    assert!(gate.ends_with("5 entered, 5 left, 0 inside"), "{gate}");
+    // Scenes without any have no such rows.
+    assert_eq!(folder.json("run tower --steps 1 --json")["came"], Value::Null);
+    assert!(!folder.output("run tower --steps 1").contains("sensors"));
+}
+
+#[test]
+fn backends_are_compared_over_several_worlds() {
+    let folder = Folder::new();
+    let compared = "compare tower -p n=2 --worlds 3 --vary n --steps 3 --backends reference,cpu";
+    let printed = folder.output(compared);
+    assert!(
+        printed.contains("9 dynamic bodies in 3 worlds") && printed.contains("no difference in any bit"),
+        "{printed}"
+    );
+    assert_eq!(folder.json(&format!("{compared} --json"))["worlds"], 3);
+}
+
+#[test]
 fn a_run_writes_its_end_as_a_scene_file_that_can_be_run_again() {
     let folder = Folder::new();
     let ran = folder.json("run conveyor --steps 700 --out-scene later.json --json");

@@ -8,6 +8,14 @@ use crate::error::Result;
 use crate::names::named;
 
 /// The backend that a user asks for.
+///
+/// ```
+/// use drystone::backend::BackendChoice;
+///
+/// assert_eq!("gpu".parse::<BackendChoice>()?, BackendChoice::Gpu);
+/// assert_eq!(BackendChoice::default().to_string(), "auto");
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BackendChoice {
@@ -26,6 +34,13 @@ pub enum BackendChoice {
 named!(BackendChoice { Auto = "auto", Gpu = "gpu", Cpu = "cpu", Reference = "reference", });
 
 /// An implementation of the sweeps.
+///
+/// ```
+/// use drystone::backend::BackendKind;
+///
+/// assert_eq!(BackendKind::Cpu.open(false)?.name(), "cpu");
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 #[non_exhaustive]
@@ -66,6 +81,14 @@ const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
 /// Opens the backend for a scene of `dynamic_bodies`, and gives the reason in one line.
 ///
 /// `exact` asks a GPU for the reference's bits.
+///
+/// ```
+/// use drystone::backend::{BackendChoice, choose};
+///
+/// let (backend, why) = choose(BackendChoice::Auto, 100, false)?;
+/// assert_eq!((backend.name(), why.as_str()), ("cpu", "cpu: 100 dynamic bodies, a GPU is not tried below 500"));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 ///
 /// # Errors
 /// A GPU is asked for by name and there is none, or it cannot give the reference's bits.

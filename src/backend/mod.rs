@@ -17,6 +17,23 @@ use crate::problem::carry::Carry;
 use crate::stats::{KernelTime, Traffic};
 
 /// Something that can run the passes of a plan.
+///
+/// ```
+/// use drystone::{Backend, Reference, Scene, Simulation, SolverConfig};
+///
+/// let scene = Scene::find("tower", &["n=3".into()])?;
+/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let (mut problem, plan) = simulation.next_problem(scene.dt)?;
+/// let mut backend: Box<dyn Backend> = Box::new(drystone::Cpu::new());
+/// assert!(!backend.adapter().is_empty() && !backend.keeps_rows() && backend.time_kernels()?.is_none());
+/// assert_eq!(backend.name(), "cpu");
+/// backend.run(&mut problem, &plan.passes)?;
+/// backend.fetch(&mut problem)?;
+/// simulation.step(scene.dt)?;
+/// assert_eq!(problem.bodies, simulation.problem().bodies);
+/// assert_eq!((backend.traffic().up, backend.kernel_times().len()), (0, 0));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub trait Backend: Send {
     /// `reference`, `cpu` or `gpu`.
     fn name(&self) -> &'static str;

@@ -23,6 +23,19 @@ pub use rules::{
 /// config.check()?;
 /// # Ok::<(), drystone::Error>(())
 /// ```
+///
+/// ```
+/// use drystone::SolverConfig;
+/// use drystone::config::{Friction, FrictionRule, Method, check_step_length};
+///
+/// let config = SolverConfig::default().with(|c| (c.friction, c.method) = (Friction::Box, Method::Accelerated));
+/// assert_eq!(config.friction_rule(), FrictionRule::Box);
+/// // A contact of a cube of 1 m sags by 7.5 mm at most.
+/// assert!((config.promised_sag(0.5) - 0.0075).abs() < 1e-6);
+/// let wrong = config.with(|c| c.substeps = 0);
+/// assert_eq!(wrong.check_ranges().expect_err("no substeps").to_string(), "substeps = 0: must be 1 to 4096");
+/// assert!(check_step_length(1.0 / 60.0).is_ok() && check_step_length(0.0).is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
 #[non_exhaustive]

@@ -9,6 +9,14 @@ use crate::names::named;
 use crate::saved::{fields, kinds};
 
 /// The friction rule of a setting.
+///
+/// ```
+/// use drystone::{SolverConfig, config::Friction};
+///
+/// assert_eq!(SolverConfig::default().friction, Friction::Disc);
+/// let smooth = SolverConfig::default().with(|c| c.friction = Friction::None);
+/// assert!(smooth.check().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -25,6 +33,12 @@ pub enum Friction {
 kinds!(Friction { None, Box, Disc });
 
 /// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison [`ComparisonRules::slip_friction`].
+///
+/// ```
+/// use drystone::{SolverConfig, config::FrictionRule};
+///
+/// assert_eq!(SolverConfig::default().friction_rule(), FrictionRule::Disc);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FrictionRule {
@@ -40,6 +54,13 @@ pub enum FrictionRule {
 }
 
 /// Where friction acts.
+///
+/// ```
+/// use drystone::{SolverConfig, config::FrictionAt};
+///
+/// let config = SolverConfig::default().with(|c| c.friction_at = FrictionAt::Manifold);
+/// assert!(config.check().is_ok() && config != SolverConfig::default());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -58,6 +79,13 @@ kinds!(FrictionAt { Points, Manifold });
 ///
 /// Over the standing scenes, overlap and speed at rest of both orders agree to a few percent. Towers drift a little less with
 /// normals first (zigzag of 20: 33 against 38 mm in 10 s), walls with friction first (3.4 against 5.7 mm).
+///
+/// ```
+/// use drystone::{SolverConfig, config::FrictionOrder};
+///
+/// let config = SolverConfig::default().with(|c| c.rules.friction_order = FrictionOrder::FrictionFirst);
+/// assert!(config.check().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -72,6 +100,14 @@ pub enum FrictionOrder {
 kinds!(FrictionOrder { NormalsFirst, FrictionFirst });
 
 /// The impulse that is kept non-negative.
+///
+/// ```
+/// use drystone::{SolverConfig, config::Clamping};
+///
+/// // Soft contacts need their sums.
+/// let config = SolverConfig::default().with(|c| c.rules.clamping = Clamping::PerCorrection);
+/// assert!(config.check().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -87,6 +123,13 @@ pub enum Clamping {
 kinds!(Clamping { PerCorrection, Accumulated });
 
 /// How the solver removes overlap.
+///
+/// ```
+/// use drystone::{SolverConfig, config::Stabilization};
+///
+/// let config = SolverConfig::default().with(|c| (c.stabilization, c.relax) = (Stabilization::Baumgarte, 0));
+/// assert!(config.check().is_ok() && config.with(|c| c.relax = 1).check().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -105,6 +148,13 @@ kinds!(Stabilization { None, Baumgarte, Soft });
 named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", });
 
 /// How joints are solved.
+///
+/// ```
+/// use drystone::{SolverConfig, config::JointSolver};
+///
+/// let swept = SolverConfig::default().with(|c| c.joint_solver = JointSolver::Sweeps);
+/// assert!(swept.check().is_ok() && SolverConfig::default().joint_solver == JointSolver::Auto);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -123,6 +173,13 @@ kinds!(JointSolver { Auto, Sweeps, Direct });
 named!(JointSolver { Auto = "auto", Sweeps = "sweeps", Direct = "direct", });
 
 /// Which sweeps of a substep solve friction.
+///
+/// ```
+/// use drystone::{SolverConfig, config::FrictionSweeps};
+///
+/// let all = SolverConfig::default().with(|c| c.friction_sweeps = FrictionSweeps::All);
+/// assert!(all.check().is_ok() && SolverConfig::default().friction_sweeps == FrictionSweeps::Relax);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -137,6 +194,13 @@ pub enum FrictionSweeps {
 kinds!(FrictionSweeps { All, Relax });
 
 /// How the sweeps of a substep follow each other.
+///
+/// ```
+/// use drystone::{SolverConfig, config::Method};
+///
+/// let config = SolverConfig::default().with(|c| (c.method, c.iterations) = (Method::Accelerated, 8));
+/// assert!(config.check().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -154,6 +218,14 @@ kinds!(Method { Plain, Accelerated });
 named!(Method { Plain = "plain", Accelerated = "accelerated", });
 
 /// Rules that exist for comparison with the literature (docs/rules.md). No scene needs another value than the default.
+///
+/// ```
+/// use drystone::{SolverConfig, config::{Clamping, ComparisonRules}};
+///
+/// assert_eq!(ComparisonRules::default().clamping, Clamping::Accumulated);
+/// let twice = SolverConfig::default().with(|c| c.rules.manifold_passes = 2);
+/// assert!(twice.check().is_ok());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
 #[non_exhaustive]

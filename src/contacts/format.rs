@@ -36,6 +36,11 @@ impl Problem {
 impl ContactProblem {
     /// From a file: text, or FCLIB's HDF5.
     ///
+    /// ```
+    /// let missing = drystone::ContactProblem::read("no such file").expect_err("there is none");
+    /// assert!(missing.to_string().starts_with("no such file: "));
+    /// ```
+    ///
     /// # Errors
     /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {

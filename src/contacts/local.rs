@@ -5,6 +5,14 @@ use glam::{DMat3, DVec3};
 /// u = W r + q, with W in blocks of contacts; the conditions on r and u are those of [`super::ContactProblem`].
 ///
 /// W need not be symmetric: files of some programs differ from their transpose by a thousandth.
+///
+/// ```
+/// use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
+/// let rows = vec![vec![(0, DMat3::IDENTITY * 0.5)]];
+/// let problem = LocalProblem { name: "one contact".into(), friction: vec![0.1], free: vec![DVec3::X * -3.0], rows };
+/// assert_eq!((problem.block(0), problem.colors()), (DMat3::IDENTITY * 0.5, vec![vec![0]]));
+/// assert_eq!(problem.response(0, &[DVec3::X * 6.0]), DVec3::X * 3.0);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LocalProblem {
     /// Its name, on one line.

@@ -24,6 +24,20 @@ pub use operator::Operator;
 use glam::{DMat3, DVec3};
 
 /// Bodies that may move, and their contacts with each other and with what is fixed.
+///
+/// ```
+/// use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// // As text, and back.
+/// assert_eq!(ContactProblem::parse(&problem.to_text())?, problem);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactProblem {
     /// Its name, on one line.
@@ -35,6 +49,14 @@ pub struct ContactProblem {
 }
 
 /// A body that can move.
+///
+/// ```
+/// use drystone::{contacts::{FreeBody, Velocity}, glam::{DMat3, DVec3}};
+///
+/// let free = Velocity { linear: DVec3::X, angular: DVec3::ZERO };
+/// let body = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// assert_eq!(body.free.linear, DVec3::X);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeBody {
     /// Mass (kg).
@@ -46,6 +68,12 @@ pub struct FreeBody {
 }
 
 /// How a body moves.
+///
+/// ```
+/// use drystone::contacts::Velocity;
+///
+/// assert_eq!(Velocity::default().linear.length(), 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Velocity {
     /// Of the center of mass (m/s).
@@ -55,6 +83,21 @@ pub struct Velocity {
 }
 
 /// One point at which two bodies touch.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// // The first coordinate is that of the normal.
+/// let r = contact.coordinates(DVec3::Y * 6.0);
+/// assert_eq!((r, contact.impulse(r)), (DVec3::X * 6.0, DVec3::Y * 6.0));
+/// # let _ = problem;
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointContact {
     /// The body that the normal points away from; none if it is fixed.
@@ -87,6 +130,24 @@ impl PointContact {
 }
 
 /// A contact problem in either form.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::contacts::Problem;
+///
+/// let path = std::env::temp_dir().join(format!("drystone-{}.contacts", std::process::id()));
+/// std::fs::write(&path, problem.to_text()).map_err(drystone::Error::file(&path))?;
+/// assert_eq!(Problem::read(&path)?, Problem::Bodies(problem));
+/// # std::fs::remove_file(&path).map_err(drystone::Error::file(&path))?;
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Problem {
     /// With its bodies.

@@ -5,6 +5,27 @@ use glam::{DMat3, DVec3};
 use super::{ContactProblem, Velocity};
 
 /// A problem with the inverse of its masses.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::contacts::Operator;
+///
+/// let operator = Operator::new(&problem);
+/// assert_eq!(operator.problem().bodies.len(), 1);
+/// // 6 N s stop 2 kg at 3 m/s.
+/// let velocities = operator.velocities(&[DVec3::X * 6.0]);
+/// assert_eq!(operator.relative_velocity(0, &velocities), DVec3::Z);
+/// // How u answers to r: 1/m along the normal, and an arm of 0.5 m on 1 kg m² along the tangents.
+/// assert_eq!(operator.block(0), DMat3::from_diagonal(DVec3::new(0.5, 0.75, 0.75)));
+/// assert_eq!(operator.inverse_inertia(0), DMat3::IDENTITY);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Operator<'a> {
     problem: &'a ContactProblem,

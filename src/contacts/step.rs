@@ -11,6 +11,17 @@ impl ContactProblem {
     /// alone, and impulses begin at zero. `problem` has the velocities that the sweeps of the substep find, gravity
     /// included. Bodies that nothing touches are left out; what moves on its own goes into the offsets. Joints have no place
     /// here and are left out.
+    ///
+    /// ```
+    /// use drystone::{ContactProblem, Reference, Scene, Simulation, SolverConfig};
+    ///
+    /// let scene = Scene::find("tower", &["n=2".into()])?;
+    /// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let (step, _) = simulation.next_problem(scene.dt)?;
+    /// let problem = ContactProblem::of_step("two boxes".into(), &step);
+    /// assert_eq!((problem.bodies.len(), problem.contacts.len()), (2, 8));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
     pub fn of_step(name: String, problem: &StepProblem) -> Self {
         let mut index = vec![None; problem.bodies.len()];
         let mut contacts = Self { name, ..Self::default() };

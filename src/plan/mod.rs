@@ -48,6 +48,17 @@ struct Sweeps<'a> {
 const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
+///
+/// ```
+/// use drystone::{Reference, Scene, Simulation, SolverConfig, StepPlan};
+///
+/// let scene = Scene::find("tower", &["n=3".into()])?;
+/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let (problem, plan) = simulation.next_problem(scene.dt)?;
+/// assert_eq!(plan, StepPlan::new(simulation.config(), &problem));
+/// assert_eq!(plan.bytes_of_passes(&problem).count(), plan.passes.len());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct StepPlan {
     /// In order.

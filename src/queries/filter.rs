@@ -18,6 +18,22 @@ pub type Predicate<'a> = &'a dyn Fn(BodyHandle, &Body) -> bool;
 /// let found = Queries::of(&world).point(Vec3::ZERO, &Filter::default().only(&is_dynamic));
 /// assert_eq!(found, [(small, 0)]);
 /// ```
+///
+/// ```
+/// use drystone::{Body, Groups, Shape, World, glam::Vec3, queries::{Filter, Queries}};
+///
+/// let mut world = World::new();
+/// let group = |bit: u32| Groups { membership: bit, filter: u32::MAX };
+/// let wall = world.insert(Body::fixed().shape(Shape::ball(1.0)).groups(group(0b01)));
+/// let zone = world.insert(Body::fixed().sensor(Shape::ball(1.0)).groups(group(0b10)));
+/// let queries = Queries::of(&world);
+/// let found = |filter: Filter| queries.point(Vec3::ZERO, &filter).iter().map(|found| found.0).collect::<Vec<_>>();
+/// assert_eq!(found(Filter::default()), [wall]);
+/// assert_eq!(found(Filter::default().with_sensors()), [wall, zone]);
+/// assert_eq!(found(Filter::default().with_sensors().except(wall)), [zone]);
+/// assert_eq!(found(Filter::default().groups(Groups { membership: !0, filter: 0b10 })), []);
+/// assert_eq!(found(Filter::default().world(1)), []);
+/// ```
 #[derive(Clone, Copy, Default)]
 pub struct Filter<'a> {
     /// The groups of what asks: bodies that it would not meet are left out.

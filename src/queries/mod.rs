@@ -13,6 +13,15 @@ use boxes::BoxRay;
 pub use filter::{Filter, Predicate};
 
 /// Where a ray, a moving shape or a point meets a collider.
+///
+/// ```
+/// use drystone::{Body, Shape, World, glam::Vec3, queries::{Filter, Hit, Queries}};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let hit: Hit = Queries::of(&world).ray(Vec3::Y * 2.0, Vec3::NEG_Y, 10.0, &Filter::default()).expect("the ground");
+/// assert_eq!((hit.distance, hit.point, hit.normal, hit.collider), (2.0, Vec3::ZERO, Vec3::Y, 0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The body.
@@ -53,6 +62,24 @@ pub type Found = (BodyHandle, usize);
 /// assert_eq!((hit.body, hit.distance, hit.normal), (ball, 7.5, Vec3::Y));
 /// let below = queries.ray(from, Vec3::NEG_Y, 100.0, &Filter::default().except(ball)).expect("the floor");
 /// assert_eq!(below.distance, 10.0);
+/// ```
+///
+/// ```
+/// use drystone::{Body, Shape, World, glam::{Quat, Vec3}, queries::{Filter, Queries}};
+///
+/// let mut world = World::new();
+/// let [a, b] = [2.0, 5.0].map(|x| world.insert(Body::fixed().shape(Shape::ball(1.0)).position(x, 0.0, 0.0)));
+/// let (queries, all) = (Queries::of(&world), Filter::default());
+/// let hits = queries.ray_all(Vec3::ZERO, Vec3::X, 10.0, &all);
+/// assert_eq!(hits.iter().map(|hit| hit.body).collect::<Vec<_>>(), [a, b]);
+/// assert_eq!(queries.point(Vec3::X * 2.5, &all), [(a, 0)]);
+/// let nearest = queries.closest(Vec3::X * 8.0, 5.0, &all).expect("the second ball");
+/// assert!(nearest.body == b && (nearest.distance - 2.0).abs() < 1e-5);
+/// assert_eq!(queries.overlapping(Vec3::new(3.5, -1.0, -1.0), Vec3::new(9.0, 1.0, 1.0), &all), [(b, 0)]);
+/// let cube = Shape::cuboid(0.5, 0.5, 0.5);
+/// assert_eq!(queries.intersecting(&cube, Vec3::X * 3.3, Quat::IDENTITY, &all), [(a, 0)]);
+/// let stopped = queries.cast(&cube, Vec3::ZERO, Quat::IDENTITY, Vec3::X, 10.0, &all).expect("the first ball");
+/// assert!(stopped.body == a && (stopped.distance - 0.5).abs() < 1e-4);
 /// ```
 pub struct Queries<'a> {
     world: &'a World,

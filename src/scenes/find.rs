@@ -15,6 +15,14 @@ impl Scene {
     /// Finds a scene by its catalogue name, else reads the file of that name, for which the feature `serde` is needed.
     /// `parameters` are `key=value`.
     ///
+    /// ```
+    /// let scene = drystone::Scene::find("tower", &["n=3".into()])?;
+    /// assert_eq!(scene.world.dynamic_count(), 3);
+    /// let unknown = drystone::Scene::find("towr", &[]).expect_err("a slip");
+    /// assert!(unknown.to_string().contains("tower"), "{unknown}");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Neither a known name nor a readable scene file; an unknown parameter or an impossible value.
     pub fn find(name_or_path: &str, parameters: &[String]) -> Result<Self> {
@@ -75,6 +83,12 @@ impl Scene {
 
     /// Finds a scene by one word, `name:key=value,...`: its parameters, how many `worlds` of it, and what to `vary`, each as in
     /// [`Scene::find_worlds`].
+    ///
+    /// ```
+    /// let towers = drystone::Scene::find_spec("tower:n=4,worlds=3,vary=n")?;
+    /// assert_eq!(towers.world.dynamic_count(), 4 + 5 + 6);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As there; worlds that are not a number.

@@ -8,6 +8,20 @@ use super::spawner::{Leaves, Spawner};
 use crate::world::World;
 
 /// A world, with what a run needs to know about it.
+///
+/// ```
+/// use drystone::{Body, Scene, Shape, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+/// let mut scene = Scene::new("a ball", world, 60).standing();
+/// scene.container = Some((Vec3::splat(-1.0), Vec3::splat(1.0)));
+/// assert!(scene.stands && scene.escaped(&scene.world) == 0);
+/// let mut after = scene.world.clone();
+/// after.bodies[ball].position.x = 3.0;
+/// assert_eq!(scene.escaped(&after), 1);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Name of the catalogue entry, or of the file.
@@ -31,6 +45,15 @@ pub struct Scene {
 }
 
 /// Bodies that stand or fall together.
+///
+/// ```
+/// use drystone::{Scene, scenes::Group};
+///
+/// let towers = Scene::find("tallest", &["n=4".into(), "step=2".into()])?;
+/// let Group { name, bodies } = &towers.groups[1];
+/// assert_eq!((name.as_str(), bodies.len()), ("4 cubes", 4));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group {
     /// Name for people.

@@ -3,6 +3,16 @@
 use crate::world::Body;
 
 /// Brings bodies that are alike: one every so many steps, at the same place with the same velocity, whatever is there already.
+///
+/// ```
+/// use drystone::{Body, Scene, Shape, World, scenes::{Leaves, Spawner}};
+///
+/// let ball = Body::dynamic().shape(Shape::ball(0.1)).position(0.0, 5.0, 0.0);
+/// let leaves = Leaves { below: Some(0.0), after: None };
+/// let mut scene = Scene::new("rain", World::new(), 600);
+/// scene.spawners.push(Spawner { leaves, count: Some(20), ..Spawner::new(ball, 10) });
+/// assert_eq!((scene.spawners[0].first, scene.spawners[0].every), (0, 10));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Spawner {
     /// The body as it comes.
@@ -27,6 +37,12 @@ impl Spawner {
 }
 
 /// When a body leaves its world; never by default.
+///
+/// ```
+/// use drystone::scenes::Leaves;
+///
+/// assert_eq!(Leaves::default(), Leaves { below: None, after: None });
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leaves {
     /// As soon as its center of mass is below this height (m).

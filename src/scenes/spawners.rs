@@ -106,6 +106,16 @@ impl Spawners {
     }
 
     /// What a scene needs to go on from here: the spawners, and the bodies that leave.
+    ///
+    /// ```
+    /// # use drystone::{Body, Scene, World, scenes::{Spawner, Spawners}};
+    /// let mut scene = Scene::new("rain", World::new(), 60);
+    /// scene.spawners.push(Spawner { count: Some(3), ..Spawner::new(Body::fixed(), 10) });
+    /// let mut spawners = Spawners::new(&scene);
+    /// (0..15).for_each(|_| spawners.before_step(&mut scene.world, scene.dt));
+    /// let (left, _) = spawners.remaining(scene.dt);
+    /// assert_eq!((left[0].first, left[0].count), (5, Some(1)));
+    /// ```
     pub fn remaining(&self, dt: f32) -> (Vec<Spawner>, Vec<(usize, Leaves)>) {
         let spawner = |(spawner, brought): (&Spawner, &u32)| {
             let first = steps_to_next(spawner, *brought, self.steps)?;

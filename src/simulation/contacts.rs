@@ -8,6 +8,21 @@ use crate::collide::MAX_POINTS;
 use crate::world::World;
 
 /// The contact of two colliders over one pair of convex parts, with the impulses of the whole step.
+///
+/// ```
+/// use drystone::{Body, Contact, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+/// (0..10).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// let contact: Contact = simulation.contacts().next().expect("the brick lies on the floor");
+/// assert!(contact.touches() && contact.b.body == brick && contact.normal == Vec3::Y);
+/// assert!(contact.points().len() == 4 && contact.points().iter().all(|point| point.impulse > 0.0));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The collider that the normal points away from.
@@ -24,6 +39,19 @@ pub struct Contact {
 }
 
 /// One point of a [`Contact`].
+///
+/// ```
+/// # use drystone::{Body, ContactPoint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(2.0, 0.5, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.step(1.0 / 60.0)?;
+/// let contact = simulation.contacts().next().expect("a ball on the floor");
+/// let ContactPoint { position, separation, .. } = contact.points()[0];
+/// assert!(position.distance(Vec3::X * 2.0) < 1e-3 && separation.abs() < 1e-6);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactPoint {
     /// Midway between the surfaces, where the bodies are now (m).

@@ -10,6 +10,16 @@ use crate::world::{BodyHandle, JointHandle};
 ///
 /// Each of the three adds up impulses over the substeps of a step, so that
 /// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is there.
+///
+/// ```
+/// use drystone::{Listen, Reference, Simulation, SolverConfig, World};
+///
+/// let mut simulation = Simulation::new(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.listen(Listen { hits_above: Some(0.5), ..Listen::default() })?;
+/// assert!(simulation.listen(Listen { hits_above: Some(-1.0), ..Listen::default() }).is_err());
+/// assert_eq!(simulation.listening().hits_above, Some(0.5));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Listen {
     /// Whether steps tell of contacts that began or ended.
@@ -35,6 +45,19 @@ impl Listen {
 }
 
 /// A collider, by its body and its place among the colliders of that body.
+///
+/// ```
+/// use drystone::{Body, ColliderOf, Reference, Shape, Simulation, SolverConfig, World};
+///
+/// let mut world = World::new();
+/// let room = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 1.0, 1.0)));
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.step(1.0 / 60.0)?;
+/// let [sensor, visitor] = [room, ball].map(|body| ColliderOf { body, collider: 0 });
+/// assert_eq!(simulation.overlaps(), [[sensor, visitor]]);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ColliderOf {
     /// The body. The handle is stale where the body was removed.
@@ -46,6 +69,28 @@ pub struct ColliderOf {
 crate::saved::fields!(ColliderOf { body, collider });
 
 /// Something that happened in a step; see [`Simulation::events`](crate::Simulation::events).
+///
+/// ```
+/// # use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.listen(Listen { contacts: true, ..Listen::default() })?;
+/// let mut landed = false;
+/// for _ in 0..60 {
+///     simulation.step(1.0 / 60.0)?;
+///     for event in simulation.events() {
+///         match event {
+///             Event::Began { b, .. } => landed |= b.body == ball,
+///             Event::Ended { .. } => panic!("the ball does not bounce"),
+///             _ => {}
+///         }
+///     }
+/// }
+/// assert!(landed);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
@@ -89,6 +134,24 @@ pub enum Event {
 }
 
 /// Two colliders that met faster than [`Listen::hits_above`].
+///
+/// ```
+/// # use drystone::{Body, Event, Hit, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.listen(Listen { hits_above: Some(1.0), ..Listen::default() })?;
+/// let mut hits: Vec<Hit> = Vec::new();
+/// for _ in 0..60 {
+///     simulation.step(1.0 / 60.0)?;
+///     hits.extend(simulation.events().iter().filter_map(|event| if let Event::Hit(hit) = event { Some(*hit) } else { None }));
+/// }
+/// // A ball of 524 kg that fell by 0.3 m.
+/// let [Hit { speed, normal, impulse, .. }] = hits[..] else { panic!("{hits:?}") };
+/// assert!((speed - 2.43).abs() < 0.01 && normal == Vec3::Y && impulse > 1200.0);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// That of the body with the lesser index.

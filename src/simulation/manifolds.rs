@@ -6,6 +6,22 @@ use crate::collide::{Detector, MAX_POINTS, Manifold, NO_SLOT, Pair};
 use crate::problem::{ContactRows, ImpulseRow, StepProblem};
 
 /// The contact of two bodies over one pair of convex parts, as the last step left it.
+///
+/// ```
+/// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedManifold, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+/// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// let manifold: SolvedManifold = simulation.manifolds().next().expect("a ball on the floor");
+/// assert_eq!((manifold.body_b, manifold.normal, manifold.points().len()), (ball, Vec3::Y, 1));
+/// // 6 kg for a substep of 1/480 s.
+/// assert_eq!(manifold.substeps, 8);
+/// assert!((manifold.normal_impulse() - 6.0 * 9.81 / 480.0).abs() < 1e-3);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolvedManifold {
     /// The body that the normal points away from.
@@ -32,6 +48,20 @@ pub struct SolvedManifold {
 }
 
 /// One contact point, as the last step left it.
+///
+/// ```
+/// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedPoint, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+/// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// let manifold = simulation.manifolds().next().expect("a ball on the floor");
+/// let SolvedPoint { r_b, separation, normal_impulse, .. } = manifold.points()[0];
+/// assert!(r_b.distance(Vec3::Y * -0.5) < 1e-3 && separation.abs() < 1e-3 && normal_impulse > 0.0);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolvedPoint {
     /// On the surface of a, in a's frame (m).
@@ -53,6 +83,20 @@ pub struct SolvedPoint {
 }
 
 /// The impulses of a step, summed over its substeps.
+///
+/// ```
+/// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, Summed, World, glam::Vec3};
+/// # let mut world = World::new();
+/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
+/// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// let manifold = simulation.manifolds().next().expect("a ball on the floor");
+/// let Summed { normal, friction } = manifold.points()[0].summed.expect("the simulation listens");
+/// assert!((normal - 6.0 * 9.81 / 60.0).abs() < 1e-2 && friction.length() < 1e-3);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summed {
     /// Normal impulse on b (N s).

@@ -47,6 +47,11 @@ impl Rollback {
     }
 
     /// Most states that it keeps.
+    ///
+    /// ```
+    /// let rollback = drystone::Rollback::new(8);
+    /// assert!(rollback.capacity() == 8 && rollback.is_empty());
+    /// ```
     pub fn capacity(&self) -> usize {
         self.capacity
     }

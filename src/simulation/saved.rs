@@ -8,6 +8,21 @@ use crate::saved::{Archive, Reader, Saved, Writer, hash_of};
 use crate::world::World;
 
 /// The state of a simulation between two steps, in memory: [`Simulation::snapshot`].
+///
+/// ```
+/// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// # let mut world = World::new();
+/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut state: drystone::Snapshot = simulation.snapshot();
+/// simulation.step(1.0 / 60.0)?;
+/// simulation.snapshot_into(&mut state);
+/// let hash = simulation.hash();
+/// simulation.step(1.0 / 60.0)?;
+/// simulation.restore(&state);
+/// assert_eq!(simulation.hash(), hash);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub struct Snapshot {
     world: World,
     config: SolverConfig,

@@ -37,6 +37,29 @@ const DRIFT_SWEEPS: u32 = 64;
 const LONGEST_MOMENTUM: u32 = 1024;
 
 /// A contact problem while it is solved.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::{Reference, config::Method, residuals::Residuals, solver::{Order, Solver}};
+///
+/// let mut solver = Solver::new(&problem, Method::Plain, Order::default(), None)?.with_passes(1);
+/// assert_eq!((solver.colors(), solver.adapter().is_empty()), (1, false));
+/// solver.advance(20)?;
+/// assert!(Residuals::of(&problem, &solver.impulses()).e_vel < 1e-9);
+/// assert!(solver.velocities()[0].linear.y.abs() < 1e-9);
+/// // The same in single precision on a backend.
+/// let mut rounded = Solver::new(&problem, Method::Plain, Order::Contacts, Some(Box::new(Reference::<f32>::new())))?;
+/// rounded.advance(20)?;
+/// assert!(Residuals::of(&problem, &rounded.impulses()).e_vel < 1e-5);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub struct Solver<'a> {
     operator: Operator<'a>,
     work: Work,

@@ -9,6 +9,22 @@ use crate::error::Result;
 use crate::residuals::{Measure, Residuals};
 
 /// A solved contact problem.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::solver::{Solution, solution};
+///
+/// let solved: Solution = solution(&problem, 1e-10, 1000)?;
+/// assert!(solved.residuals.e_vel <= 1e-10 && (solved.impulses[0].x - 6.0).abs() < 1e-6);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Solution {
@@ -24,6 +40,20 @@ pub struct Solution {
 
 /// Solves a problem in f64 by accelerated sweeps, contact by contact, until `e_vel` is at most `tolerance` or `most` sweeps
 /// are done; the best of them is the result, and its residuals say how good that is.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// let solved = drystone::solver::solution(&problem, 1e-10, 1000)?;
+/// assert!((solved.velocities[0].linear.x - 0.7).abs() < 1e-6);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 ///
 /// # Errors
 /// A contact whose second tangent is not, up to its sign, the normal times the first.

@@ -11,6 +11,18 @@ use crate::saved::{Archive, Columns, Saved};
 
 /// Names one body for as long as the body is in its world. The handle of a body that was removed names nothing from then on: the next body
 /// at the same index has another handle.
+///
+/// ```
+/// use drystone::{Body, BodyHandle, World};
+///
+/// let mut world = World::new();
+/// let handle: BodyHandle = world.insert(Body::fixed());
+/// assert_eq!(handle.index(), 0);
+/// world.remove(handle);
+/// // Another body takes the index, and not the handle.
+/// let other = world.insert(Body::fixed());
+/// assert!(other.index() == 0 && other != handle);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyHandle {
     index: u32,
@@ -30,6 +42,20 @@ impl BodyHandle {
 ///
 /// A removed body leaves a vacancy, a fixed body without shapes, which the next body of the same world fills. Indices depend on the
 /// order of the calls alone.
+///
+/// ```
+/// use drystone::{Body, World, world::Bodies};
+///
+/// let mut world = World::new();
+/// let [a, b] = ["a", "b"].map(|name| world.insert(Body::fixed().named(name)));
+/// world.remove(a);
+/// let bodies: &Bodies = &world.bodies;
+/// assert!(bodies.is_vacant(0) && !bodies.contains(a) && bodies.contains(b));
+/// assert_eq!((bodies.len(), bodies.count(), bodies.world_count()), (2, 1, 1));
+/// assert_eq!((bodies.handle(0), bodies.handle(1)), (None, Some(b)));
+/// assert!(bodies.handles().eq([b]));
+/// assert_eq!(bodies.worlds(), [0, 0]);
+/// ```
 #[derive(Debug, Default)]
 pub struct Bodies {
     all: Vec<Body>,

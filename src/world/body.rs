@@ -10,6 +10,14 @@ use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 
 /// How a body moves.
+///
+/// ```
+/// use drystone::{Body, BodyKind};
+///
+/// let mut gate = Body::kinematic();
+/// assert_eq!(gate.kind, BodyKind::Kinematic);
+/// gate.kind = BodyKind::Fixed;
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -31,6 +39,13 @@ crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
 /// Friction and restitution of a surface.
 ///
 /// Two materials combine: friction by the geometric mean, sqrt(a b); restitution by the larger.
+///
+/// ```
+/// use drystone::Material;
+///
+/// let (ice, rubber) = (Material { friction: 0.01, restitution: 0.0 }, Material { friction: 1.0, restitution: 0.8 });
+/// assert_eq!(ice.combine(rubber), Material { friction: 0.1, restitution: 0.8 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Coulomb coefficient mu, 0 or more.
@@ -55,6 +70,18 @@ impl Material {
 }
 
 /// A shape at a place on a body.
+///
+/// ```
+/// use drystone::{Body, Shape, glam::{Quat, Vec3}, world::Collider};
+///
+/// let hammer = Body::dynamic()
+///     .shape_at(Shape::cuboid(0.1, 0.05, 0.05), Vec3::Y * 0.4, Quat::IDENTITY)
+///     .shape(Shape::cylinder(0.4, 0.02));
+/// let head: &Collider = &hammer.colliders[0];
+/// assert!(!head.sensor);
+/// let (low, high) = head.bounds(Vec3::X, Quat::IDENTITY);
+/// assert!(low.distance(Vec3::new(0.9, 0.35, -0.05)) < 1e-6 && high.distance(Vec3::new(1.1, 0.45, 0.05)) < 1e-6);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Collider {
     /// The shape.
@@ -75,6 +102,39 @@ crate::saved::fields!(Collider { shape, position, rotation, sensor });
 /// use drystone::{Body, Shape};
 /// let brick = Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.25)).density(2000.0).position(0.0, 1.0, 0.0);
 /// assert_eq!(brick.mass.mass, 500.0);
+/// ```
+///
+/// ```
+/// use drystone::{Body, BodyKind, Groups, Shape, glam::{Quat, Vec3}};
+///
+/// let mut ball = Body::dynamic()
+///     .named("ball")
+///     .shape(Shape::ball(0.5))
+///     .total_mass(2.0)
+///     .friction(0.3)
+///     .restitution(0.5)
+///     .gravity_scale(0.5)
+///     .groups(Groups { membership: 0b1, filter: !0 })
+///     .rotation(Quat::from_rotation_y(0.3))
+///     .velocity(Vec3::X * 3.0, Vec3::Z);
+/// assert_eq!(ball.center_of_mass(), ball.position);
+/// assert_eq!(ball.velocity_at(Vec3::Y), Vec3::X * 2.0);
+/// assert_eq!(ball.smallest_half_extent(), 0.5);
+/// // 2 kg at 3 m/s, and 0.2 kg m² at 1 rad/s.
+/// assert!((ball.kinetic_energy() - 9.1).abs() < 1e-5 && (ball.angular_momentum().z - 0.2).abs() < 1e-6);
+/// assert!(ball.is_finite() && !ball.is_driven());
+/// ball.apply_force_at(Vec3::X, Vec3::Y);
+/// ball.apply_torque(Vec3::Z * 4.0);
+/// assert_eq!((ball.whole_force(), ball.whole_torque()), (Vec3::X, Vec3::Z * 3.0));
+/// ball.apply_angular_impulse(Vec3::Z * -0.2);
+/// assert!(ball.angular_velocity.length() < 1e-5);
+///
+/// // A kinematic body goes where it is told, and a sensor beside it sees what comes.
+/// let mut lift = Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0));
+/// lift = lift.sensor_at(Shape::cuboid(1.0, 0.5, 1.0), Vec3::Y * 0.6, Quat::IDENTITY);
+/// lift.move_to(Vec3::Y * 0.5, Quat::IDENTITY, 0.25);
+/// assert_eq!((lift.linear_velocity, lift.kind), (Vec3::Y * 2.0, BodyKind::Kinematic));
+/// assert!(lift.is_driven());
 /// ```
 #[derive(Debug)]
 pub struct Body {
@@ -282,6 +342,15 @@ impl Body {
     }
 
     /// Mass, center and inertia as given, instead of those of the shapes.
+    ///
+    /// ```
+    /// use drystone::{Body, MassProperties, Shape, glam::Vec3};
+    ///
+    /// let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
+    /// let low = MassProperties { center: Vec3::Y * -0.4, ..cube.mass };
+    /// let tumbler = cube.mass_properties(low);
+    /// assert_eq!(tumbler.center_of_mass(), Vec3::Y * -0.4);
+    /// ```
     pub fn mass_properties(mut self, mass: MassProperties) -> Self {
         self.mass = mass;
         self

@@ -25,6 +25,29 @@ use crate::saved::{Archive, Saved};
 /// let edges = (Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.1, 0.0, 0.0));
 /// world.join(Joint::new(door, edges.0, wall, edges.1).hinge(Vec3::Y).limited(0.0, 1.5).motor(0.3, 20.0));
 /// ```
+///
+/// ```
+/// use drystone::{Axis, Joint, Linear, glam::{Quat, Vec3}};
+///
+/// let anchors = (Vec3::X, Vec3::NEG_X);
+/// let ball = Joint::new(0, anchors.0, 1, anchors.1);
+/// assert!(ball.is_ball() && ball.holds_anchors() && ball.holds(0) && ball.holds(1) && !ball.holds(2));
+/// let door = ball.hinge(Vec3::Y).limited(0.0, 1.5).spring(0.0, 1.0, 0.7).breaking_at(500.0).colliding();
+/// assert!(door.holds_anchors() && !door.is_ball() && door.collide);
+/// let piston = ball.slider(Vec3::Y).motor(0.5, 100.0);
+/// let weld = ball.fixed();
+/// let [rope, rod, spring] = [ball.rope(2.0), ball.rod(2.0), ball.elastic(2.0, 1.5, 0.1)];
+/// assert_eq!(rope.linear, Linear::Distance(Axis::limited(0.0, 2.0)));
+/// assert_eq!(rod, ball.at_distance(Axis::limited(2.0, 2.0)));
+/// assert_eq!(spring, ball.at_distance(Axis::FREE.spring(2.0, 1.5, 0.1, f32::MAX)));
+/// // A screw without thread: free to shift along its axis and to turn about it.
+/// let bolt = ball.along(Vec3::Z).generic([Axis::FREE, Axis::LOCKED, Axis::LOCKED], [Axis::FREE, Axis::LOCKED, Axis::LOCKED]);
+/// // Angles are zero with body 0 turned by a quarter.
+/// let bolt = bolt.zero_at(Quat::from_rotation_z(1.5), Quat::IDENTITY);
+/// assert!(bolt.clone().first_axis().is_some() && weld.clone().first_axis().is_none());
+/// assert_eq!(Joint::to_world(0, anchors.0, Vec3::Y).body_b, None);
+/// # let _ = piston;
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     /// Index of one body.
@@ -51,6 +74,14 @@ pub struct Joint {
 }
 
 /// How a joint guides the anchor of a.
+///
+/// ```
+/// use drystone::{Axis, Joint, Linear, glam::Vec3};
+///
+/// let joint = Joint::to_world(0, Vec3::ZERO, Vec3::Y);
+/// assert_eq!(joint.linear, Linear::Axes([Axis::LOCKED; 3]));
+/// assert_eq!(joint.rope(1.0).linear, Linear::Distance(Axis::limited(0.0, 1.0)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Linear {
     /// Along each of the axes (m).

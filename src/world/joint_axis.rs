@@ -21,6 +21,13 @@ pub struct Axis {
 }
 
 /// Where an axis may be.
+///
+/// ```
+/// use drystone::{Axis, Bounds};
+///
+/// assert_eq!([Axis::FREE, Axis::LOCKED].map(|axis| axis.bounds), [Bounds::Free, Bounds::Locked]);
+/// assert_eq!(Axis::limited(-1.0, 2.0).bounds, Bounds::Between { min: -1.0, max: 2.0 });
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Bounds {
     /// Anywhere.
@@ -38,6 +45,14 @@ pub enum Bounds {
 }
 
 /// What drives an axis.
+///
+/// ```
+/// use drystone::{Axis, Drive};
+///
+/// let mut wheel = Axis::FREE.motor(20.0, 150.0);
+/// assert_eq!(wheel.drive, Drive::Motor { speed: 20.0, max_load: 150.0 });
+/// wheel.drive = Drive::None;
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Drive {
     /// Nothing.

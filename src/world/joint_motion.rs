@@ -11,6 +11,18 @@ use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
 use crate::error::{Result, ensure};
 
 /// Where body a of a joint is against body b, and how fast it moves there: three axes to shift along, then three to turn about.
+///
+/// ```
+/// use drystone::{Body, Joint, JointMotion, Shape, World, glam::{Quat, Vec3}};
+///
+/// let mut world = World::new();
+/// let door = Body::dynamic().shape(Shape::cuboid(0.5, 1.0, 0.02)).rotation(Quat::from_rotation_y(0.3));
+/// let door = world.add(door.velocity(Vec3::ZERO, Vec3::Y * 2.0));
+/// let hinge = Joint::to_world(door, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Y);
+/// let JointMotion { position, speed, .. } = world.joint_motion(&hinge);
+/// // The angle about the first axis, and its change.
+/// assert!((position[3] - 0.3).abs() < 1e-6 && (speed[3] - 2.0).abs() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
     /// Positions (m), then angles (rad): that about the first axis, between -pi and pi, and the two of the vector by which the first axis is
@@ -29,6 +41,14 @@ pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
 
 impl World {
     /// Where the axes of a joint stand, and how fast they move.
+    ///
+    /// ```
+    /// # use drystone::{Body, Joint, Shape, World, glam::Vec3};
+    /// let mut world = World::new();
+    /// let lift = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+    /// let slider = Joint::to_world(lift, Vec3::ZERO, Vec3::ZERO).slider(Vec3::Y);
+    /// assert!((world.joint_motion(&slider).position[0] - 2.0).abs() < 1e-6);
+    /// ```
     pub fn joint_motion(&self, joint: &Joint) -> JointMotion {
         let [anchor_a, anchor_b] = self.anchors(joint);
         let a = &self.bodies[joint.body_a];

@@ -6,6 +6,17 @@ use std::slice;
 use super::joint::Joint;
 
 /// Names one joint for as long as the joint is in its world.
+///
+/// ```
+/// use drystone::{Body, Joint, JointHandle, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// let body = world.add(Body::fixed());
+/// let handle: JointHandle = world.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO));
+/// assert!(world.joint(handle).is_some());
+/// world.remove_joint(handle);
+/// assert!(world.joint(handle).is_none());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JointHandle {
     number: u32,
@@ -16,6 +27,20 @@ crate::saved::fields!(JointHandle { number, generation });
 
 /// The joints of a world: a slice in the order in which they were inserted. The index of a joint falls by one with each joint before it that
 /// is removed; its handle stays.
+///
+/// ```
+/// use drystone::{Body, Joint, World, glam::Vec3, world::Joints};
+///
+/// let mut world = World::new();
+/// let body = world.add(Body::fixed());
+/// let [a, b] = [1.0, 2.0].map(|y| world.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::Y * y)));
+/// let joints: &mut Joints = &mut world.joints;
+/// assert_eq!(joints.handles(), [a, b]);
+/// joints.retain(|joint| joint.anchor_b.y > 1.5);
+/// assert_eq!((joints.index(a), joints.index(b)), (None, Some(0)));
+/// joints.clear();
+/// assert!(joints.is_empty());
+/// ```
 #[derive(Debug, Default)]
 pub struct Joints {
     all: Vec<Joint>,

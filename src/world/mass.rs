@@ -10,6 +10,19 @@ use crate::error::{Result, ensure};
 use crate::stats::largest;
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
+///
+/// ```
+/// use drystone::{Body, MassProperties, Shape, glam::{Mat3, Quat}};
+///
+/// let plate = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.5)).total_mass(12.0).mass;
+/// assert!(plate.is_anisotropic() && MassProperties::MASSES.contains(&plate.mass));
+/// let turned = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+/// // 12 kg (1² + 0.2²) / 12 across the plate, and 12 kg (1² + 1²) / 12 about its normal.
+/// let tensor = plate.world_inertia(turned);
+/// assert!((tensor.x_axis.x - 2.0).abs() < 1e-4 && (tensor.y_axis.y - 1.04).abs() < 1e-4);
+/// assert!((tensor * plate.world_inverse_inertia(turned)).abs_diff_eq(Mat3::IDENTITY, 1e-5));
+/// assert_eq!(Body::fixed().mass, MassProperties::IMMOVABLE);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// Mass (kg).

@@ -49,6 +49,33 @@ use limits::{is_place, is_within};
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// assert!(world.body(brick).is_none() && world.body(ball).is_some());
 /// ```
+///
+/// ```
+/// use drystone::{Body, Joint, Shape, World, glam::Vec3};
+///
+/// let mut world = World::new();
+/// let [a, b] = [0.0, 2.0].map(|x| world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).position(x, 1.0, 0.0)));
+/// world.bodies[a].linear_velocity = Vec3::X;
+/// // Joints have handles too, and an index until one before them goes.
+/// let rod = world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.9));
+/// world.joint_mut(rod).expect("just put in").break_force = 100.0;
+/// assert_eq!(world.anchors(world.joint(rod).expect("still there")), [Vec3::Y, Vec3::new(2.0, 1.0, 0.0)]);
+/// assert!((world.joint_gap() - 0.1).abs() < 1e-6);
+/// assert_eq!(world.join(Joint::to_world(b, Vec3::ZERO, Vec3::Y).rope(5.0)), 1);
+/// world.remove_joint(rod);
+/// world.check()?;
+///
+/// assert_eq!((world.dynamic_count(), world.dynamic().count(), world.first_non_finite()), (2, 2, None));
+/// assert_eq!((world.kinetic_energy(), world.linear_momentum().x), (0.5, 1.0));
+/// assert!((world.potential_energy() - 2.0 * 9.81).abs() < 1e-5);
+/// assert_eq!((world.angular_momentum().z, world.gravity_on(a).y), (-1.0, -9.81));
+///
+/// // A second world beside the first, whose bodies never meet those of the first.
+/// world.beside(&World::new());
+/// let other = world.insert_in(1, Body::fixed());
+/// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other.index()]));
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct World {
     /// Acceleration of gravity (m/s²) in every world without one of its own. A body feels its [`Body::gravity_scale`] of it.

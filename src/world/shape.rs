@@ -14,6 +14,29 @@ use crate::error::{Error, Result, ensure, input};
 ///
 /// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; triangle mesh and height field not on dynamic
 /// ones, since they have no mass; half-space only on fixed ones.
+///
+/// ```
+/// use drystone::{Shape, glam::Vec3};
+///
+/// let ball = Shape::ball(0.5);
+/// assert!(ball.is_ball() && ball.as_ball() == Some(0.5) && ball.is_same(&ball.clone()));
+/// let brick = Shape::cuboid(0.5, 0.25, 0.25);
+/// assert_eq!((brick.as_cuboid(), brick.volume()), (Some(Vec3::new(0.5, 0.25, 0.25)), 0.25));
+/// assert_eq!((brick.smallest_half_extent(), brick.triangles().1.len()), (0.25, 12));
+/// let [capsule, cylinder, cone] = [Shape::capsule(0.5, 0.1), Shape::cylinder(0.5, 0.1), Shape::cone(0.5, 0.1)];
+/// assert!(capsule.volume() > cylinder.volume() && cylinder.volume() > cone.volume());
+/// assert!((capsule.bounding_radius() - 0.6).abs() < 1e-6 && cone.parry().as_cone().is_some());
+/// let wedge = Shape::convex_hull(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z])?;
+/// assert!(wedge.has_volume() && Shape::convex_hull(&[Vec3::ZERO, Vec3::X, Vec3::Y]).is_err());
+///
+/// // Ground for bodies that move.
+/// let plane = Shape::half_space(Vec3::Y);
+/// assert!(plane.is_half_space() && plane.as_half_space() == Some(Vec3::Y));
+/// let ramp = Shape::mesh(vec![Vec3::ZERO, Vec3::Z, Vec3::new(1.0, 0.2, 0.0)], vec![[0, 1, 2]])?;
+/// let hills = Shape::height_field(&[vec![0.0, 0.3], vec![0.1, 0.0]], Vec3::new(10.0, 1.0, 10.0))?;
+/// assert!(!ramp.has_volume() && !hills.has_volume());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone)]
 pub struct Shape(pub(crate) SharedShape, Option<Arc<[Vec3]>>);
 

@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::output::{print, print_json};
 use super::progress::Progress;
-use super::scene::SceneArgs;
+use super::scene::{SceneArgs, WorldsArgs};
 use super::words;
 use drystone::backend::gpu::adapters;
 use drystone::backend::{BackendChoice, choose};
@@ -15,6 +15,8 @@ use drystone::{Error, Result};
 pub struct CompareArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    worlds: WorldsArgs,
     /// The two backends; the first is the reference.
     #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
@@ -31,7 +33,7 @@ impl CompareArgs {
         let &[a, b] = &self.backends[..] else {
             return Err(Error::input(format!("--backends: two are compared, {} were given", self.backends.len())));
         };
-        let (scene, config) = self.scene.load_awake()?;
+        let (scene, config) = self.scene.load_awake(&self.worlds)?;
         self.scene.set_threads(BackendChoice::Auto);
         let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.exact));
         let bodies = scene.world.dynamic_count();
@@ -46,11 +48,12 @@ impl CompareArgs {
         bar.finish();
         if self.scene.json {
             return print_json(&serde_json::json!({
-                "scene": scene.name, "backends": named, "exact": exact, "bodies": bodies, "dt": scene.dt,
+                "scene": scene.name, "backends": named, "exact": exact, "worlds": self.worlds.worlds, "bodies": bodies, "dt": scene.dt,
                 "config": config, "steps": found.steps, "first": found.first, "differing_steps": found.differing_steps(),
             }));
         }
-        print(format_args!("{} against {}, {bodies} dynamic bodies", named[1], named[0]))?;
+        let worlds = if self.worlds.worlds == 1 { String::new() } else { format!(" in {} worlds", self.worlds.worlds) };
+        print(format_args!("{} against {}, {bodies} dynamic bodies{worlds}", named[1], named[0]))?;
         print("  step   differ   position m     rotation        v m/s      w rad/s")?;
         for (step, d) in (1..).zip(&found.steps) {
             // The first four steps, the first that differs, every tenth part of the run, and the last step.

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::output::{print, replacing, say};
 use super::progress::Progress;
-use super::scene::{MACHINE, SceneArgs, SleepArgs};
+use super::scene::{MACHINE, SceneArgs, SleepArgs, WorldsArgs};
 use super::words;
 use crate::files;
 use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly, scene_of};
@@ -75,7 +75,7 @@ impl RenderArgs {
                 let simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
                 (scene_of(replay, &simulation), simulation.config().clone())
             }
-            None => args.load(1, None)?,
+            None => args.load(&WorldsArgs::ONE)?,
         };
         self.sleep.apply(&mut config);
         args.set_threads(self.backend);

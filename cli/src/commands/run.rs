@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::output::{plain_table, print, print_json, replacing, say};
 use super::progress::Progress;
-use super::scene::{BackendArgs, MACHINE, OUTPUT, SCENE, SceneArgs, SleepArgs, check_touching};
+use super::scene::{BackendArgs, MACHINE, OUTPUT, SceneArgs, SleepArgs, WorldsArgs, check_touching};
 use crate::files::{self, Draft};
 use crate::report::{RunReport, Trajectory};
 use drystone::backend::choose;
@@ -28,14 +28,8 @@ pub struct RunArgs {
     kernel_times: bool,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// Solve N separate worlds of the scene as one problem.
-    #[arg(long, value_name = "N", default_value_t = 1, help_heading = SCENE)]
-    worlds: u32,
-    /// Increase this parameter by one from each world to the next.
-    ///
-    /// Without it, all worlds are the same.
-    #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
-    vary: Option<String>,
+    #[command(flatten)]
+    worlds: WorldsArgs,
     /// Write the motion of all bodies except fixed ones as CSV.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out: Option<PathBuf>,
@@ -89,7 +83,7 @@ impl RunArgs {
     }
 
     pub fn run(&self) -> Result<()> {
-        let (mut scene, mut config) = self.scene.load(self.worlds as usize, self.vary.as_deref())?;
+        let (mut scene, mut config) = self.scene.load(&self.worlds)?;
         self.save_problem.iter().try_for_each(|save| check_save(save, &scene))?;
         if self.out_scene.is_some() {
             SceneFile::of(&scene).map_err(|e| e.within("--out-scene"))?;
@@ -124,6 +118,7 @@ impl RunArgs {
                         None => simulation.step(scene.dt)?,
                     },
                 };
+                report.count(&simulation, &spawners);
                 report.add(&stats);
                 if stats.fault.is_some() {
                     report.faults.last().iter().for_each(say);

@@ -87,6 +87,24 @@ pub(super) struct BackendArgs {
 }
 
 #[derive(Args)]
+pub(super) struct WorldsArgs {
+    /// Solve N separate worlds of the scene as one problem.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = SCENE)]
+    pub(super) worlds: u32,
+    /// Increase this parameter by one from each world to the next.
+    ///
+    /// Without it, all worlds are the same.
+    #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
+    pub(super) vary: Option<String>,
+}
+
+#[cfg(feature = "view")]
+impl WorldsArgs {
+    /// One world.
+    pub(super) const ONE: Self = Self { worlds: 1, vary: None };
+}
+
+#[derive(Args)]
 pub(super) struct SleepArgs {
     /// Keep all bodies awake.
     ///
@@ -104,21 +122,23 @@ impl SleepArgs {
 }
 
 impl SceneArgs {
-    /// The scene and the settings for a comparison: bodies sleep only with `--set sleep_after`.
-    pub(super) fn load_awake(&self) -> Result<(Scene, SolverConfig)> {
-        self.load_from(self.base()?.without_sleep(), 1, None)
+    /// The scene, or some worlds of it, and the settings for a comparison: bodies sleep only with `--set sleep_after`.
+    pub(super) fn load_awake(&self, worlds: &WorldsArgs) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?.without_sleep(), worlds)
     }
 
     /// The scene, or some worlds of it ([`Scene::find_worlds`]), and the settings.
-    pub(super) fn load(&self, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
-        self.load_from(self.base()?, worlds, vary)
+    pub(super) fn load(&self, worlds: &WorldsArgs) -> Result<(Scene, SolverConfig)> {
+        self.load_from(self.base()?, worlds)
     }
 
     fn base(&self) -> Result<SolverConfig> {
         self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
     }
 
-    fn load_from(&self, mut config: SolverConfig, worlds: usize, vary: Option<&str>) -> Result<(Scene, SolverConfig)> {
+    fn load_from(&self, mut config: SolverConfig, worlds: &WorldsArgs) -> Result<(Scene, SolverConfig)> {
+        let WorldsArgs { worlds, vary } = worlds;
+        let (worlds, vary) = (*worlds as usize, vary.as_deref());
         for assignment in &self.set {
             settings::set(&mut config, assignment)?;
         }

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::scene::{BackendArgs, SceneArgs, SleepArgs};
+use super::scene::{BackendArgs, SceneArgs, SleepArgs, WorldsArgs};
 use crate::view::{ColorBy, Live, window};
 use drystone::Result;
 
@@ -30,7 +30,7 @@ impl ViewArgs {
                 self.color,
             )?));
         }
-        let (scene, mut config) = self.scene.load(1, None)?;
+        let (scene, mut config) = self.scene.load(&WorldsArgs::ONE)?;
         self.sleep.apply(&mut config);
         self.scene.set_threads(self.backend.choice);
         window::run(Box::new(Live::new(scene, config, self.backend.choice, self.backend.exact, self.color)?))

@@ -1,6 +1,9 @@
 //! Report of one run, as rows and as JSON.
 
+mod counted;
 mod rows;
+
+pub use counted::SensorCount;
 
 use std::ops::Range;
 
@@ -54,6 +57,11 @@ pub struct RunReport {
     pub most_substeps: u32,
     /// The contact that asked for most substeps in that last step.
     pub hardest_contact: Option<HardestContact>,
+    /// Bodies that came and left during the run; none in a scene without such.
+    pub came: Option<u32>,
+    pub left: Option<u32>,
+    /// What each sensor counted.
+    pub sensors: Vec<SensorCount>,
     pub asleep: usize,
     /// The first step after which a body slept.
     pub first_asleep_step: Option<u32>,
@@ -111,6 +119,9 @@ pub struct RunReport {
     places: Vec<(Vec3, f64)>,
     #[serde(skip)]
     stands: bool,
+    /// Dynamic bodies after the last step.
+    #[serde(skip)]
+    bodies_now: usize,
 }
 
 /// Number of dynamic bodies of a group, and of those in place.
@@ -170,6 +181,8 @@ impl RunReport {
             adapter: backend.adapter(),
             worlds: scene.world.world_count(),
             bodies: scene.world.dynamic_count(),
+            bodies_now: scene.world.dynamic_count(),
+            sensors: counted::of(&scene.world),
             dt: scene.dt,
             config: config.clone(),
             joints: scene.world.joints.len(),
@@ -190,7 +203,7 @@ impl RunReport {
         if self.asleep > 0 {
             self.first_asleep_step.get_or_insert(self.steps);
         }
-        let all_sleep = self.asleep > 0 && self.asleep == self.bodies;
+        let all_sleep = self.asleep > 0 && self.asleep == self.bodies_now;
         self.all_asleep_step = all_sleep.then(|| self.all_asleep_step.unwrap_or(self.steps));
         // Without a dispatch all bodies slept when the step began.
         if self.asleep > 0 && stats.dispatches == 0 {

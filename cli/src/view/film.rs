@@ -114,7 +114,7 @@ impl Film {
     }
 
     pub fn bounds(&self) -> Bounds {
-        let of = |frame: &Frame| bounds_at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
+        let of = |frame: &Frame| bounds_at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses, MARGIN);
         self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(of(frame)))
     }
 
@@ -148,17 +148,25 @@ pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
 }
 
-/// The bounds of everything that moves in a world, with a margin, and of the points from which bodies hang.
+/// The bounds of everything that moves in a world, with a margin, of sensors, and of the points from which bodies hang.
 pub fn bounds(world: &World) -> Bounds {
-    bounds_at(world, &poses(world))
+    bounds_at(world, &poses(world), MARGIN)
 }
 
-fn bounds_at(world: &World, poses: &Poses) -> Bounds {
-    let moving = world.bodies.iter().zip(poses).filter(|(b, _)| b.kind != BodyKind::Fixed);
-    let around = moving.map(|(body, &(position, rotation))| {
-        let bounds = body.colliders.iter().map(|c| c.bounds(position, rotation));
+/// The same without a margin: what lies outside on the side of the eye only hides it.
+pub fn tight_bounds(world: &World) -> Bounds {
+    bounds_at(world, &poses(world), 0.0)
+}
+
+/// Room on each side of a body, as a share of its size.
+const MARGIN: f32 = 0.25;
+
+fn bounds_at(world: &World, poses: &Poses, margin: f32) -> Bounds {
+    let around = world.bodies.iter().zip(poses).map(|(body, &(position, rotation))| {
+        let shown = body.colliders.iter().filter(|c| body.kind != BodyKind::Fixed || c.sensor);
+        let bounds = shown.map(|c| c.bounds(position, rotation));
         let body = bounds.fold(Bounds::EMPTY, |all, (low, high)| all.join(Bounds { low, high }));
-        let room = 0.25 * (body.high - body.low);
+        let room = margin * (body.high - body.low);
         Bounds { low: body.low - room, high: body.high + room }
     });
     let hung = world.joints.iter().filter(|j| j.body_b.is_none());

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::camera::Bounds;
 use super::colors::ColorBy;
-use super::film::bounds;
+use super::film::{bounds, tight_bounds};
 use super::overlay::Overlay;
 use super::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
@@ -69,6 +69,9 @@ pub(super) struct Grabbed {
 pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
     let mut scene = Scene::new(replay.title(), simulation.world.clone(), replay.len());
     scene.dt = replay.dt().unwrap_or(scene.dt);
+    // A recording has no container; near walls hide its bodies all the same.
+    let Bounds { low, high } = tight_bounds(&scene.world);
+    scene.container = low.is_finite().then_some((low, high));
     scene
 }
 
@@ -364,6 +367,10 @@ mod tests {
             .collect();
         let replay = Replay::read(&recorder.finish(&mut simulation).expect("memory")).expect("a recording");
         let mut live = Live::of_recording(replay, BackendChoice::Reference, false, ColorBy::Batch).expect("a scene");
+        // Whatever stands before the bodies is not drawn.
+        let Bounds { low, high } = live.container().expect("bodies");
+        let mut bodies = live.world().dynamic().map(|body| body.position);
+        assert!(bodies.all(|at| at.cmpgt(low).all() && at.cmplt(high).all()));
         (0..70).for_each(|_| live.step().expect("a step"));
         live.key(&Key::Named(NamedKey::ArrowLeft), true).expect("a key");
         assert_eq!((live.steps, live.simulation.hash()), (10, hashes[9]));

@@ -38,6 +38,10 @@ pub fn poses(world: &World) -> Vec<(Vec3, Quat)> {
 const PLAIN: u32 = 0;
 const CHECKERED: u32 = 1;
 const OCTANTS: u32 = 2;
+const SENSOR: u32 = 3;
+
+/// What is seen of a sensor lets the bodies in it be seen too.
+const SENSOR_COLOR: [u8; 4] = [40, 110, 220, 255];
 
 /// Cosine of the largest angle between faces of a smooth surface, 35 degrees.
 const SMOOTH: f32 = 0.82;
@@ -80,6 +84,7 @@ impl Meshes {
                 };
                 let plane = shape.as_half_space();
                 let pattern = match (plane, collider.shape.as_ball()) {
+                    _ if collider.sensor => SENSOR,
                     (Some(_), _) => CHECKERED,
                     (_, Some(_)) => OCTANTS,
                     _ => PLAIN,
@@ -137,7 +142,7 @@ impl Meshes {
             }
             Instance {
                 position: center.to_array(),
-                color: colors[part.body],
+                color: if part.pattern == SENSOR { SENSOR_COLOR } else { colors[part.body] },
                 rotation: turn.to_array(),
                 scale: scale.to_array(),
                 pattern: part.pattern,

@@ -210,7 +210,9 @@ impl Open {
             if panel {
                 let corner = ui.ctx().content_rect().right_top() + egui::vec2(-8.0, 8.0);
                 let window = egui::Window::new(show.title()).pivot(egui::Align2::RIGHT_TOP).default_pos(corner);
-                let shown = window.resizable(false).show(ui.ctx(), |ui| show.panel(ui));
+                // A panel that is higher than the window scrolls.
+                let most = ui.ctx().content_rect().height() - 64.0;
+                let shown = window.resizable(false).vscroll(true).max_height(most).show(ui.ctx(), |ui| show.panel(ui));
                 width = shown.map_or(0.0, |s| s.response.rect.width() * ui.ctx().pixels_per_point());
             }
         });

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::camera::Bounds;
 use super::colors::{Rgba, batch_color};
 use super::mesh::Poses;
-use drystone::{BodyKind, Joint, Simulation, SolvedManifold, World};
+use drystone::{BodyKind, Joint, Linear, Simulation, SolvedManifold, World};
 
 /// An end of a line, in the layout of the shader.
 #[repr(C)]
@@ -28,15 +28,24 @@ const JOINT: Rgba = [30, 90, 200, 255];
 const GAP: Rgba = [220, 30, 30, 255];
 const BOX: Rgba = [90, 90, 90, 255];
 
-/// Lines from bodies to their anchors in the world, as pairs of ends.
+/// Lines between the anchors of joints that hold a distance, and from bodies to anchors in the world that lie outside of them, as pairs of
+/// ends.
 pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
-    let hung = world.joints.iter().filter(|j| j.body_b.is_none());
+    let line = |ends: [Vec3; 2]| Some(ends.map(|p| LineEnd { position: p.to_array(), color: BOX }));
     let rope = |j: &Joint| {
         let (position, rotation) = poses[j.body_a];
-        let center = position + rotation * world.bodies[j.body_a].mass.center;
-        [center, j.anchor_b].map(|p| LineEnd { position: p.to_array(), color: BOX })
+        let on_b = j.body_b.map_or(j.anchor_b, |b| poses[b].0 + poses[b].1 * j.anchor_b);
+        if let Linear::Distance(_) = j.linear {
+            return line([position + rotation * j.anchor_a, on_b]);
+        }
+        let body = &world.bodies[j.body_a];
+        let is_inside = |(low, high): (Vec3, Vec3)| low.cmple(on_b).all() && on_b.cmple(high).all();
+        if j.body_b.is_some() || body.colliders.iter().any(|c| is_inside(c.bounds(position, rotation))) {
+            return None;
+        }
+        line([position + rotation * body.mass.center, on_b])
     };
-    hung.flat_map(rope).collect()
+    world.joints.iter().filter_map(rope).flatten().collect()
 }
 
 /// Lines as pairs of ends; crosses and normals have the length `size` (m).

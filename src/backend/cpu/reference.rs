@@ -17,6 +17,14 @@ use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, JointRow, MOST_AXES, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
+///
+/// ```
+/// use drystone::{Backend, Reference};
+///
+/// assert_eq!(Reference::<f32>::new().name(), "reference");
+/// // The same kernels in double precision, to see what rounding does.
+/// assert!(Reference::<f64>::new().rows().bodies.is_empty());
+/// ```
 #[derive(Debug, Default)]
 pub struct Reference<S> {
     rows: KernelRows<S>,

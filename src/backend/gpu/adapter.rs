@@ -5,6 +5,13 @@ use std::fmt;
 use crate::error::{Error, Result};
 
 /// An adapter, as reports name it.
+///
+/// ```
+/// use drystone::backend::gpu::{AdapterSummary, adapters};
+///
+/// let exact: Vec<AdapterSummary> = adapters().into_iter().filter(|adapter| adapter.exact).collect();
+/// println!("{} adapters give the bits of the reference", exact.len());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSummary {
     /// Its own name.
@@ -32,6 +39,13 @@ impl fmt::Display for AdapterSummary {
 }
 
 /// Which adapter to open.
+///
+/// ```
+/// use drystone::backend::gpu::{AdapterChoice, adapters, open_device};
+///
+/// let hardware = adapters().iter().any(|adapter| adapter.hardware);
+/// assert_eq!(open_device(AdapterChoice::Hardware).is_ok(), hardware);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AdapterChoice {
@@ -48,6 +62,12 @@ const INSTALL: &str = "install a graphics driver, or the software one: `apt-get 
 /// Adapters that can run the kernels, the one with the most hardware first.
 ///
 /// The variable `DRYSTONE_ADAPTER` narrows them to those whose name, API or driver contains it; `none` hides all.
+///
+/// ```
+/// for adapter in drystone::backend::gpu::adapters() {
+///     println!("{adapter}");
+/// }
+/// ```
 pub fn adapters() -> Vec<AdapterSummary> {
     found().into_iter().map(|(_, summary)| summary).collect()
 }
@@ -78,6 +98,14 @@ pub(super) fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, 
 }
 
 /// Opens the adapter that `choice` finds, for drawing.
+///
+/// ```
+/// use drystone::backend::gpu::{AdapterChoice, adapters, open_device};
+///
+/// if let Ok((_device, _queue, summary)) = open_device(AdapterChoice::Best) {
+///     assert_eq!(summary, adapters()[0]);
+/// }
+/// ```
 ///
 /// # Errors
 /// No such adapter, or it cannot be opened.

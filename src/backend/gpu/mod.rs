@@ -52,6 +52,16 @@ const SOFTWARE_ROWS_A_THREAD: u32 = 4;
 const MOST_DEVICES: usize = 3;
 
 /// Follows plans on a device through wgpu.
+///
+/// ```
+/// use drystone::{Backend, Gpu, backend::gpu::{AdapterChoice, adapters}};
+///
+/// // A machine without an adapter gets one clear line.
+/// match Gpu::new(AdapterChoice::Best, false) {
+///     Ok(gpu) => assert!(gpu.summary() == &adapters()[0] && !gpu.is_exact() && gpu.cut_as_hardware().name() == "gpu"),
+///     Err(refusal) => assert!(refusal.to_string().starts_with("no adapter found")),
+/// }
+/// ```
 pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,

@@ -9,6 +9,13 @@ use crate::suggest::hint;
 pub const MOST_BODIES: f64 = 4e6;
 
 /// A number that shapes a scene of the catalogue.
+///
+/// ```
+/// use drystone::scenes::{CATALOGUE, Parameter};
+///
+/// let parameters: Vec<&Parameter> = CATALOGUE.iter().flat_map(|entry| entry.parameters).collect();
+/// assert!(parameters.iter().all(|p| (p.range.0..=p.range.1).contains(&p.default)));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Parameter {
     /// Name, as in `name=value`.
@@ -43,6 +50,16 @@ impl Parameter {
 }
 
 /// A scene of the catalogue.
+///
+/// ```
+/// use drystone::scenes::{CATALOGUE, Entry, Parameter};
+///
+/// let tower: &Entry = CATALOGUE.iter().find(|entry| entry.name == "tower").expect("it is there");
+/// let Parameter { name, default, whole, .. } = &tower.parameters[0];
+/// assert_eq!((*name, *default, *whole), ("n", 10.0, true));
+/// assert_eq!(tower.body_count(&["n=7".into()])?, 7);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// Name, as [`Scene::find`] knows it.

@@ -337,7 +337,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("every", 120, (1.0, 1e6), "steps from one box to the next"),
         ],
         bodies: |_| 1.0,
-        build: |v| Ok(flow::conveyor(v[0] as f32, v[1] as f32, v[2] as u32)),
+        build: |v| flow::conveyor(v[0] as f32, v[1] as f32, v[2] as u32),
     },
     Entry {
         name: "turnstile",
@@ -348,5 +348,17 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |_| 1.0,
         build: |v| Ok(flow::turnstile(v[0] as u32, v[1] as u32)),
+    },
+    Entry {
+        name: "galton",
+        summary: "balls fall past rows of pins into bins, and sensors count them: all that came pass the gate, and each is in a bin",
+        parameters: &[
+            Parameter::whole("n", 60, (1.0, 1000.0), "number of balls"),
+            Parameter::whole("rows", 8, (2.0, 50.0), "rows of pins; one bin more"),
+            Parameter::whole("every", 15, (12.0, 1e6), "steps from one ball to the next"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the places where balls come"),
+        ],
+        bodies: |_| 0.0,
+        build: |v| Ok(flow::galton(v[0] as u32, v[1] as usize, v[2] as u32, v[3] as u64)),
     },
 ];

@@ -71,6 +71,15 @@ impl SceneFile {
 
 /// Reads the scene file `path`.
 ///
+/// ```
+/// let path = std::env::temp_dir().join(format!("drystone-{}.json", std::process::id()));
+/// let text = r#"{"version": 1, "bodies": [{"shapes": [{"type": "ball", "radius": 0.5}]}]}"#;
+/// std::fs::write(&path, text).map_err(drystone::Error::file(&path))?;
+/// assert_eq!(drystone::scenes::load(&path)?.world.dynamic_count(), 1);
+/// # std::fs::remove_file(&path).map_err(drystone::Error::file(&path))?;
+/// # Ok::<(), drystone::Error>(())
+/// ```
+///
 /// # Errors
 /// The file cannot be read, or says something that no scene can be made of: one line that names the file and the place.
 pub fn load(path: &Path) -> Result<Scene> {
@@ -80,6 +89,10 @@ pub fn load(path: &Path) -> Result<Scene> {
 }
 
 /// The JSON Schema of scene files.
+///
+/// ```
+/// assert_eq!(drystone::scenes::schema()["title"], "Scene");
+/// ```
 pub fn schema() -> Value {
     schemars::schema_for!(SceneFile).to_value()
 }

@@ -16,6 +16,37 @@ use crate::world::{BodyKind, Groups};
 /// assert_eq!(scene.world.dynamic_count(), 1);
 /// # Ok::<(), drystone::Error>(())
 /// ```
+///
+/// ```
+/// use drystone::scenes::{
+///     AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
+///     SpawnerFile, SpringFile,
+/// };
+///
+/// let text = r#"{"version": 1,
+///     "bodies": [
+///         {"name": "door", "position": [0.5, 1, 0], "leaves": {"after": 9},
+///          "mass_properties": {"mass": 20, "principal_inertia": [1, 1, 1]},
+///          "shapes": [{"type": "cuboid", "half_extents": [0.5, 1, 0.02]}]},
+///         {"name": "lamp", "position": [3, 1, 0], "shapes": [{"type": "ball", "radius": 0.1}]}],
+///     "joints": [
+///         {"type": "hinge", "bodies": ["door"], "anchor": [0, 1, 0], "axis": [0, 1, 0], "motor": {"speed": 1, "max_load": 9}},
+///         {"type": "generic", "bodies": [1], "anchor": [3, 2, 0], "linear": [{}, {"spring": {"frequency": 2}}, {}], "angular": [{}, {}, {}]}],
+///     "spawners": [{"every": 60, "body": {"shapes": [{"type": "ball", "radius": 0.3}]}}]}"#;
+/// let file = SceneFile::parse(text)?;
+/// let [BodyFile { leaves, mass_properties, shapes, .. }, _] = &file.bodies[..] else { panic!("two bodies") };
+/// assert!(matches!(leaves, Some(LeavesFile { after: Some(9.0), below: None })));
+/// assert!(matches!(mass_properties, Some(MassFile { mass: 20.0, .. })));
+/// assert!(matches!(&shapes[..], [ShapeFile { geometry: Geometry::Cuboid { .. }, sensor: false, .. }]));
+/// let [door, lamp]: &[JointFile; 2] = file.joints[..].try_into().expect("two joints");
+/// assert!(matches!(&door.bodies[..], [BodyRef::Name(name)] if name == "door"));
+/// assert!(matches!(&door.kind, JointKind::Hinge { motor: Some(MotorFile { speed: 1.0, .. }), .. }));
+/// let JointKind::Generic { linear, .. } = &lamp.kind else { panic!("a generic joint") };
+/// assert!(matches!(linear[1], AxisFile { spring: Some(SpringFile { frequency: 2.0, .. }), .. }));
+/// assert!(matches!(file.spawners[..], [SpawnerFile { every: 60, first: 0, .. }]));
+/// assert_eq!(file.into_scene("room")?.world.dynamic_count(), 2);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Scene")]

@@ -7,6 +7,16 @@ use super::system::{Cone, System};
 use crate::contacts::LocalProblem;
 
 /// A problem that is given by its W.
+///
+/// ```
+/// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
+/// # let rows = vec![vec![(0, DMat3::IDENTITY * 0.5)]];
+/// # let problem = LocalProblem { name: "one contact".into(), friction: vec![0.1], free: vec![DVec3::X * -3.0], rows };
+/// use drystone::solver::newton::{Blocks, newton};
+///
+/// let solved = newton(&mut Blocks::new(&problem), 1e-8, 1000);
+/// assert!((solved.impulses[0].x - 6.0).abs() < 1e-6);
+/// ```
 pub struct Blocks<'a> {
     problem: &'a LocalProblem,
     cones: Vec<Cone>,

@@ -13,6 +13,20 @@ use crate::contacts::{ContactProblem, Operator};
 use crate::solver::{Order, Sequence};
 
 /// A problem of rigid bodies.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::solver::newton::{Bodies, System};
+///
+/// assert_eq!(Bodies::new(&problem).cones().len(), 1);
+/// ```
 pub struct Bodies {
     cones: Vec<Cone>,
     sequence: Vec<u32>,

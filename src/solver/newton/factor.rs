@@ -8,6 +8,22 @@ use super::elimination::eliminate;
 pub type Block<const N: usize> = [[f64; N]; N];
 
 /// The matrix, and then its factors in its place.
+///
+/// ```
+/// use drystone::solver::newton::Factor;
+///
+/// // 1 + [[3, 1], [1, 4]] with two nodes of one unknown.
+/// let mut factor = Factor::<1>::new(2, [[0, 1]]);
+/// factor.clear();
+/// for (row, column, value) in [(0, 0, 3.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 4.0)] {
+///     factor.block_mut(row, column)[0][0] += value;
+/// }
+/// assert!(factor.multiplications() > 0.0);
+/// factor.factor().expect("no pivot is singular");
+/// let mut x = [[9.0], [20.0]];
+/// factor.solve(&mut x);
+/// assert!((x[0][0] - 25.0 / 19.0).abs() < 1e-12 && (x[1][0] - 71.0 / 19.0).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Factor<const N: usize> {
     /// The place of each node in the order of elimination.

@@ -41,6 +41,14 @@ const PATIENCE: u32 = 12;
 const LAST_DIGITS: f64 = 100.0;
 
 /// What ended a solve.
+///
+/// ```
+/// use drystone::{contacts::LocalProblem, solver::newton::{Blocks, Ended, newton}};
+///
+/// // Nothing to solve.
+/// let nothing = LocalProblem::default();
+/// assert_eq!(newton(&mut Blocks::new(&nothing), 1e-8, 10).ended, Ended::FirstSweeps);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -56,6 +64,13 @@ pub enum Ended {
 }
 
 /// What ended Newton's method.
+///
+/// ```
+/// use drystone::{contacts::LocalProblem, solver::newton::{Blocks, NewtonEnded, newton}};
+///
+/// let nothing = LocalProblem::default();
+/// assert_eq!(newton(&mut Blocks::new(&nothing), 1e-8, 10).newton, NewtonEnded::NotBegun);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
@@ -71,6 +86,21 @@ pub enum NewtonEnded {
 }
 
 /// A problem solved as far as it went.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::solver::newton::{Bodies, Ended, Outcome, newton};
+///
+/// let outcome: Outcome = newton(&mut Bodies::new(&problem), 1e-8, 1000);
+/// assert_ne!(outcome.ended, Ended::Limit);
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Outcome {
@@ -98,6 +128,21 @@ impl Outcome {
 }
 
 /// Solves a problem until `e_vel` is at most `tolerance`, with at most `most` sweeps.
+///
+/// ```
+/// # use drystone::contacts::{FreeBody, PointContact, Velocity};
+/// # use drystone::{ContactProblem, glam::{DMat3, DVec3}};
+/// # let free = Velocity { linear: DVec3::new(1.0, -3.0, 0.0), angular: DVec3::ZERO };
+/// # let ball = FreeBody { mass: 2.0, inertia: DMat3::IDENTITY, free };
+/// # let frame = [DVec3::Y, DVec3::Z, DVec3::X];
+/// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
+/// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
+/// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
+/// use drystone::solver::newton::{Bodies, newton};
+///
+/// let solved = newton(&mut Bodies::new(&problem), 1e-8, 1000);
+/// assert!(solved.e_vel <= 1e-8 && (solved.impulses[0].x - 6.0).abs() < 1e-6);
+/// ```
 pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
     let zero = vec![DVec3::ZERO; system.cones().len()];
     let mut best = Outcome {

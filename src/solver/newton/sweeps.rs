@@ -16,6 +16,19 @@ struct State {
 }
 
 /// A problem while it is swept.
+///
+/// ```
+/// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
+/// # let rows = vec![vec![(0, DMat3::IDENTITY * 0.5)]];
+/// # let problem = LocalProblem { name: "one contact".into(), friction: vec![0.1], free: vec![DVec3::X * -3.0], rows };
+/// use drystone::{config::Method, solver::newton::{Blocks, Sweeps}};
+///
+/// let system = Blocks::new(&problem);
+/// let mut sweeps = Sweeps::new(&system, Method::Plain, vec![DVec3::ZERO]);
+/// assert!(sweeps.error(&system) > 0.5);
+/// (0..30).for_each(|_| sweeps.advance(&system));
+/// assert!(sweeps.error(&system) < 1e-8 && (sweeps.impulses()[0].x - 6.0).abs() < 1e-6);
+/// ```
 pub struct Sweeps {
     method: Method,
     /// After the last sweep, after the one before, and where the next begins.

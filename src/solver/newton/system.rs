@@ -6,6 +6,23 @@ use glam::{DMat3, DVec3};
 ///
 /// [`Self::factor`] and [`Self::solve`] are a direct solver of 1 + D W for any D in blocks; with an approximate D they precondition
 /// other methods.
+///
+/// ```
+/// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
+/// # let rows = vec![vec![(0, DMat3::IDENTITY * 0.5)]];
+/// # let problem = LocalProblem { name: "one contact".into(), friction: vec![0.1], free: vec![DVec3::X * -3.0], rows };
+/// use drystone::solver::newton::{Blocks, System};
+///
+/// let mut system = Blocks::new(&problem);
+/// assert_eq!((system.sequence(), system.cones()[0].mu), (&[0][..], 0.1));
+/// assert_eq!(system.response(0, &[DVec3::X], &system.carried(&[DVec3::X])), DVec3::X * 0.5);
+/// system.push(0, DVec3::X, &mut []);
+/// let (factor, sweep) = system.work();
+/// assert!(factor > sweep);
+/// // (1 + 2 * 0.5) x = b, and W x = 0.5 x.
+/// system.factor(&[DMat3::IDENTITY * 2.0]).expect("no pivot is singular");
+/// assert_eq!(system.solve(&[DVec3::X * 4.0]), [DVec3::X]);
+/// ```
 pub trait System {
     /// What each contact is by itself.
     fn cones(&self) -> &[Cone];
@@ -37,6 +54,13 @@ pub trait System {
 }
 
 /// What one contact is by itself.
+///
+/// ```
+/// use drystone::{glam::{DMat3, DVec3}, solver::newton::Cone};
+///
+/// let cone = Cone::new(0.3, DVec3::ZERO, DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0)));
+/// assert_eq!((cone.rho, cone.tangent_step), (0.5, 1.0 / 3.0));
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Cone {

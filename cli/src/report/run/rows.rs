@@ -1,14 +1,18 @@
 //! The report of a run as a table.
 
-use super::RunReport;
+use super::{RunReport, SensorCount};
 use drystone::stats::median;
+
+/// Most sensors of which each has a row.
+const MOST_SENSORS: usize = 20;
 
 impl RunReport {
     pub fn rows(&self) -> Vec<(String, String)> {
         let mut rows = Vec::new();
         let mut row = |what: &str, value: String| rows.push((what.to_owned(), value));
         let (substeps, iterations, relax) = (self.config.substeps, self.config.iterations, self.config.relax);
-        row("scene", format!("{}, {} dynamic bodies", self.scene, self.bodies));
+        let at_first = if self.came.is_some() { " at first" } else { "" };
+        row("scene", format!("{}, {} dynamic bodies{at_first}", self.scene, self.bodies));
         if self.worlds > 1 {
             let steps = self.worlds as f64 / (1e-3 * median(&self.awake_times));
             row("worlds", format!("{}, {steps:.3e} steps of one world a second", self.worlds));
@@ -26,7 +30,21 @@ impl RunReport {
             let first = self.first_asleep_step.filter(|_| self.first_asleep_step != self.all_asleep_step);
             let first = first.map_or_else(String::new, |first| format!(", the first {}", after(first)));
             let all = self.all_asleep_step.map(|all| format!("all bodies {}", after(all)));
-            row("asleep", all.unwrap_or_else(|| format!("{} of {} bodies", self.asleep, self.bodies)) + &first);
+            row("asleep", all.unwrap_or_else(|| format!("{} of {} bodies", self.asleep, self.bodies_now)) + &first);
+        }
+        if let (Some(came), Some(left)) = (self.came, self.left) {
+            row("bodies", format!("{came} came, {left} left, {} dynamic bodies at the end", self.bodies_now));
+        }
+        if !self.sensors.is_empty() {
+            let sum = |of: fn(&SensorCount) -> u64| self.sensors.iter().map(of).sum::<u64>();
+            let (entered, left) = (sum(|sensor| sensor.entered), sum(|sensor| sensor.left));
+            row("sensors", format!("{}: {entered} times entered, {left} times left", self.sensors.len()));
+            for SensorCount { sensor, entered, left, inside, .. } in self.sensors.iter().take(MOST_SENSORS) {
+                row(&format!("  {sensor}"), format!("{entered} entered, {left} left, {inside} inside"));
+            }
+            if self.sensors.len() > MOST_SENSORS {
+                row("  ...", format!("and {} more, in --json", self.sensors.len() - MOST_SENSORS));
+            }
         }
         if self.most_substeps > substeps {
             let each: Vec<_> =
