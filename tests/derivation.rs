@@ -373,7 +373,7 @@ fn pressed(rules: Rules, params: &StepParams<f64>, separation: f64, before: f64)
     let normal_mass = 1.0 / case.dense(case.normal, case.normal);
     let point = Point { r_a: lane(case.r[0]), r_b: lane(case.r[1]), separation, normal_mass, ..Point::default() };
     let mut impulses = [Impulse { normal: before, ..Impulse::default() }];
-    solve_contact(rules, params, &mut pair, &contact, &[point], &mut impulses);
+    solve_contact(rules, params, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
     let u = relative_velocity(Rules::default(), &pair, point.r_a, point.r_b);
     (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0].normal)
 }
@@ -446,7 +446,7 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, separation: -0.01, normal_mass: mass, ..Point::default() };
         let mut impulses = [Impulse { normal: 0.1, peak: 0.3, ..Impulse::default() }];
-        solve_contact(rules, &parting, &mut pair, &contact, &[point], &mut impulses);
+        solve_contact(rules, &parting, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
         assert_eq!(impulses[0].peak, 0.3, "the largest so far stays");
         impulses[0].normal
     };
@@ -465,7 +465,7 @@ fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_conta
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, normal_mass: mass, approach_velocity, ..Point::default() };
         let mut impulses = [Impulse { normal: 0.1, peak, ..Impulse::default() }];
-        restitute_contact(Rules::default(), &params, &mut pair, &contact, &[point], &mut impulses);
+        restitute_contact(Rules::default(), &params, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
         let u = relative_velocity(Rules::default(), &pair, r_a, r_b);
         (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0])
     };
@@ -487,15 +487,9 @@ fn a_warm_start_is_the_impulses_times_their_rows() {
     let friction = |i: Impulse<f64>| t_1 * i.tangent_1 + t_2 * i.tangent_2;
     for patch in [false, true] {
         let mut pair = s.pair;
-        let (rules, points, impulses) =
-            (Rules { patch, ..with(FrictionRule::Disc) }, [s.point; 2], [impulse, patch_impulse]);
-        warm_start(
-            rules,
-            &mut pair,
-            &s.contact,
-            &points[..1 + usize::from(patch)],
-            &impulses[..1 + usize::from(patch)],
-        );
+        let (points, mut impulses) = ([s.point; 2], [impulse, patch_impulse]);
+        let (rules, count) = (Rules { patch, ..with(FrictionRule::Disc) }, 1 + usize::from(patch));
+        warm_start(rules, &mut pair, &s.contact, &(&points[..count], &mut impulses[..count]));
         let linear = case.normal * impulse.normal + friction(if patch { patch_impulse } else { impulse });
         let twist = if patch { case.normal * patch_impulse.normal } else { DVec3::ZERO };
         for (i, (was, is, sign)) in [(s.pair.a, pair.a, -1.0), (s.pair.b, pair.b, 1.0)].into_iter().enumerate() {

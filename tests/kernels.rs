@@ -47,6 +47,7 @@ const MEASURED: Rules = Rules {
     measured: true,
     from_start: false,
     isotropic: false,
+    bounces: false,
     axes: false,
 };
 

@@ -46,7 +46,7 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     let sum = clamp_normal(rules, (*impulse).normal, params.relaxation * correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
-    (*impulse).peak = larger((*impulse).peak, sum);
+    if rules.bounces { (*impulse).peak = larger((*impulse).peak, sum); }
     note_correction(rules.measured, change, point.normal_mass);
     apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
 }

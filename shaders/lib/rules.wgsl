@@ -16,6 +16,8 @@ struct Rules {
     from_start: bool,
     // Every body that can move has the same moment of inertia about all axes.
     isotropic: bool,
+    // Points keep the largest normal impulse of the step.
+    bounces: bool,
 }
 
 const FRICTION_NONE: u32 = 0u;

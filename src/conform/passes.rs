@@ -26,6 +26,7 @@ pub fn every_rules() -> Vec<Rules> {
                 passes: 1 + u8::from(has(6)),
                 from_start: has(7),
                 isotropic: has(8),
+                bounces: has(4),
                 axes: false,
             };
             // Velocities since the start of the step meet every sum of velocities without the rules below.

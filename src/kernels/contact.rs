@@ -2,7 +2,7 @@
 //! `clear_impulses`, `sum_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
 //! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share
-//! the lanes of fuller ones. With friction per manifold the last of `points` and `impulses` is the patch.
+//! the lanes of fuller ones. With friction per manifold the last of the rows is the patch.
 
 use super::Rules;
 use super::friction::{solve_friction, solve_twist};
@@ -10,6 +10,43 @@ use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
 use crate::math::{Lane, NormalMovement, cross3, dot3, larger, smaller};
+
+/// The points of a manifold and their impulses, wherever they stand.
+pub trait PointRows<L> {
+    /// How many there are, the patch included.
+    fn count(&self) -> usize;
+    /// The point `k`.
+    fn point(&self, k: usize) -> Point<L>;
+    /// The impulse of the point `k`.
+    fn impulse(&self, k: usize) -> Impulse<L>;
+    /// Changes the normal impulse of a point.
+    fn set_normal(&mut self, k: usize, normal: L);
+    /// Changes the friction of a point.
+    fn set_friction(&mut self, k: usize, tangent_1: L, tangent_2: L);
+    /// Changes the largest normal impulse of a point.
+    fn set_peak(&mut self, k: usize, peak: L);
+}
+
+impl<L: Lane> PointRows<L> for (&[Point<L>], &mut [Impulse<L>]) {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+    fn point(&self, k: usize) -> Point<L> {
+        self.0[k]
+    }
+    fn impulse(&self, k: usize) -> Impulse<L> {
+        self.1[k]
+    }
+    fn set_normal(&mut self, k: usize, normal: L) {
+        self.1[k].normal = normal;
+    }
+    fn set_friction(&mut self, k: usize, tangent_1: L, tangent_2: L) {
+        (self.1[k].tangent_1, self.1[k].tangent_2) = (tangent_1, tangent_2);
+    }
+    fn set_peak(&mut self, k: usize, peak: L) {
+        self.1[k].peak = peak;
+    }
+}
 
 /// How the bodies of a contact moved along its normal since the step began.
 #[inline(always)]
@@ -81,7 +118,9 @@ fn solve_normal<L: Lane>(
     let sum = clamp_normal(rules, impulse.normal, params.relaxation * correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
-    impulse.peak = larger(impulse.peak, sum);
+    if rules.bounces {
+        impulse.peak = larger(impulse.peak, sum);
+    }
     note_correction(rules, params, pair, change, point.normal_mass);
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
@@ -102,16 +141,11 @@ pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Im
 
 /// Applies the impulses that a manifold already carries. Kernel `warm_start`.
 #[inline(always)]
-pub fn warm_start<L: Lane>(
-    rules: Rules,
-    pair: &mut Pair<L>,
-    contact: &Contact<L>,
-    points: &[Point<L>],
-    impulses: &[Impulse<L>],
-) {
+pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L>, rows: &impl PointRows<L>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    let (points, patch) = points.split_at(rules.contact_points(points.len()));
-    for (point, impulse) in points.iter().zip(impulses) {
+    let end = rules.contact_points(rows.count());
+    for k in 0..end {
+        let (point, impulse) = (rows.point(k), rows.impulse(k));
         let mut p = contact.normal * impulse.normal;
         if rules.friction != FrictionRule::None && !rules.patch {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
@@ -119,12 +153,12 @@ pub fn warm_start<L: Lane>(
         apply_impulse(rules, pair, point.r_a, point.r_b, p);
     }
     if rules.friction != FrictionRule::None && rules.patch {
-        let impulse = &impulses[points.len()];
+        let (patch, impulse) = (rows.point(end), rows.impulse(end));
         let twist = contact.normal * impulse.normal;
         pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, twist);
         pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, twist);
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        apply_impulse(rules, pair, patch[0].r_a, patch[0].r_b, p);
+        apply_impulse(rules, pair, patch.r_a, patch.r_b, p);
     }
 }
 
@@ -135,21 +169,24 @@ pub fn solve_contact<L: Lane>(
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
-    points: &[Point<L>],
-    impulses: &mut [Impulse<L>],
+    rows: &mut impl PointRows<L>,
 ) {
     let has_friction = rules.friction != FrictionRule::None;
     let common = Common { softness: pair_softness(params, pair), movement: normal_movement(rules, pair, contact) };
-    let contact_points = rules.contact_points(points.len());
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {
-            sweep_friction(rules, params, pair, contact, points, impulses);
+            sweep_friction(rules, params, pair, contact, rows);
         }
-        for (point, impulse) in points[..contact_points].iter().zip(impulses.iter_mut()) {
-            solve_normal(rules, params, &common, pair, contact, point, impulse);
+        for k in 0..rules.contact_points(rows.count()) {
+            let mut impulse = rows.impulse(k);
+            solve_normal(rules, params, &common, pair, contact, &rows.point(k), &mut impulse);
+            rows.set_normal(k, impulse.normal);
+            if rules.bounces {
+                rows.set_peak(k, impulse.peak);
+            }
         }
         if has_friction && !rules.friction_first {
-            sweep_friction(rules, params, pair, contact, points, impulses);
+            sweep_friction(rules, params, pair, contact, rows);
         }
     }
 }
@@ -160,22 +197,26 @@ fn sweep_friction<L: Lane>(
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
-    points: &[Point<L>],
-    impulses: &mut [Impulse<L>],
+    rows: &mut impl PointRows<L>,
 ) {
+    let end = rules.contact_points(rows.count());
     if rules.patch {
-        let (points, patch) = points.split_at(rules.contact_points(points.len()));
-        let (impulses, patch_impulse) = impulses.split_at_mut(points.len());
         let (mut pressed, mut lever) = (L::constant(0.0), L::constant(0.0));
-        for (point, impulse) in points.iter().zip(impulses) {
-            pressed = pressed + impulse.normal;
-            lever = lever + impulse.normal * point.slip_1;
+        for k in 0..end {
+            let normal = rows.impulse(k).normal;
+            pressed = pressed + normal;
+            lever = lever + normal * rows.point(k).slip_1;
         }
-        solve_twist(rules, params, pair, contact, &patch[0], lever, &mut patch_impulse[0]);
-        solve_friction(rules, params, pair, contact, &patch[0], pressed, &mut patch_impulse[0]);
+        let (patch, mut impulse) = (rows.point(end), rows.impulse(end));
+        solve_twist(rules, params, pair, contact, &patch, lever, &mut impulse);
+        solve_friction(rules, params, pair, contact, &patch, pressed, &mut impulse);
+        rows.set_normal(end, impulse.normal);
+        rows.set_friction(end, impulse.tangent_1, impulse.tangent_2);
     } else {
-        for (point, impulse) in points.iter().zip(impulses) {
-            solve_friction(rules, params, pair, contact, point, impulse.normal, impulse);
+        for k in 0..end {
+            let mut impulse = rows.impulse(k);
+            solve_friction(rules, params, pair, contact, &rows.point(k), impulse.normal, &mut impulse);
+            rows.set_friction(k, impulse.tangent_1, impulse.tangent_2);
         }
     }
 }
@@ -187,20 +228,19 @@ pub fn restitute_contact<L: Lane>(
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
-    points: &[Point<L>],
-    impulses: &mut [Impulse<L>],
+    rows: &mut impl PointRows<L>,
 ) {
     let zero = L::constant(0.0);
-    let contact_points = rules.contact_points(points.len());
-    for (point, impulse) in points[..contact_points].iter().zip(impulses) {
+    for k in 0..rules.contact_points(rows.count()) {
+        let (point, impulse) = (rows.point(k), rows.impulse(k));
         let hit = (-params.restitution_threshold).gt(point.approach_velocity);
         let bounces = L::and(hit, impulse.peak.gt(zero));
         let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
         let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
         let sum = L::select(impulse.normal, larger(impulse.normal + correction, zero), bounces);
         let change = sum - impulse.normal;
-        impulse.normal = sum;
-        impulse.peak = larger(impulse.peak, sum);
+        rows.set_normal(k, sum);
+        rows.set_peak(k, larger(impulse.peak, sum));
         apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
     }
 }

@@ -50,6 +50,8 @@ pub struct Rules {
     pub from_start: bool,
     /// Whether every body that can move has the same moment of inertia about all axes.
     pub isotropic: bool,
+    /// Whether any surface bounces: points then keep the largest normal impulse of the step.
+    pub bounces: bool,
     /// Whether joints have axes. Shaders with and without them are made of different files.
     pub axes: bool,
 }
@@ -69,6 +71,7 @@ impl Default for Rules {
             measured: false,
             from_start: false,
             isotropic: false,
+            bounces: false,
             axes: false,
         }
     }

@@ -33,6 +33,12 @@ impl<'a, T: Copy> Shared<'a, T> {
         self.start
     }
 
+    /// Whether there is no element.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     /// Some elements, to write in place.
     ///
     /// # Safety

@@ -162,6 +162,22 @@ impl Kernel {
         measures && self.is_from_start()
     }
 
+    /// Whether the kernel keeps the largest impulses of points.
+    pub fn keeps_peaks(self) -> bool {
+        match self {
+            Self::SolveContacts(rules) => rules.bounces,
+            _ => matches!(self, Self::ApplyRestitution(_)),
+        }
+    }
+
+    /// Whether the kernel reads the velocities of approach or the slips of points.
+    pub fn reads_approach_or_slip(self) -> bool {
+        match self {
+            Self::SolveContacts(rules) => rules.patch || rules.driven || rules.friction == FrictionRule::Slip,
+            _ => matches!(self, Self::ApplyRestitution(_)),
+        }
+    }
+
     /// Whether the kernel is left out where sweeps are no longer needed.
     pub fn is_measured(self) -> bool {
         match self {
@@ -204,6 +220,7 @@ impl fmt::Display for Kernel {
                 (r.measured, "measured"),
                 (r.from_start, "from start"),
                 (r.isotropic, "isotropic"),
+                (r.bounces, "bouncing"),
             ];
             let on: Vec<_> = named.iter().filter(|n| n.0).map(|n| n.1).collect();
             write!(f, "({})", on.join(", "))?;

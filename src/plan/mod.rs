@@ -139,9 +139,9 @@ impl StepPlan {
             biased: false,
             from_start: false,
             isotropic: false,
+            bounces: contacts.restitution,
             axes: !problem.axes.is_empty(),
         };
-        let bounces = contacts.restitution;
         let mut plan = Self::default();
         for (block, isotropic) in (0..).zip(isotropic(problem)) {
             let own = &problem.blocks[block as usize];
@@ -152,7 +152,7 @@ impl StepPlan {
                 plan.over_colors(Kernel::BeginChanges, block, std::slice::from_ref(&bodies));
             }
             plan.substeps(config, problem, block, rules);
-            if bounces {
+            if rules.bounces {
                 let rules = Rules { patch: rules.patch, from_start, isotropic, ..Rules::default() };
                 let groups = color_groups(&problem.colors, contact_colors, config.fuse_colors_below);
                 plan.over_colors(Kernel::ApplyRestitution(rules), block, &groups);

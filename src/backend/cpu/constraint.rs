@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use crate::kernels::axis::{solve_axis, warm_start_axis};
-use crate::kernels::contact::{restitute_contact, solve_contact, warm_start};
+use crate::kernels::contact::{PointRows, restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::joint_system::{apply_joint_change, measure_joint};
-use crate::kernels::{Axis, Contact, Impulse, Joint, Pair, Point, StepParams};
+use crate::kernels::{Axis, Contact, Joint, Pair, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
 use crate::problem::{Block, ContactRow, JointRow, MOST_AXES, StepProblem};
@@ -115,14 +115,36 @@ pub(super) fn sweep_contact<L: Lane>(
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
-    points: &[Point<L>],
-    impulses: &mut [Impulse<L>],
+    rows: &mut impl PointRows<L>,
 ) {
     match kernel {
-        Kernel::WarmStart(rules) => warm_start(rules, pair, contact, points, impulses),
-        Kernel::SolveContacts(rules) => solve_contact(rules, params, pair, contact, points, impulses),
-        Kernel::ApplyRestitution(rules) => restitute_contact(rules, params, pair, contact, points, impulses),
+        Kernel::WarmStart(rules) => warm_start(rules, pair, contact, rows),
+        Kernel::SolveContacts(rules) => solve_contact(rules, params, pair, contact, rows),
+        Kernel::ApplyRestitution(rules) => restitute_contact(rules, params, pair, contact, rows),
         _ => unreachable!("a kernel over other rows"),
+    }
+}
+
+/// The axes of a joint and their impulses, wherever they stand.
+pub(super) trait AxisRows<L> {
+    fn count(&self) -> usize;
+    fn axis(&self, k: usize) -> Axis<L>;
+    fn impulse(&self, k: usize) -> L;
+    fn set_impulse(&mut self, k: usize, impulse: L);
+}
+
+impl<L: Lane> AxisRows<L> for (&[Axis<L>], &mut [Vec3<L>]) {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+    fn axis(&self, k: usize) -> Axis<L> {
+        self.0[k]
+    }
+    fn impulse(&self, k: usize) -> L {
+        self.1[k].x
+    }
+    fn set_impulse(&mut self, k: usize, impulse: L) {
+        self.1[k].x = impulse;
     }
 }
 
@@ -134,22 +156,23 @@ pub(super) fn sweep_joint<L: Lane>(
     pair: &mut Pair<L>,
     joint: &Joint<L>,
     impulse: &mut Vec3<L>,
-    axes: &[Axis<L>],
-    axis_impulses: &mut [Impulse<L>],
+    axes: &mut impl AxisRows<L>,
 ) {
     match kernel {
         Kernel::WarmStartJoints { axes: has_axes } => {
             if has_axes {
-                for (axis, impulse) in axes.iter().zip(axis_impulses) {
-                    warm_start_axis(pair, joint, axis, impulse.normal);
+                for k in 0..axes.count() {
+                    warm_start_axis(pair, joint, &axes.axis(k), axes.impulse(k));
                 }
             }
             warm_start_joint(pair, joint, *impulse);
         }
         Kernel::SolveJoints(rules) => {
             if rules.axes {
-                for (axis, impulse) in axes.iter().zip(axis_impulses) {
-                    solve_axis(rules, params, pair, joint, axis, &mut impulse.normal);
+                for k in 0..axes.count() {
+                    let mut impulse = axes.impulse(k);
+                    solve_axis(rules, params, pair, joint, &axes.axis(k), &mut impulse);
+                    axes.set_impulse(k, impulse);
                 }
             }
             solve_joint(rules, params, pair, joint, impulse);

@@ -6,12 +6,13 @@ use std::ops::Range;
 
 use super::bodies::State;
 use super::lane_layout::{ImpulsePlace, LaneLayout};
+use super::lane_rows::SharedImpulses;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use crate::kernels::joint_system::{
     Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
 };
 use crate::kernels::{Joint, Mass, Pair, Sym3};
-use crate::lanes::{Lanes, Shared, WIDTH, Wide, Work};
+use crate::lanes::{Lanes, Shared, Work};
 use crate::math::{Vec3, vec3};
 use crate::problem::{JointRow, JointSystems, StepProblem};
 
@@ -82,8 +83,8 @@ pub(super) struct SystemWork<'a> {
     pub slots: &'a [u32],
     pub bodies: Shared<'a, State>,
     pub factors: SharedFactors<'a>,
-    pub changes: Shared<'a, [Wide; 4]>,
-    pub impulses: Shared<'a, [Wide; 4]>,
+    pub changes: SharedImpulses<'a>,
+    pub impulses: SharedImpulses<'a>,
 }
 
 impl Work for SystemWork<'_> {
@@ -125,10 +126,9 @@ struct Changes<'a, 'b>(&'a SystemWork<'b>);
 impl Changes<'_, '_> {
     /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
     #[inline(always)]
-    fn numbers<'c>(rows: &Shared<'c, [Wide; 4]>, place: ImpulsePlace, k: usize) -> &'c mut f32 {
+    fn numbers<'c>(rows: &SharedImpulses<'c>, place: ImpulsePlace, k: usize) -> &'c mut f32 {
         // SAFETY: this reaches one lane of the row, and no other task the same lane.
-        let row = rows.as_ptr().wrapping_add(place.row as usize);
-        unsafe { &mut *row.cast::<f32>().add(k * WIDTH + place.lane as usize) }
+        unsafe { rows.number(place.row as usize, k, place.lane as usize) }
     }
 }
 

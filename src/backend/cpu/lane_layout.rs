@@ -7,13 +7,14 @@ use std::ops::Range;
 
 use super::constraint::{Constraint, MOST_IMPULSES};
 use super::lane_group::{LaneGroup, NO_ROW};
+use super::lane_rows::{LaneImpulses, LanePoints};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use super::threads::Threads;
 use super::transfer::{BodyPlace, Load, Store};
 use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
-use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH, Wide};
-use crate::math::{Lane, Vec3, vec3};
+use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH};
+use crate::math::Lane;
 use crate::problem::{ImpulseRow, StepProblem};
 
 /// The place of the impulse of a joint among the lanes.
@@ -25,13 +26,21 @@ pub(super) struct ImpulsePlace {
     pub lane: u32,
 }
 
+/// The numbers of a step that only some passes use.
+#[derive(Clone, Copy)]
+pub(super) struct Uses {
+    /// Largest impulses of points.
+    pub peaks: bool,
+    /// Velocities of approach and slips of points.
+    pub approach_or_slip: bool,
+}
+
 /// The contacts, or the joints, of a problem, part by part and color by color.
 #[derive(Default)]
 pub(super) struct LaneLayout<C> {
     pub groups: Vec<LaneGroup>,
     /// The groups of each color of each part.
     pub ranges: ColorRanges,
-    pub points: Vec<[Wide; 12]>,
     rows: PartitionedRows,
     /// Constraints of each color of each part by their numbers of points, and its first group and impulse.
     counts: Vec<[usize; MOST_IMPULSES]>,
@@ -42,26 +51,27 @@ pub(super) struct LaneLayout<C> {
 }
 
 impl<C: Constraint> LaneLayout<C> {
-    /// Takes over the constraints of a problem and their impulses.
+    /// Takes over the constraints of a problem and their impulses, as far as passes use them.
     pub fn load(
         &mut self,
         problem: &StepProblem,
         partition: &Partition,
         places: &[BodyPlace],
-        impulses: &mut Vec<[Wide; 4]>,
+        (points, impulses): (&mut LanePoints, &mut LaneImpulses),
+        uses: Uses,
         (instructions, threads): (InstructionSet, &Threads),
     ) {
         self.make_groups(problem, partition, threads);
         let count = self.groups.last().map_or(0, |group| group.impulses().end);
-        self.points.resize(if C::are_with_points(problem) { count } else { 0 }, [Wide::default(); 12]);
-        impulses.resize(count, [Wide::default(); 4]);
+        points.resize(if C::are_with_points(problem) { count } else { 0 }, uses.approach_or_slip);
+        impulses.resize(count, uses.peaks);
         let len = self.groups.len();
         let work = Load::<C> {
             problem,
             places,
             groups: Shared::new(&mut self.groups),
-            points: Shared::new(&mut self.points),
-            impulses: Shared::new(impulses),
+            points: points.shared(),
+            impulses: impulses.shared(),
             constraint: PhantomData,
         };
         threads.spread(0..len, &|range| instructions.run(&work, range));
@@ -71,7 +81,7 @@ impl<C: Constraint> LaneLayout<C> {
     pub fn store(
         &self,
         problem: &mut StepProblem,
-        impulses: &[[Wide; 4]],
+        impulses: &LaneImpulses,
         (instructions, threads): (InstructionSet, &Threads),
     ) {
         let (rows, to) = C::impulses_mut(problem);
@@ -79,17 +89,16 @@ impl<C: Constraint> LaneLayout<C> {
     }
 
     /// Takes over sums of impulses, sixteen side by side as the impulses are.
-    pub fn load_sums(&self, problem: &StepProblem, from: &[ImpulseRow], sums: &mut Vec<[Wide; 4]>, threads: &Threads) {
-        sums.clear();
-        sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), [Wide::default(); 4]);
-        let (rows, from, sums): (_, &[[f32; 4]], _) = (C::rows(problem), bytemuck::cast_slice(from), Shared::new(sums));
+    pub fn load_sums(&self, problem: &StepProblem, from: &[ImpulseRow], sums: &mut LaneImpulses, threads: &Threads) {
+        sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), true);
+        let (rows, from, sums): (_, &[[f32; 4]], _) = (C::rows(problem), bytemuck::cast_slice(from), sums.shared());
         threads.spread(0..self.groups.len(), &|range| {
             for group in &self.groups[range] {
                 // SAFETY: `LaneLayout::make_groups` gives each group impulses of its own.
-                for (k, wide) in unsafe { sums.slice(group.impulses()) }.iter_mut().enumerate() {
+                let mut own = unsafe { sums.slice(group.impulses()) };
+                for k in 0..group.count as usize {
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                        let sum = &from[C::impulse(rows, row, k)];
-                        wide.iter_mut().zip(sum).for_each(|(wide, number)| wide.0[lane] = *number);
+                        own.set_lane(k, lane, &from[C::impulse(rows, row, k)]);
                     }
                 }
             }
@@ -100,7 +109,7 @@ impl<C: Constraint> LaneLayout<C> {
     pub fn store_to(
         &self,
         rows: &[C],
-        impulses: &[[Wide; 4]],
+        impulses: &LaneImpulses,
         to: &mut [[f32; 4]],
         (instructions, threads): (InstructionSet, &Threads),
     ) {
@@ -109,17 +118,16 @@ impl<C: Constraint> LaneLayout<C> {
     }
 
     /// Extrapolates all impulses.
-    pub fn extrapolate(&mut self, first: bool, factor: f32, impulses: &mut [[Wide; 4]], threads: &Threads) {
-        let len = impulses.len();
+    pub fn extrapolate(&mut self, first: bool, factor: f32, impulses: &mut LaneImpulses, threads: &Threads) {
+        let len = impulses.normals.len();
         self.steps.resize(len, ImpulseStep::default());
         let factor = Portable::constant(factor.into());
-        let (impulses, steps) = (Shared::new(impulses), Shared::new(&mut self.steps));
+        let (impulses, steps) = (impulses.shared(), Shared::new(&mut self.steps));
         threads.spread(0..len, &|range| {
             // SAFETY: tasks have different impulses: `Threads::spread` cuts their range.
-            let (impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
-            for (impulse, step) in impulses.iter_mut().zip(steps) {
-                let Vec3 { x, y, z } = extrapolate(first, factor, components(impulse), step);
-                [impulse[0], impulse[1], impulse[2]] = [x.store(), y.store(), z.store()];
+            let (mut impulses, steps) = unsafe { (impulses.slice(range.clone()), steps.slice(range)) };
+            for (k, step) in steps.iter_mut().enumerate() {
+                impulses.set_components(k, extrapolate(first, factor, impulses.components(k), step));
             }
         });
     }
@@ -128,7 +136,7 @@ impl<C: Constraint> LaneLayout<C> {
     pub fn measure_step(
         &self,
         problem: &StepProblem,
-        impulses: &[[Wide; 4]],
+        impulses: &LaneImpulses,
         lengths: &mut [StepLength<f32>],
         threads: &Threads,
     ) {
@@ -136,7 +144,7 @@ impl<C: Constraint> LaneLayout<C> {
         threads.spread(0..self.groups.len(), &|range| {
             for group in &self.groups[range] {
                 for (k, i) in group.impulses().enumerate() {
-                    let StepLength { square, along } = step_length(components(&impulses[i]), &self.steps[i]);
+                    let StepLength { square, along } = step_length(impulses.components(i), &self.steps[i]);
                     let (square, along) = (square.store(), along.store());
                     for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                         let to = C::impulse(rows, row, k);
@@ -209,11 +217,6 @@ impl<C: Constraint> LaneLayout<C> {
         });
     }
 
-    /// The rows of points of a group of joints: those of axes, after that of the anchors.
-    pub fn axes(&self, impulses: Range<usize>) -> &[[Wide; 12]] {
-        self.points.get(impulses.start + 1..impulses.end).unwrap_or_default()
-    }
-
     /// The place of the first impulse of each of `count` rows.
     pub fn impulse_places(&self, count: usize, places: &mut Vec<ImpulsePlace>) {
         places.resize(count, ImpulsePlace::default());
@@ -229,10 +232,4 @@ impl<C: Constraint> LaneLayout<C> {
         let groups = &self.groups[groups];
         groups.first().map_or(0..0, |first| first.impulses().start..groups[groups.len() - 1].impulses().end)
     }
-}
-
-/// The three components of sixteen impulses.
-fn components(impulse: &[Wide; 4]) -> Vec3<Portable> {
-    let [x, y, z, _] = impulse.each_ref().map(Portable::load);
-    vec3(x, y, z)
 }

@@ -10,6 +10,7 @@ mod constraint;
 mod joint_systems;
 mod lane_group;
 mod lane_layout;
+mod lane_rows;
 mod partition;
 mod reference;
 mod shared_step;
@@ -31,12 +32,13 @@ use crate::kernels::convergence::begin_sweep;
 use crate::kernels::joint_system::JointFactors;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
-use crate::lanes::{InstructionSet, Row8, Shared, WIDTH, Wide};
+use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
 use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
 use joint_systems::{SharedFactors, SystemLayout};
-use lane_layout::LaneLayout;
+use lane_layout::{LaneLayout, Uses};
+use lane_rows::{LaneImpulses, LanePoints};
 use partition::Partition;
 use shared_step::{SharedStep, Spread};
 use threads::Threads;
@@ -60,17 +62,19 @@ pub struct Cpu {
     /// Unequal moments of inertia, and the slots of their bodies, in the order of slots.
     inertias: Vec<(usize, Inertia<f32>)>,
     contacts: LaneLayout<ContactRow>,
-    contact_impulses: Vec<[Wide; 4]>,
+    contact_points: LanePoints,
+    contact_impulses: LaneImpulses,
     /// Their sums over the substeps.
-    contact_totals: Vec<[Wide; 4]>,
+    contact_totals: LaneImpulses,
     joints: LaneLayout<JointRow>,
-    joint_impulses: Vec<[Wide; 4]>,
+    joint_axes: LanePoints,
+    joint_impulses: LaneImpulses,
     /// Joints that are solved at once: their places, factors and corrections.
     systems: SystemLayout,
     factors: JointFactors<f32>,
     /// Inertia of their bodies when the step begins, in the order of slots.
     turning: Vec<(u32, Row8)>,
-    joint_changes: Vec<[Wide; 4]>,
+    joint_changes: LaneImpulses,
     convergence: ConvergenceRow,
     momentum: Momentum<f32>,
     /// Velocities of the accelerated sweep before.
@@ -95,7 +99,7 @@ impl Cpu {
         Self { undivided: Some(size), ..self }
     }
 
-    fn load(&mut self, problem: &StepProblem, threads: &Threads) {
+    fn load(&mut self, problem: &StepProblem, passes: &[Pass], threads: &Threads) {
         self.partition.update(problem, self.undivided.unwrap_or(UNDIVIDED));
         let slots = &self.partition.slots;
         let len = self.partition.all_bodies().len() * WIDTH;
@@ -114,12 +118,19 @@ impl Cpu {
             BodyPlace { place: place(slot as usize), is_movable }
         }));
         let on = (self.instructions, threads);
-        self.contacts.load(problem, &self.partition, &self.places, &mut self.contact_impulses, on);
-        self.contact_totals.clear();
+        let is_any = |uses: fn(Kernel) -> bool| passes.iter().any(|pass| uses(pass.kernel));
+        let uses =
+            Uses { peaks: is_any(Kernel::keeps_peaks), approach_or_slip: is_any(Kernel::reads_approach_or_slip) };
+        let rows = (&mut self.contact_points, &mut self.contact_impulses);
+        self.contacts.load(problem, &self.partition, &self.places, rows, uses, on);
+        self.contact_totals.resize(0, false);
         if !problem.totals.is_empty() {
             self.contacts.load_sums(problem, &problem.totals, &mut self.contact_totals, threads);
         }
-        self.joints.load(problem, &self.partition, &self.places, &mut self.joint_impulses, on);
+        // The last numbers of axes stand where those of points do.
+        let uses = Uses { peaks: false, approach_or_slip: true };
+        let rows = (&mut self.joint_axes, &mut self.joint_impulses);
+        self.joints.load(problem, &self.partition, &self.places, rows, uses, on);
         self.systems.load(problem, &self.partition, &self.joints);
         self.turning.clear();
         self.turning.extend(problem.turning.iter().map(|row| {
@@ -131,7 +142,7 @@ impl Cpu {
         }));
         self.turning.sort_unstable_by_key(|row| row.0);
         self.factors.reset(&problem.systems);
-        self.joint_changes.resize(self.joint_impulses.len(), [Wide::default(); 4]);
+        self.joint_changes.resize(self.joint_impulses.normals.len(), false);
         self.convergence = problem.convergence;
         self.momentum = Momentum::load(&problem.momentum);
     }
@@ -181,15 +192,17 @@ impl Cpu {
             accelerations: &self.accelerations,
             inertias: &self.inertias,
             contacts: &self.contacts,
-            contact_impulses: Shared::new(&mut self.contact_impulses),
-            contact_totals: Shared::new(&mut self.contact_totals),
+            contact_points: self.contact_points.shared(),
+            contact_impulses: self.contact_impulses.shared(),
+            contact_totals: self.contact_totals.shared(),
             joints: &self.joints,
-            joint_impulses: Shared::new(&mut self.joint_impulses),
+            joint_axes: self.joint_axes.shared(),
+            joint_impulses: self.joint_impulses.shared(),
             problem,
             systems: &self.systems,
             turning: &self.turning,
             factors: SharedFactors::new(&mut self.factors),
-            joint_changes: Shared::new(&mut self.joint_changes),
+            joint_changes: self.joint_changes.shared(),
             moving: &moving,
         };
         let is_needed = |pass: &&Pass| self.convergence.done == 0 || !pass.kernel.is_measured();
@@ -257,7 +270,7 @@ impl Backend for Cpu {
         let (problem, passes) = step.into_parts();
         let widest = problem.bodies.len().max(problem.order.len()).div_ceil(WIDTH);
         Threads::lead(widest, |threads| {
-            self.load(problem, threads);
+            self.load(problem, passes, threads);
             for passes in passes.chunk_by(|p, q| stays_on_islands(p.kernel) && stays_on_islands(q.kernel)) {
                 self.run_passes(problem, passes, threads);
             }

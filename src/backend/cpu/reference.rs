@@ -14,7 +14,7 @@ use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolate
 use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, JointRow, MOST_AXES, StepProblem};
+use crate::problem::{ConvergenceRow, JointRow, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 ///
@@ -161,11 +161,7 @@ impl<S: Scalar> Reference<S> {
                     let (joint, axes) = (&rows.joints[i], &rows.axes[first..first + count]);
                     let (own, of_axes) = numbers.split_at_mut(problem.joints.len());
                     let of_axes = of_axes.get_mut(first..first + count).unwrap_or_default();
-                    let mut impulses = [Impulse::default(); MOST_AXES];
-                    let impulses = &mut impulses[..count];
-                    impulses.iter_mut().zip(&*of_axes).for_each(|(impulse, row)| impulse.set_components(*row));
-                    sweep_joint(pass.kernel, &params, &mut pair, joint, &mut own[i], axes, impulses);
-                    impulses.iter().zip(of_axes).for_each(|(impulse, row)| *row = impulse.components());
+                    sweep_joint(pass.kernel, &params, &mut pair, joint, &mut own[i], &mut (axes, of_axes));
                     self.store_pair(bodies, &pair);
                 }
             }
@@ -175,8 +171,8 @@ impl<S: Scalar> Reference<S> {
                     let first = row.first_point as usize;
                     let own = first..first + row.point_count as usize + usize::from(rules.patch);
                     let (mut pair, rows) = (self.load_pair(row.bodies()), &mut self.rows);
-                    let (points, impulses) = (&rows.points[own.clone()], &mut rows.impulses[own]);
-                    sweep_contact(pass.kernel, &params, &mut pair, &rows.contacts[i], points, impulses);
+                    let mut own = (&rows.points[own.clone()], &mut rows.impulses[own]);
+                    sweep_contact(pass.kernel, &params, &mut pair, &rows.contacts[i], &mut own);
                     self.store_pair(row.bodies(), &pair);
                 }
             }

@@ -1,5 +1,6 @@
 //! One pass over one part of a step, on one thread or on all.
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
@@ -7,10 +8,11 @@ use super::bodies::{BodyWork, State, TurningWork, integrate_spins};
 use super::constraint::Constraint;
 use super::joint_systems::{SharedFactors, SystemLayout, SystemWork};
 use super::lane_layout::LaneLayout;
+use super::lane_rows::{SharedImpulses, SharedPoints};
 use super::partition::Partition;
 use super::sweep::{Sums, Sweep, clear_impulses};
 use crate::kernels::Inertia;
-use crate::lanes::{InstructionSet, Row8, Shared, WIDTH, Wide};
+use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
 
@@ -25,15 +27,17 @@ pub(super) struct SharedStep<'a> {
     pub accelerations: &'a [Row8],
     pub inertias: &'a [(usize, Inertia<f32>)],
     pub contacts: &'a LaneLayout<ContactRow>,
-    pub contact_impulses: Shared<'a, [Wide; 4]>,
-    pub contact_totals: Shared<'a, [Wide; 4]>,
+    pub contact_points: SharedPoints<'a>,
+    pub contact_impulses: SharedImpulses<'a>,
+    pub contact_totals: SharedImpulses<'a>,
     pub joints: &'a LaneLayout<JointRow>,
-    pub joint_impulses: Shared<'a, [Wide; 4]>,
+    pub joint_axes: SharedPoints<'a>,
+    pub joint_impulses: SharedImpulses<'a>,
     pub problem: &'a StepProblem,
     pub systems: &'a SystemLayout,
     pub turning: &'a [(u32, Row8)],
     pub factors: SharedFactors<'a>,
-    pub joint_changes: Shared<'a, [Wide; 4]>,
+    pub joint_changes: SharedImpulses<'a>,
     /// Set if a correction was above the tolerance.
     pub moving: &'a AtomicBool,
 }
@@ -76,13 +80,13 @@ impl SharedStep<'_> {
                 }
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                self.sweep(pass, part, self.contacts, self.contact_impulses, spread);
+                self.sweep(pass, part, self.contacts, (self.contact_points, self.contact_impulses), spread);
             }
             Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => {
-                self.sweep(pass, part, self.joints, self.joint_impulses, spread);
+                self.sweep(pass, part, self.joints, (self.joint_axes, self.joint_impulses), spread);
             }
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
-                self.sweep(pass, part, self.joints, self.joint_changes, spread);
+                self.sweep(pass, part, self.joints, (self.joint_axes, self.joint_changes), spread);
             }
             Kernel::TurnInertias => {
                 let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
@@ -117,12 +121,13 @@ impl SharedStep<'_> {
         pass: &Pass,
         part: usize,
         layout: &LaneLayout<C>,
-        impulses: Shared<[Wide; 4]>,
+        (points, impulses): (SharedPoints, SharedImpulses),
         spread: Spread,
     ) {
         let (kernel, params, bodies, free, moving) = (pass.kernel, self.params, self.bodies, self.free, self.moving);
         let substep = &self.blocks[pass.block as usize].substep;
-        let work = Sweep { kernel, params, substep, bodies, free, layout, impulses, moving };
+        let (groups, constraint) = (&layout.groups[..], PhantomData::<C>);
+        let work = Sweep { kernel, params, substep, bodies, free, groups, points, impulses, constraint, moving };
         for color in pass.colors.clone() {
             spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
         }

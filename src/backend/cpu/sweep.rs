@@ -2,15 +2,16 @@
 
 #![allow(unsafe_code)]
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
-use super::lane_layout::LaneLayout;
+use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
 use crate::kernels::contact::sum_impulse;
-use crate::kernels::{Axis, Body, Contact, Free, Impulse, Joint, Pair, Point, StepParams};
+use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
@@ -22,8 +23,10 @@ pub(super) struct Sweep<'a, C> {
     pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
     pub free: Shared<'a, Row8>,
-    pub layout: &'a LaneLayout<C>,
-    pub impulses: Shared<'a, [Wide; 4]>,
+    pub groups: &'a [LaneGroup],
+    pub points: SharedPoints<'a>,
+    pub impulses: SharedImpulses<'a>,
+    pub constraint: PhantomData<C>,
     /// Set if a correction was above the tolerance.
     pub moving: &'a AtomicBool,
 }
@@ -33,7 +36,7 @@ impl<C: Constraint> Work for Sweep<'_, C> {
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = StepParams::<L>::load(self.params, self.substep);
         for group in groups {
-            self.sweep::<L>(&params, &self.layout.groups[group]);
+            self.sweep::<L>(&params, &self.groups[group]);
         }
     }
 }
@@ -53,24 +56,22 @@ impl<C: Constraint> Sweep<'_, C> {
                 pair.start_b = wide_start(free, &group.b.places, &pair.mass_b);
             }
         }
-        let rows = group.impulses();
+        let own = group.impulses();
         // Impulses and rows are used in place: copies were most of what a sweep moved.
-        // SAFETY: `Impulse` is `repr(C)` and holds lanes only; `LaneLayout::make_groups` gives each group impulses of its own.
-        let impulses: &mut [Impulse<L>] = unsafe { as_lanes_mut(self.impulses.slice(rows.clone())) };
+        // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
+        let mut rows =
+            unsafe { GroupRows { points: self.points.slice(own.clone()), impulses: self.impulses.slice(own) } };
         if C::HAS_POINTS {
-            // SAFETY: `Contact` and `Point` are `repr(C)` and hold lanes only.
-            let (contact, points): (&Contact<L>, &[Point<L>]) =
-                unsafe { (&as_lanes(std::slice::from_ref(&group.header))[0], as_lanes(&self.layout.points[rows])) };
-            sweep_contact(self.kernel, params, &mut pair, contact, points, impulses);
+            // SAFETY: `Contact` is `repr(C)` and holds lanes only.
+            let contact: &Contact<L> = unsafe { as_lanes(&group.header) };
+            sweep_contact(self.kernel, params, &mut pair, contact, &mut rows);
         } else {
             let [joint @ .., _]: &[Wide; 11] = &group.header;
-            // SAFETY: `Joint` and `Axis` are `repr(C)` and hold lanes only.
-            let (joint, axes): (&Joint<L>, &[Axis<L>]) =
-                unsafe { (&as_lanes::<_, 10>(std::slice::from_ref(joint))[0], as_lanes(self.layout.axes(rows))) };
-            let (first, others) = impulses.split_first_mut().expect("a group of joints has impulses");
-            let mut impulse = first.components();
-            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse, axes, others);
-            first.set_components(impulse);
+            // SAFETY: `Joint` is `repr(C)` and holds lanes only.
+            let joint: &Joint<L> = unsafe { as_lanes::<_, 10>(joint) };
+            let mut impulse = rows.impulses.components(0);
+            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse, &mut rows);
+            rows.impulses.set_components(0, impulse);
         }
         // SAFETY: as above.
         unsafe {
@@ -84,28 +85,31 @@ impl<C: Constraint> Sweep<'_, C> {
 }
 
 /// Clears some impulses. Each task has its own.
-pub(super) fn clear_impulses(impulses: &Shared<[Wide; 4]>, range: Range<usize>) {
+pub(super) fn clear_impulses(impulses: &SharedImpulses, range: Range<usize>) {
     // SAFETY: tasks have different parts, and `LaneLayout::impulses_of` gives each part impulses of its own.
-    for impulse in unsafe { impulses.slice(range) } {
-        impulse[..3].fill(Wide::default());
-    }
+    let OwnImpulses { normals, tangents, peaks: _ } = unsafe { impulses.slice(range) };
+    normals.fill(Wide::default());
+    tangents.fill([Wide::default(); 2]);
 }
 
 /// Adds some impulses to their sums.
 pub(super) struct Sums<'a> {
     pub is_first: bool,
-    pub impulses: Shared<'a, [Wide; 4]>,
-    pub totals: Shared<'a, [Wide; 4]>,
+    pub impulses: SharedImpulses<'a>,
+    pub totals: SharedImpulses<'a>,
 }
 
 impl Work for Sums<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, range: Range<usize>) {
-        // SAFETY: tasks have different ranges, and no pass runs beside this one. `Impulse` is `repr(C)` and holds lanes only.
-        let (impulses, totals): (&[Impulse<L>], &mut [Impulse<L>]) =
-            unsafe { (as_lanes(self.impulses.slice(range.clone())), as_lanes_mut(self.totals.slice(range))) };
-        for (impulse, total) in impulses.iter().zip(totals) {
-            sum_impulse(self.is_first, impulse, total);
+        let count = range.len();
+        // SAFETY: tasks have different ranges, and no pass runs beside this one.
+        let (impulses, mut totals) = unsafe { (self.impulses.slice(range.clone()), self.totals.slice(range)) };
+        for k in 0..count {
+            let (now, mut total): (Impulse<L>, Impulse<L>) = (impulses.impulse(k), totals.impulse(k));
+            sum_impulse(self.is_first, &now, &mut total);
+            totals.set_components(k, total.components());
+            totals.peaks[k] = total.peak.store();
         }
     }
 }
@@ -150,24 +154,13 @@ unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, bod
     }
 }
 
-/// Rows of sixteen as rows of lanes, in the same order.
+/// Numbers of sixteen as a row of lanes, in the same order.
 ///
 /// # Safety
 /// `T` is `repr(C)` and holds `N` lanes and nothing else.
 #[inline(always)]
-unsafe fn as_lanes<T, const N: usize>(rows: &[[Wide; N]]) -> &[T] {
+unsafe fn as_lanes<T, const N: usize>(numbers: &[Wide; N]) -> &T {
     const { assert!(size_of::<T>() == size_of::<[Wide; N]>() && align_of::<T>() <= align_of::<Wide>()) };
     // SAFETY: the caller's promise; a lane is sixteen numbers.
-    unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len()) }
-}
-
-/// The same, to write.
-///
-/// # Safety
-/// As above.
-#[inline(always)]
-unsafe fn as_lanes_mut<T, const N: usize>(rows: &mut [[Wide; N]]) -> &mut [T] {
-    const { assert!(size_of::<T>() == size_of::<[Wide; N]>() && align_of::<T>() <= align_of::<Wide>()) };
-    // SAFETY: as above.
-    unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len()) }
+    unsafe { &*std::ptr::from_ref(numbers).cast() }
 }

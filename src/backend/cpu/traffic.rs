@@ -2,8 +2,8 @@
 
 use super::Cpu;
 use super::bodies::State;
-use super::lane_group::LaneGroup;
-use crate::lanes::{Row8, WIDTH, Wide};
+use crate::config::FrictionRule;
+use crate::lanes::{Row8, WIDTH};
 use crate::plan::Kernel;
 
 impl Cpu {
@@ -12,16 +12,18 @@ impl Cpu {
     pub fn bytes_of_sweep(&self, kernel: Kernel) -> usize {
         let start = if kernel.reads_start() { size_of::<Row8>() } else { 0 };
         let body = size_of::<State>() + size_of::<Row8>() + start;
-        let impulses = size_of_val(&self.contact_impulses[..]);
-        self.bytes_of_groups() + 2 * impulses + self.contacts.groups.len() * 2 * WIDTH * body
+        let has_friction = kernel.rules().is_some_and(|rules| rules.friction != FrictionRule::None);
+        let rows = self.contact_points.bytes(has_friction) + 2 * self.contact_impulses.bytes(has_friction);
+        self.bytes_of_groups() + rows + self.contacts.groups.len() * 2 * WIDTH * body
     }
 
-    /// Bytes of all that such a sweep reads or writes, each counted once.
+    /// Bytes of all that sweeps read or write, each counted once.
     pub fn bytes_of_contacts(&self) -> usize {
-        self.bytes_of_groups() + size_of_val(&self.contact_impulses[..]) + size_of_val(&self.bodies[..])
+        let rows = self.contact_points.bytes(true) + self.contact_impulses.bytes(true);
+        self.bytes_of_groups() + rows + size_of_val(&self.bodies[..])
     }
 
     fn bytes_of_groups(&self) -> usize {
-        self.contacts.groups.len() * size_of::<LaneGroup>() + self.contacts.points.len() * size_of::<[Wide; 12]>()
+        size_of_val(&self.contacts.groups[..])
     }
 }

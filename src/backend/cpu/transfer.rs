@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::constraint::Constraint;
 use super::lane_group::{LaneGroup, NO_ROW};
+use super::lane_rows::{LaneImpulses, OwnImpulses, OwnPoints, SharedImpulses, SharedPoints};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, lanes};
 use crate::problem::StepProblem;
 
@@ -23,8 +24,8 @@ pub(super) struct Load<'a, C> {
     /// Body by body; last that of the placeholder.
     pub places: &'a [BodyPlace],
     pub groups: Shared<'a, LaneGroup>,
-    pub points: Shared<'a, [Wide; 12]>,
-    pub impulses: Shared<'a, [Wide; 4]>,
+    pub points: SharedPoints<'a>,
+    pub impulses: SharedImpulses<'a>,
     pub constraint: PhantomData<C>,
 }
 
@@ -32,7 +33,7 @@ pub(super) struct Load<'a, C> {
 pub(super) struct Store<'a, C> {
     pub rows: &'a [C],
     pub groups: &'a [LaneGroup],
-    pub impulses: &'a [[Wide; 4]],
+    pub impulses: &'a LaneImpulses,
     pub to: Shared<'a, [f32; 4]>,
 }
 
@@ -42,11 +43,10 @@ impl<C: Constraint> Work for Load<'_, C> {
         // SAFETY: tasks have different groups: `Threads::spread` cuts their range.
         for group in unsafe { self.groups.slice(range) } {
             let own = group.impulses();
-            let own_points = if C::are_with_points(self.problem) { own.clone() } else { 0..0 };
             // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
-            let (points, impulses) = unsafe { (self.points.slice(own_points), self.impulses.slice(own)) };
+            let (points, impulses) = unsafe { (self.points.slice(own.clone()), self.impulses.slice(own)) };
             self.take_bodies(group);
-            if group.is_full() && (C::HAS_POINTS || points.is_empty()) {
+            if group.is_full() && (C::HAS_POINTS || points.arms.is_empty()) {
                 self.take_full::<L>(group, points, impulses);
             } else {
                 self.take_some(group, points, impulses);
@@ -69,7 +69,7 @@ impl<C: Constraint> Load<'_, C> {
 
     /// A row in each lane.
     #[inline(always)]
-    fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
+    fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let own: [&C; WIDTH] = lanes!(lane => &rows[group.rows[lane] as usize]);
         let numbers: [&[f32]; WIDTH] = lanes!(lane => bytemuck::cast_slice(std::slice::from_ref(own[lane])));
@@ -78,29 +78,33 @@ impl<C: Constraint> Load<'_, C> {
             *wide = if at < 8 { low[at] } else { high[at + 8 - numbers[0].len()] };
         }
         let firsts: [usize; WIDTH] = lanes!(lane => C::impulse(rows, group.rows[lane], 0));
-        for (k, point) in points.iter_mut().enumerate() {
+        for (k, arms) in points.arms.iter_mut().enumerate() {
             let all: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
             let rows: [&[f32]; WIDTH] = lanes!(lane => &all[firsts[lane] + k][..]);
-            point[..8].copy_from_slice(&first_eight::<L>(&rows));
-            point[4..].copy_from_slice(&last_eight::<L>(&rows));
+            *arms = first_eight::<L>(&rows);
+            let [.., tangent_mass, approach, slip_1, slip_2] = last_eight::<L>(&rows);
+            points.tangent_masses[k] = tangent_mass;
+            if let Some(others) = points.others.get_mut(k) {
+                *others = [approach, slip_1, slip_2];
+            }
         }
         let all = C::impulses(self.problem);
-        if let [only] = impulses {
+        if group.count == 1 {
             for (lane, &first) in firsts.iter().enumerate() {
-                set_lane(only, lane, &all[first]);
+                impulses.set_lane(0, lane, &all[first]);
             }
             return;
         }
-        for k in pairs_of(impulses.len()) {
+        for k in pairs_of(group.count as usize) {
             let pairs: [&[f32]; WIDTH] = lanes!(lane => all[firsts[lane] + k..firsts[lane] + k + 2].as_flattened());
-            let both = first_eight::<L>(&pairs);
-            impulses[k].copy_from_slice(&both[..4]);
-            impulses[k + 1].copy_from_slice(&both[4..]);
+            let [a, b, c, d, e, f, g, h] = first_eight::<L>(&pairs);
+            impulses.set(k, [a, b, c, d]);
+            impulses.set(k + 1, [e, f, g, h]);
         }
     }
 
     /// Lanes without a row hold zeros.
-    fn take_some(&self, group: &mut LaneGroup, points: &mut [[Wide; 12]], impulses: &mut [[Wide; 4]]) {
+    fn take_some(&self, group: &mut LaneGroup, mut points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let all_impulses = C::impulses(self.problem);
         for (lane, row) in group.rows.into_iter().enumerate() {
@@ -110,13 +114,13 @@ impl<C: Constraint> Load<'_, C> {
                 C::HEADER.map(|at| numbers[at])
             });
             set_lane(&mut group.header, lane, &header);
-            for (k, point) in points.iter_mut().enumerate() {
+            for k in 0..points.arms.len() {
                 let numbers = constraint.and_then(|constraint| constraint.point(self.problem, k));
-                set_lane(point, lane, numbers.unwrap_or(&[0.0; 12]));
+                points.set_lane(k, lane, numbers.unwrap_or(&[0.0; 12]));
             }
-            for (k, impulse) in impulses.iter_mut().enumerate() {
+            for k in 0..group.count as usize {
                 let numbers = constraint.and_then(|_| all_impulses.get(C::impulse(rows, row, k)));
-                set_lane(impulse, lane, numbers.unwrap_or(&[0.0; 4]));
+                impulses.set_lane(k, lane, numbers.unwrap_or(&[0.0; 4]));
             }
         }
     }
@@ -126,20 +130,22 @@ impl<C: Constraint> Work for Store<'_, C> {
     #[inline(always)]
     fn over<L: Lanes>(&self, range: Range<usize>) {
         for group in &self.groups[range] {
-            let impulses = &self.impulses[group.impulses()];
-            if !group.is_full() || impulses.len() == 1 || !C::HAS_POINTS {
+            let own = group.impulses();
+            if !group.is_full() || own.len() == 1 || !C::HAS_POINTS {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                    for (k, wide) in impulses.iter().enumerate() {
+                    for (k, i) in own.clone().enumerate() {
+                        let numbers = self.impulses.numbers(i).map(|number| number.0[lane]);
                         // SAFETY: `LaneLayout::make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
                         // constraints have different impulses.
-                        unsafe { self.to.write(C::impulse(self.rows, row, k), wide.map(|number| number.0[lane])) };
+                        unsafe { self.write(C::impulse(self.rows, row, k), &numbers) };
                     }
                 }
                 continue;
             }
             let firsts: [usize; WIDTH] = lanes!(lane => C::impulse(self.rows, group.rows[lane], 0));
-            for k in pairs_of(impulses.len()) {
-                let [[a, b, c, d], [e, f, g, h]] = [&impulses[k], &impulses[k + 1]];
+            for k in pairs_of(own.len()) {
+                let [a, b, c, d] = self.impulses.numbers(own.start + k);
+                let [e, f, g, h] = self.impulses.numbers(own.start + k + 1);
                 let pairs = L::scattered([
                     L::load(a),
                     L::load(b),
@@ -154,12 +160,26 @@ impl<C: Constraint> Work for Store<'_, C> {
                     let (one, two) = pair.as_chunks().0.split_at(1);
                     // SAFETY: as above.
                     unsafe {
-                        self.to.write(first + k, one[0]);
-                        self.to.write(first + k + 1, two[0]);
+                        self.write(first + k, &one[0]);
+                        self.write(first + k + 1, &two[0]);
                     }
                 }
             }
         }
+    }
+}
+
+impl<C: Constraint> Store<'_, C> {
+    /// Writes an impulse. The largest impulses stay as they are where the lanes have none.
+    ///
+    /// # Safety
+    /// No other task has the same one.
+    #[inline(always)]
+    unsafe fn write(&self, i: usize, numbers: &[f32; 4]) {
+        // SAFETY: the caller's promise.
+        let to = unsafe { &mut self.to.slice(i..i + 1)[0] };
+        let count = if self.impulses.peaks.is_empty() { 3 } else { 4 };
+        to[..count].copy_from_slice(&numbers[..count]);
     }
 }
 

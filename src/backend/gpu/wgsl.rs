@@ -177,6 +177,7 @@ fn rules_text(rules: Rules) -> String {
         measured,
         from_start,
         isotropic,
+        bounces,
         friction,
         axes: _,
     } = rules;
@@ -187,7 +188,7 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start}, {isotropic})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
     )
 }
 

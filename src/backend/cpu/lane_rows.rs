@@ -1,0 +1,310 @@
+//! Points and impulses of the lanes, apart by the sweeps that use them: a sweep streams what it reads and no more.
+//!
+//! A biased sweep without friction reads the first eight numbers of a point and its normal impulse; friction reads one number more and the two
+//! impulses along the tangents. Velocities of approach, slips and largest impulses stand in the lanes only where a pass uses them.
+
+#![allow(unsafe_code)]
+
+use std::ops::Range;
+
+use super::constraint::AxisRows;
+use crate::kernels::contact::PointRows;
+use crate::kernels::{Axis, Impulse, Point};
+use crate::lanes::{Lanes, Shared, Wide};
+use crate::math::{Vec3, vec3};
+
+/// Lanes of some numbers, without a closure: a closure would be compiled for the plain instruction set.
+macro_rules! loaded {
+    ($numbers:expr; $($i:literal)*) => {{
+        let numbers = $numbers;
+        [$(L::load(&numbers[$i])),*]
+    }};
+}
+
+/// The numbers of points, or of the axes of joints, by the order of their rows.
+#[derive(Default)]
+pub(super) struct LanePoints {
+    /// Arms, separation, normal mass; the first eight numbers of an axis.
+    pub arms: Vec<[Wide; 8]>,
+    /// Tangent mass; the ninth number of an axis.
+    pub tangent_masses: Vec<Wide>,
+    /// Velocity of approach and slip; the last three numbers of an axis. Empty where no pass reads them.
+    pub others: Vec<[Wide; 3]>,
+}
+
+/// Impulses, by the order of their rows.
+#[derive(Default)]
+pub(super) struct LaneImpulses {
+    pub normals: Vec<Wide>,
+    /// Along both tangents.
+    pub tangents: Vec<[Wide; 2]>,
+    /// The largest along the normal; empty where no pass keeps them.
+    pub peaks: Vec<Wide>,
+}
+
+impl LanePoints {
+    pub fn resize(&mut self, count: usize, has_others: bool) {
+        self.arms.resize(count, Default::default());
+        self.tangent_masses.resize(count, Default::default());
+        self.others.resize(if has_others { count } else { 0 }, Default::default());
+    }
+
+    pub fn shared(&mut self) -> SharedPoints<'_> {
+        let Self { arms, tangent_masses, others } = self;
+        SharedPoints {
+            arms: Shared::new(arms),
+            tangent_masses: Shared::new(tangent_masses),
+            others: Shared::new(others),
+        }
+    }
+
+    /// Bytes that a sweep with friction or without reads; both leave the last numbers alone.
+    pub fn bytes(&self, has_friction: bool) -> usize {
+        size_of_val(&self.arms[..]) + if has_friction { size_of_val(&self.tangent_masses[..]) } else { 0 }
+    }
+}
+
+impl LaneImpulses {
+    pub fn resize(&mut self, count: usize, has_peaks: bool) {
+        self.normals.resize(count, Default::default());
+        self.tangents.resize(count, Default::default());
+        self.peaks.resize(if has_peaks { count } else { 0 }, Default::default());
+    }
+
+    pub fn shared(&mut self) -> SharedImpulses<'_> {
+        let Self { normals, tangents, peaks } = self;
+        SharedImpulses { normals: Shared::new(normals), tangents: Shared::new(tangents), peaks: Shared::new(peaks) }
+    }
+
+    /// Normal impulse and friction, and the largest normal impulse or zero.
+    #[inline(always)]
+    pub fn numbers(&self, i: usize) -> [&Wide; 4] {
+        let [one, two] = &self.tangents[i];
+        [&self.normals[i], one, two, if self.peaks.is_empty() { &ZERO } else { &self.peaks[i] }]
+    }
+
+    /// The three components of sixteen impulses.
+    pub fn components<L: Lanes>(&self, i: usize) -> Vec3<L> {
+        vec3(L::load(&self.normals[i]), L::load(&self.tangents[i][0]), L::load(&self.tangents[i][1]))
+    }
+
+    /// Bytes that a sweep with friction or without reads and writes.
+    pub fn bytes(&self, has_friction: bool) -> usize {
+        size_of_val(&self.normals[..]) + if has_friction { size_of_val(&self.tangents[..]) } else { 0 }
+    }
+}
+
+const ZERO: Wide = Wide([0.0; crate::lanes::WIDTH]);
+
+/// Points, shared by threads that have different ones.
+#[derive(Clone, Copy)]
+pub(super) struct SharedPoints<'a> {
+    arms: Shared<'a, [Wide; 8]>,
+    tangent_masses: Shared<'a, Wide>,
+    others: Shared<'a, [Wide; 3]>,
+}
+
+/// Impulses, shared likewise.
+#[derive(Clone, Copy)]
+pub(super) struct SharedImpulses<'a> {
+    normals: Shared<'a, Wide>,
+    tangents: Shared<'a, [Wide; 2]>,
+    peaks: Shared<'a, Wide>,
+}
+
+impl<'a> SharedPoints<'a> {
+    /// Some points, to write in place.
+    ///
+    /// # Safety
+    /// No other thread reads or writes them meanwhile.
+    #[inline(always)]
+    pub unsafe fn slice(&self, range: Range<usize>) -> OwnPoints<'a> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            OwnPoints {
+                arms: self.arms.slice(present(&self.arms, &range)),
+                tangent_masses: self.tangent_masses.slice(present(&self.tangent_masses, &range)),
+                others: self.others.slice(present(&self.others, &range)),
+            }
+        }
+    }
+}
+
+impl<'a> SharedImpulses<'a> {
+    /// Some impulses, to write in place.
+    ///
+    /// # Safety
+    /// As of points.
+    #[inline(always)]
+    pub unsafe fn slice(&self, range: Range<usize>) -> OwnImpulses<'a> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            OwnImpulses {
+                peaks: self.peaks.slice(present(&self.peaks, &range)),
+                normals: self.normals.slice(range.clone()),
+                tangents: self.tangents.slice(range),
+            }
+        }
+    }
+
+    /// The component `k` of one lane.
+    ///
+    /// # Safety
+    /// No other thread reads or writes it meanwhile.
+    #[inline(always)]
+    pub unsafe fn number(&self, i: usize, k: usize, lane: usize) -> &'a mut f32 {
+        let wide = match k {
+            0 => self.normals.as_ptr().wrapping_add(i),
+            _ => self.tangents.as_ptr().cast::<Wide>().wrapping_add(2 * i + k - 1),
+        };
+        // SAFETY: the caller's promise. This reaches one lane, and no other.
+        unsafe { &mut *wide.cast::<f32>().add(lane) }
+    }
+}
+
+/// The range, or none where nothing stands.
+#[inline(always)]
+fn present<T: Copy>(rows: &Shared<T>, range: &Range<usize>) -> Range<usize> {
+    if rows.is_empty() { 0..0 } else { range.clone() }
+}
+
+/// Points of one thread.
+pub(super) struct OwnPoints<'a> {
+    pub arms: &'a mut [[Wide; 8]],
+    pub tangent_masses: &'a mut [Wide],
+    pub others: &'a mut [[Wide; 3]],
+}
+
+/// Impulses of one thread.
+pub(super) struct OwnImpulses<'a> {
+    pub normals: &'a mut [Wide],
+    pub tangents: &'a mut [[Wide; 2]],
+    pub peaks: &'a mut [Wide],
+}
+
+impl OwnPoints<'_> {
+    /// Writes one lane of a point.
+    pub fn set_lane(&mut self, k: usize, lane: usize, numbers: &[f32; 12]) {
+        let [arms @ .., tangent_mass, approach, slip_1, slip_2] = numbers;
+        let arms: &[f32; 8] = arms;
+        self.arms[k].iter_mut().zip(arms).for_each(|(wide, number)| wide.0[lane] = *number);
+        self.tangent_masses[k].0[lane] = *tangent_mass;
+        if let Some(others) = self.others.get_mut(k) {
+            others.iter_mut().zip([approach, slip_1, slip_2]).for_each(|(wide, number)| wide.0[lane] = *number);
+        }
+    }
+}
+
+impl OwnImpulses<'_> {
+    /// Writes sixteen impulses.
+    #[inline(always)]
+    pub fn set(&mut self, k: usize, [normal, tangent_1, tangent_2, peak]: [Wide; 4]) {
+        (self.normals[k], self.tangents[k]) = (normal, [tangent_1, tangent_2]);
+        if let Some(own) = self.peaks.get_mut(k) {
+            *own = peak;
+        }
+    }
+
+    /// Writes one lane.
+    pub fn set_lane(&mut self, k: usize, lane: usize, [normal, tangent_1, tangent_2, peak]: &[f32; 4]) {
+        self.normals[k].0[lane] = *normal;
+        [self.tangents[k][0].0[lane], self.tangents[k][1].0[lane]] = [*tangent_1, *tangent_2];
+        if let Some(own) = self.peaks.get_mut(k) {
+            own.0[lane] = *peak;
+        }
+    }
+
+    /// Changes the three components.
+    #[inline(always)]
+    pub fn set_components<L: Lanes>(&mut self, k: usize, Vec3 { x, y, z }: Vec3<L>) {
+        (self.normals[k], self.tangents[k]) = (x.store(), [y.store(), z.store()]);
+    }
+
+    /// The three components of sixteen impulses.
+    #[inline(always)]
+    pub fn components<L: Lanes>(&self, k: usize) -> Vec3<L> {
+        self.impulse::<L>(k).components()
+    }
+
+    /// Sixteen impulses; the largest are zero where no pass keeps them.
+    #[inline(always)]
+    pub fn impulse<L: Lanes>(&self, k: usize) -> Impulse<L> {
+        let [tangent_1, tangent_2] = loaded!(&self.tangents[k]; 0 1);
+        let peak = match self.peaks.get(k) {
+            Some(peak) => L::load(peak),
+            None => L::constant(0.0),
+        };
+        Impulse { normal: L::load(&self.normals[k]), tangent_1, tangent_2, peak }
+    }
+}
+
+/// The points of a group and their impulses.
+pub(super) struct GroupRows<'a> {
+    pub points: OwnPoints<'a>,
+    pub impulses: OwnImpulses<'a>,
+}
+
+impl<L: Lanes> PointRows<L> for GroupRows<'_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.impulses.normals.len()
+    }
+    #[inline(always)]
+    fn point(&self, k: usize) -> Point<L> {
+        let [ax, ay, az, separation, bx, by, bz, normal_mass] = loaded!(&self.points.arms[k]; 0 1 2 3 4 5 6 7);
+        let [approach_velocity, slip_1, slip_2] = match self.points.others.get(k) {
+            Some(others) => loaded!(others; 0 1 2),
+            None => [L::constant(0.0); 3],
+        };
+        Point {
+            r_a: vec3(ax, ay, az),
+            separation,
+            r_b: vec3(bx, by, bz),
+            normal_mass,
+            tangent_mass: L::load(&self.points.tangent_masses[k]),
+            approach_velocity,
+            slip_1,
+            slip_2,
+        }
+    }
+    #[inline(always)]
+    fn impulse(&self, k: usize) -> Impulse<L> {
+        self.impulses.impulse(k)
+    }
+    #[inline(always)]
+    fn set_normal(&mut self, k: usize, normal: L) {
+        self.impulses.normals[k] = normal.store();
+    }
+    #[inline(always)]
+    fn set_friction(&mut self, k: usize, tangent_1: L, tangent_2: L) {
+        self.impulses.tangents[k] = [tangent_1.store(), tangent_2.store()];
+    }
+    #[inline(always)]
+    fn set_peak(&mut self, k: usize, peak: L) {
+        self.impulses.peaks[k] = peak.store();
+    }
+}
+
+/// Those of a joint stand after its anchors.
+impl<L: Lanes> AxisRows<L> for GroupRows<'_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.points.arms.len().saturating_sub(1)
+    }
+    #[inline(always)]
+    fn axis(&self, k: usize) -> Axis<L> {
+        let [x, y, z, is_linear, gap, range, speed, max_impulse] = loaded!(&self.points.arms[k + 1]; 0 1 2 3 4 5 6 7);
+        let [mass_scale, impulse_scale, length] = loaded!(&self.points.others[k + 1]; 0 1 2);
+        let rate = L::load(&self.points.tangent_masses[k + 1]);
+        let direction = vec3(x, y, z);
+        Axis { direction, is_linear, gap, range, speed, max_impulse, rate, mass_scale, impulse_scale, length }
+    }
+    #[inline(always)]
+    fn impulse(&self, k: usize) -> L {
+        L::load(&self.impulses.normals[k + 1])
+    }
+    #[inline(always)]
+    fn set_impulse(&mut self, k: usize, impulse: L) {
+        self.impulses.normals[k + 1] = impulse.store();
+    }
+}
