@@ -285,7 +285,7 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     let mut other = bytes.clone();
     other[8] += 1;
     let line = refusal(&other);
-    assert!(line.contains("version 2") && line.contains("reads 1"), "{line}");
+    assert!(line.contains("version 3") && line.contains("reads 2"), "{line}");
     assert!(refusal(b"a file of another program").contains("these bytes are none"));
 }
 
