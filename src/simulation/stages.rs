@@ -388,7 +388,7 @@ impl Stages {
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
         }
         self.break_joints(world, dt);
-        self.sleep.after_step(world, &self.detector, dt);
+        self.sleep.after_step(world, &self.detector, &self.key.config, dt);
     }
 }
 
