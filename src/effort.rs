@@ -28,6 +28,8 @@ pub struct Interface {
     pub b: u32,
     /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
     pub need: f32,
+    /// How deep its surfaces overlap, over the sag that the settings promise; 0 of a joint, and of a contact that class 0 is enough for.
+    pub overlap: f32,
     /// Whether it is a joint, which no other takes load from.
     pub is_joint: bool,
 }
@@ -39,6 +41,8 @@ pub struct Effort {
     classes: Vec<u8>,
     /// Steps in which the next lower class would have kept its promise, body by body.
     calm_for: Vec<u8>,
+    /// How deep contacts of its island overlapped, over the promise, when its class changed in the hope of less; 0 where it may rise. Body by body.
+    overlapped: Vec<f32>,
     /// Bodies that began on others, unbalanced by any forces, and whose islands did not come to rest since.
     restless: Vec<u32>,
     /// The need that gives them [`RESTLESS_SUBSTEPS`].
@@ -57,6 +61,8 @@ pub struct Effort {
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
     highest: u8,
+    /// The lowest class from which on a class has to show that it lessens overlaps.
+    judged_from: u8,
     /// Bodies that can be pushed, asleep or not.
     movable: u32,
     /// Bodies that are awake and can be pushed, class by class.
@@ -71,6 +77,7 @@ pub struct Effort {
 crate::saved::cloned!(Effort {
     classes,
     calm_for,
+    overlapped,
     restless,
     restless_need,
     heaps,
@@ -81,6 +88,7 @@ crate::saved::cloned!(Effort {
     used,
     any_above,
     highest,
+    judged_from,
     movable,
     counts,
 } scratch { awake, islands, of_root });
@@ -94,6 +102,7 @@ impl Saved for Effort {
         let Self {
             classes,
             calm_for,
+            overlapped,
             restless,
             restless_need,
             heaps,
@@ -104,6 +113,7 @@ impl Saved for Effort {
             used,
             any_above,
             highest,
+            judged_from,
             movable,
             counts,
             awake: _,
@@ -114,12 +124,14 @@ impl Saved for Effort {
         if A::READS {
             classes.resize(bodies, 0);
             calm_for.resize(bodies, 0);
+            overlapped.resize(bodies, 0.0);
             heaps.resize(bodies, false);
             heaps_before.resize(bodies, false);
         }
         archive.runs(bodies, |i, archive| {
             classes[i].walk(archive)?;
             calm_for[i].walk(archive)?;
+            overlapped[i].walk(archive)?;
             heaps[i].walk(archive)?;
             heaps_before[i].walk(archive)?;
             ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))
@@ -132,6 +144,7 @@ impl Saved for Effort {
         used.walk(archive)?;
         any_above.walk(archive)?;
         highest.walk(archive)?;
+        judged_from.walk(archive)?;
         movable.walk(archive)?;
         counts.walk(archive)
     }
@@ -145,6 +158,9 @@ const HEAPS_EVERY: u32 = 8;
 /// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
 /// 0.12 of the radius thick, 4 of 15 stand with 8, 9 with 16 and 10 with 32.
 const RESTLESS_SUBSTEPS: f32 = 32.0;
+/// Fewest substeps of a class that has to show that it lessens overlaps. A contact is at rest within a step of so many: the damper of the default
+/// lets it sag over 25.
+const JUDGED_SUBSTEPS: u32 = 64;
 /// What is as fast as after a fall of so long does not come to rest where it began (s).
 const FALL: f32 = 0.1;
 
@@ -176,6 +192,7 @@ impl Effort {
         interfaces: impl FnOnce() -> I,
     ) -> bool {
         self.highest = Self::highest(config);
+        self.judged_from = (JUDGED_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
         self.restless_need = (RESTLESS_SUBSTEPS / config.substeps as f32).powi(2);
         self.has_heaps = config.has_heap_springs();
         if self.heaps_change {
@@ -186,6 +203,7 @@ impl Effort {
         if is_first {
             self.classes.resize(world.bodies.len(), 0);
             self.calm_for.resize(world.bodies.len(), 0);
+            self.overlapped.resize(world.bodies.len(), 0.0);
             self.heaps.resize(world.bodies.len(), false);
             self.heaps_before.resize(world.bodies.len(), false);
             self.movable = world.dynamic_count() as u32;
@@ -203,7 +221,8 @@ impl Effort {
         // No contact holds bodies of two kinds.
         let has_kinds = self.used.len() > 1;
         let is_restless = !self.restless.is_empty();
-        let changed = (is_first || self.any_above || is_above || looks || has_kinds || is_restless)
+        let is_squeezed = self.overlapped.iter().any(|&before| before > 0.0);
+        let changed = (is_first || self.any_above || is_above || is_squeezed || looks || has_kinds || is_restless)
             && self.follow_islands(world, asleep, interfaces(), looks);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
@@ -224,10 +243,11 @@ impl Effort {
         self.restless.retain(|&body| changed.binary_search(&(body as usize)).is_err());
         self.classes.resize(bodies, 0);
         self.calm_for.resize(bodies, 0);
+        self.overlapped.resize(bodies, 0.0);
         self.heaps.resize(bodies, false);
         self.heaps_before.resize(bodies, false);
         for &i in changed.iter().filter(|&&i| i < bodies) {
-            (self.classes[i], self.calm_for[i]) = (0, 0);
+            (self.classes[i], self.calm_for[i], self.overlapped[i]) = (0, 0, 0.0);
             (self.heaps[i], self.heaps_before[i]) = (false, false);
         }
         self.movable = world.dynamic_count() as u32;
@@ -252,7 +272,7 @@ impl Effort {
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
-            Interface { a, b, need: need as f32, is_joint: false }
+            Interface { a, b, need: need as f32, overlap: 0.0, is_joint: false }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
         self.follow_islands(world, &[], interfaces.iter().copied(), false);
@@ -276,7 +296,7 @@ impl Effort {
         let root = |body: u32| roots[body as usize] as usize;
         self.of_root.clear();
         self.of_root.resize(bodies, Island::NONE);
-        for Interface { a, b, need, is_joint } in interfaces {
+        for Interface { a, b, need, overlap, is_joint } in interfaces {
             let body = if a == IMMOVABLE { b } else { a };
             if body != IMMOVABLE {
                 let island = &mut self.of_root[root(body)];
@@ -284,8 +304,8 @@ impl Effort {
                     island.whole_need = island.whole_need.max(need);
                     island.has_joints = true;
                 } else {
-                    island.need = island.need.max(need);
-                    island.squares += need * need;
+                    island.needs.add(need);
+                    island.overlap = island.overlap.max(overlap);
                     island.contacts += 1;
                 }
             }
@@ -301,6 +321,7 @@ impl Effort {
             island.bodies += 1;
             island.class = island.class.max(self.classes[i]);
             island.calm_for = island.calm_for.min(self.calm_for[i]);
+            island.overlapped = island.overlapped.max(self.overlapped[i]);
             island.is_heap |= self.heaps[i];
             island.fastest = island.fastest.max(body.linear_velocity.length());
         }
@@ -312,15 +333,15 @@ impl Effort {
             if looks_for_heaps {
                 island.is_heap = self.has_heaps && island.becomes_heap();
             }
-            (island.class, island.calm_for) = island.next(self.highest);
+            (island.class, island.calm_for, island.overlapped) = island.next(self.highest, self.judged_from);
         }
         let mut changed = false;
         let mut kinds = [[0; 2]; EFFORT_CLASSES];
         for &(body, is_dynamic) in &self.awake {
-            let Island { class, calm_for, is_heap, .. } = self.of_root[root(body)];
+            let Island { class, calm_for, overlapped, is_heap, .. } = self.of_root[root(body)];
             let body = body as usize;
             changed |= class != self.classes[body];
-            (self.classes[body], self.calm_for[body]) = (class, calm_for);
+            (self.classes[body], self.calm_for[body], self.overlapped[body]) = (class, calm_for, overlapped);
             self.heaps[body] = is_heap;
             self.heaps_change |= is_heap != self.heaps_before[body];
             kinds[usize::from(class)][usize::from(is_heap)] += u32::from(is_dynamic);

@@ -4,11 +4,11 @@
 //! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
 //! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it, or when
 //! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it. A body that
-//! touches nothing never sleeps. Everything is decided in the order of bodies and pairs, whatever the number of threads.
+//! touches nothing never sleeps, nor does an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
 
-use crate::collide::{Activity, Detector};
+use crate::collide::{Activity, Detector, Pair};
 use crate::config::SolverConfig;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
@@ -86,6 +86,19 @@ crate::saved::cloned!(Sleep {
     count,
     steps,
 } scratch { islands });
+
+/// The overlap from which on a body has to lie still, over the sag that the settings promise: preloads lift what rests out of deeper overlaps.
+const DEEP: f32 = 0.25;
+/// A body comes out of another if it does so within so long (s), as fast as it is now.
+const COMING_OUT: f32 = 10.0;
+
+/// Whether bodies that overlap come apart.
+fn comes_out(pair: &Pair, world: &World, config: &SolverConfig) -> bool {
+    let deep = DEEP * config.promised_sag(pair.size);
+    let going_on = pair.manifolds.iter().filter(|manifold| !manifold.has_ended());
+    let mut points = going_on.flat_map(|manifold| pair.overlaps(manifold, world));
+    points.any(|(overlap, parting)| overlap > deep && COMING_OUT * parting > overlap)
+}
 
 /// Islands are looked for in every so many steps.
 const EVERY: u32 = 8;
@@ -287,7 +300,7 @@ impl Sleep {
     }
 
     /// Notes which bodies were slow in a step of `dt` seconds, and lets islands fall asleep that were slow for long enough.
-    pub fn after_step(&mut self, world: &mut World, detector: &Detector, dt: f32) {
+    pub fn after_step(&mut self, world: &mut World, detector: &Detector, config: &SolverConfig, dt: f32) {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
             if body.kind != BodyKind::Dynamic {
@@ -300,11 +313,11 @@ impl Sleep {
         }
         self.steps += 1;
         if ready && self.steps.is_multiple_of(EVERY) {
-            self.let_islands_sleep(world, detector);
+            self.let_islands_sleep(world, detector, config);
         }
     }
 
-    fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector) {
+    fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector, config: &SolverConfig) {
         // Islands of bodies that are awake; bodies that something holds; bodies that touch a driven body.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut held = vec![false; self.asleep.len()];
@@ -324,6 +337,11 @@ impl Sleep {
             }
         }
         let mut restless = vec![false; self.asleep.len()];
+        for pair in detector.pairs().filter(|pair| pair.takes_part && comes_out(pair, world, config)) {
+            for body in [pair.body_a, pair.body_b].into_iter().filter(|&body| is_dynamic(body as usize)) {
+                restless[self.islands.root(body) as usize] = true;
+            }
+        }
         let awake: Vec<usize> = (0..self.asleep.len()).filter(|&i| is_dynamic(i) && !self.asleep[i]).collect();
         for &i in &awake {
             restless[self.islands.root(i as u32) as usize] |= self.slow_for[i] < self.after || !held[i] || driven[i];

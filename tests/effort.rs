@@ -9,7 +9,9 @@ use drystone::config::{Method, Stabilization};
 use drystone::glam::Vec3;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::compare;
-use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem};
+use drystone::{
+    Backend, Body, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World,
+};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -47,6 +49,36 @@ fn a_cube_bears_one_of_a_million_times_its_mass() {
         let deepest = simulation.penetration().max;
         assert!(deepest < 3e-3, "{ratio}: {deepest} m");
     }
+}
+
+/// Walls hold a cube by 5 cm on either side: no number of substeps lessens that overlap. The cube took 1,024 substeps for ever.
+#[test]
+fn what_walls_hold_takes_no_more_substeps_than_help() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let wall = |x: f32| Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0);
+    let cube = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
+    world.add(wall(-0.65));
+    let right = world.insert(wall(0.65));
+    let mut simulation =
+        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world");
+    let mut most = [0; 10];
+    for step in 0..600 {
+        run(&mut simulation, 1);
+        most[step / 60] = most[step / 60].max(simulation.substeps_of(cube));
+    }
+    assert!(simulation.penetration().max > 0.04, "the walls hold it");
+    assert!(most[0] <= 128 && most[9] == 8, "{most:?}");
+    // The cube is free, and bears a thousand times its mass as any other does.
+    simulation.world.remove(right);
+    run(&mut simulation, 60);
+    let at = simulation.world.bodies[cube].position;
+    let load = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).density(1e6).position(at.x, at.y + 0.4, at.z);
+    simulation.world.insert(load.velocity(1e-9 * Vec3::NEG_Y, Vec3::ZERO));
+    run(&mut simulation, 240);
+    assert!(simulation.substeps_of(cube) >= 32, "{}", simulation.substeps_of(cube));
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 0.5e-3, "{deepest} m");
 }
 
 /// Flat bodies sag by a share of their thickness: coins slide apart where cubes of the same load stand.

@@ -56,6 +56,27 @@ fn asleep(simulation: &Simulation, bodies: std::ops::Range<usize>) -> bool {
     count > 0
 }
 
+/// A cube 16 mm deep in the floor comes out at 5 mm/s, which is slow enough to sleep: it slept 12 mm deep.
+#[test]
+fn what_still_comes_out_of_another_body_stays_awake() {
+    let mut world = World::new();
+    world.add(floor());
+    world.add(cube(0.0, 0.484));
+    // Walls hold this one for ever. It sleeps all the same.
+    for x in [9.02, 11.0 - 0.02] {
+        world.add(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0));
+    }
+    world.add(cube(10.0, 0.5));
+    let mut simulation = simulation(world, sleepy().with(|c| c.push_limit = 5e-3));
+    run(&mut simulation, 90);
+    let height = simulation.world.bodies[1].position.y;
+    assert!((0.485..0.495).contains(&height) && !simulation.is_asleep(1), "{height}");
+    run(&mut simulation, 510);
+    let height = simulation.world.bodies[1].position.y;
+    assert!((height - 0.5).abs() < 2e-3 && simulation.is_asleep(1), "{height}");
+    assert!(simulation.is_asleep(4) && simulation.penetration().max > 0.015);
+}
+
 /// Two stacks that have fallen asleep.
 fn sleeping() -> Simulation {
     let mut simulation = simulation(stacks(), sleepy());

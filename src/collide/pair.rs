@@ -11,6 +11,7 @@ use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::random::mixed;
+use crate::world::{Body, BodyKind, World};
 
 /// Two colliders whose boxes overlap.
 #[derive(Debug)]
@@ -87,6 +88,20 @@ impl Pair {
     /// Whether the bodies touch, or are about to.
     pub fn is_touching(&self) -> bool {
         self.manifolds.iter().any(|manifold| !manifold.has_ended())
+    }
+
+    /// The points of a manifold of this pair where the bodies of `world` are: how deep the surfaces overlap (m), and how fast they part (m/s).
+    pub fn overlaps<'a>(&self, manifold: &'a Manifold, world: &'a World) -> impl Iterator<Item = (f32, f32)> + 'a {
+        let [a, b] = [self.body_a, self.body_b].map(|body| &world.bodies[body as usize]);
+        let at = |body: &Body, anchor: Vec3| body.position + body.rotation * anchor;
+        // A body that became fixed keeps the numbers of its velocity, and they mean nothing.
+        let velocity =
+            |body: &Body, p: Vec3| if body.kind == BodyKind::Fixed { Vec3::ZERO } else { body.velocity_at(p) };
+        manifold.points().iter().map(move |point| {
+            let (on_a, on_b) = (at(a, point.anchor_a), at(b, point.anchor_b));
+            let parting = velocity(b, on_b) - velocity(a, on_a);
+            ((on_a - on_b).dot(manifold.normal), parting.dot(manifold.normal))
+        })
     }
 
     /// Ends all manifolds. A body that left the range touches nothing, so that the trouble does not spread.

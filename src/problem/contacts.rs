@@ -81,6 +81,13 @@ impl Materials {
     }
 }
 
+/// How deep the surfaces of a contact overlap where its bodies are now (m). A look at the rows would not do: a device may have them.
+fn overlap(world: &World, slot: &Slot, detector: &Detector) -> f32 {
+    let pair = detector.pair(slot.world, slot.pair);
+    let manifold = &pair.manifolds[slot.manifold as usize];
+    pair.overlaps(manifold, world).map(|(overlap, _)| overlap).fold(0.0, f32::max)
+}
+
 /// Slots that one task goes over.
 const SLOTS_A_TASK: usize = 4096;
 
@@ -204,6 +211,7 @@ impl ContactRows {
         &'a self,
         world: &'a World,
         detector: &'a Detector,
+        config: &'a SolverConfig,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
         let any_driven = world.bodies.iter().any(Body::is_driven);
         let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
@@ -217,7 +225,9 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need, is_joint: false }
+            let is_judged = slot.need > 1.0;
+            let overlap = if is_judged { overlap(world, slot, detector) / config.promised_sag(slot.size) } else { 0.0 };
+            Interface { a, b, need: slot.need, overlap, is_joint: false }
         })
     }
 

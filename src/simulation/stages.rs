@@ -279,7 +279,8 @@ impl Stages {
             }
             let has_new_bodies = contacts.note_new_bodies(world);
             let asleep = sleep.asleep();
-            let interfaces = || contacts.interfaces(world, detector).chain(joints.interfaces(world, asleep));
+            let of_contacts = || contacts.interfaces(world, detector, config);
+            let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
             effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         })
@@ -387,7 +388,7 @@ impl Stages {
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
         }
         self.break_joints(world, dt);
-        self.sleep.after_step(world, &self.detector, dt);
+        self.sleep.after_step(world, &self.detector, &self.key.config, dt);
     }
 }
 
