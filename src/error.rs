@@ -22,10 +22,10 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// The caller's input cannot be used: a scene file, a setting, a parameter.
-    #[error("{0}")]
+    #[error("{}", one_line(.0))]
     Input(String),
     /// A file could not be read or written.
-    #[error("{path}: {source}")]
+    #[error("{}: {source}", one_line(.path.display()))]
     File {
         /// The file as the caller named it.
         path: PathBuf,
@@ -70,6 +70,11 @@ impl Error {
             Self::Adapter(_) | Self::Lost(_) | Self::TooLarge(_) => 3,
         }
     }
+}
+
+/// A text as one line, whatever a file or a caller has in it.
+fn one_line(text: impl std::fmt::Display) -> String {
+    text.to_string().replace(char::is_control, " ")
 }
 
 /// An [`Error::Input`] with a text as of `format!`.

@@ -70,6 +70,12 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": shapes[0]: cylinder of half height NaN", |w| {
             w.add(Body::fixed().shape(Shape::cylinder(f32::NAN, 1.0)));
         }),
+        ("body 2 \"\": shapes[0]: cylinder of radius -1", |w| {
+            w.add(Body::fixed().shape(Shape::cylinder(1.0, -1.0)));
+        }),
+        ("body 2 \"\": shapes[0]: cone of half height -2", |w| {
+            w.add(Body::fixed().shape(Shape::cone(-2.0, 1.0)));
+        }),
         ("body 2 \"\": shapes[0]: cone of radius", |w| {
             w.add(Body::fixed().shape(Shape::cone(1.0, 2e9)));
         }),

@@ -77,6 +77,7 @@ impl ContactProblem {
     /// As text; every number is read back to the same bits.
     pub fn to_text(&self) -> String {
         let name = self.name.replace(char::is_control, " ");
+        let name = name.trim();
         let (bodies, contacts) = (self.bodies.len(), self.contacts.len());
         let mut text = format!("contacts 1\n{name}\nbodies {bodies} contacts {contacts}\n");
         let mut row = |head: String, numbers: &[f64]| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
-use parry3d::shape::{HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
+use parry3d::shape::{Cylinder, HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
 use super::limits::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result, ensure, input};
@@ -64,7 +64,8 @@ impl Shape {
 
     /// A cylinder along Y (m).
     pub fn cylinder(half_height: f32, radius: f32) -> Self {
-        Self(SharedShape::cylinder(half_height, radius), None)
+        // parry's own function panics at a size below 0.
+        Self(SharedShape::new(Cylinder { half_height, radius }), None)
     }
 
     /// A cone along Y, tip up (m).

@@ -162,8 +162,7 @@ pub fn main() -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(e) => {
-            // File names may contain line breaks; the message is one line.
-            say(format_args!("drystone: {}", e.to_string().replace(char::is_control, " ")));
+            say(format_args!("drystone: {e}"));
             e.exit_code().into()
         }
     }

@@ -66,6 +66,7 @@ impl Script {
 
     /// Tilts to the right and to the front at a time (degrees). The first point is reached from zero at time 0; the last tilt lasts.
     pub fn at(&self, time: f32) -> [f32; 2] {
+        let time = time.max(0.0);
         let after = self.points.partition_point(|p| p.0 <= time);
         let earlier = if after == 0 { (0.0, [0.0; 2]) } else { self.points[after - 1] };
         let Some(&later) = self.points.get(after) else { return earlier.1 };
@@ -93,6 +94,8 @@ mod tests {
         let script = Script::parse("s", "# a comment\n1 2 -4\n\n3 4 0 # another\n").expect("a script");
         assert_eq!(script.at(0.5), [1.0, -2.0]);
         assert_eq!(script.at(2.0), [3.0, -2.0]);
+        assert_eq!(script.at(-1.0), [0.0, 0.0]);
+        assert_eq!(Script::parse("s", "0 1 1\n1 2 2").expect("a script").at(-1.0), [1.0, 1.0]);
         assert_eq!((script.at(9.0), script.end()), ([4.0, 0.0], 3.0));
         assert_eq!(Script::parse("s", &script.text()).expect("its own text"), script);
     }

@@ -104,7 +104,7 @@ fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) ->
     if let Some(version) = value.get("version").filter(|&v| *v != 1) {
         return check::unknown_version(version);
     }
-    let message = error.inner().to_string().replace(char::is_control, " ");
+    let message = error.inner().to_string();
     let message = shorten(&message, "`drystone scenes --schema` lists all");
     let mut segments = error.path().iter();
     let place = match (segments.next(), segments.next()) {
@@ -119,5 +119,5 @@ fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) ->
         (None | Some(Segment::Unknown), _) => return Error::input(message),
         _ => error.path().to_string(),
     };
-    Error::input(message).within(place.replace(char::is_control, " "))
+    Error::input(message).within(place)
 }

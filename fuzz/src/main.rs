@@ -1,0 +1,44 @@
+//! libFuzzer over the kind of input that `DRYSTONE_FUZZ` names. With `DRYSTONE_FUZZ_SEEDS`, a folder, it writes good inputs there instead; without
+//! a kind it names all kinds, each with its longest input.
+#![no_main]
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use drystone_fuzz::{TARGETS, Target, target};
+
+fn chosen() -> &'static Target {
+    static CHOSEN: OnceLock<&Target> = OnceLock::new();
+    CHOSEN.get_or_init(|| {
+        let Ok(name) = std::env::var("DRYSTONE_FUZZ") else {
+            TARGETS.iter().for_each(|target| println!("{} {}", target.name, target.longest));
+            std::process::exit(0)
+        };
+        target(&name).unwrap_or_else(|| {
+            eprintln!("DRYSTONE_FUZZ={name}: is no kind of input");
+            std::process::exit(2)
+        })
+    })
+}
+
+fn write_seeds(folder: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let seeds = (chosen().seeds)();
+    (0..).zip(&seeds).try_for_each(|(k, seed): (u32, _)| std::fs::write(folder.join(format!("seed-{k}")), seed))
+}
+
+libfuzzer_sys::fuzz_target!(
+    init: {
+        chosen();
+        if let Some(folder) = std::env::var_os("DRYSTONE_FUZZ_SEEDS") {
+            std::process::exit(match write_seeds(Path::new(&folder)) {
+                Ok(()) => 0,
+                Err(error) => {
+                    eprintln!("{}: {error}", folder.display());
+                    1
+                }
+            });
+        }
+    },
+    |data: &[u8]| (chosen().check)(data)
+);

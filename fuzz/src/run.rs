@@ -1,0 +1,109 @@
+//! The same simulation on several backends and numbers of threads, in step.
+
+use std::sync::OnceLock;
+
+use drystone::{Backend, Body, Cpu, Reference, Result, Simulation, SolverConfig, World};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::{good, is_one_line};
+
+fn three_threads() -> &'static ThreadPool {
+    static POOL: OnceLock<ThreadPool> = OnceLock::new();
+    POOL.get_or_init(|| ThreadPoolBuilder::new().num_threads(3).build().expect("a pool"))
+}
+
+fn one_thread() -> &'static ThreadPool {
+    static POOL: OnceLock<ThreadPool> = OnceLock::new();
+    POOL.get_or_init(|| ThreadPoolBuilder::new().num_threads(1).build().expect("a pool"))
+}
+
+/// What runs a simulation.
+struct Way {
+    name: &'static str,
+    pool: fn() -> &'static ThreadPool,
+    backend: fn() -> Box<dyn Backend>,
+}
+
+const WAYS: [Way; 3] = [
+    Way { name: "reference", pool: one_thread, backend: || Box::new(Reference::<f32>::new()) },
+    Way { name: "lanes", pool: one_thread, backend: || Box::new(Cpu::new()) },
+    Way { name: "three threads", pool: three_threads, backend: || Box::new(Cpu::new()) },
+];
+
+/// A simulation in three ways.
+pub struct Runs {
+    simulations: Vec<Simulation>,
+}
+
+impl Runs {
+    /// None if the world or the settings are refused, by all with one line.
+    pub fn new(world: &World, config: &SolverConfig) -> Option<Self> {
+        let begun =
+            |way: &Way| (way.pool)().install(|| Simulation::new(world.clone(), config.clone(), (way.backend)()));
+        let simulations: Vec<_> = agreed(WAYS.iter().map(begun).collect())?;
+        Some(Self { simulations })
+    }
+
+    /// The one that others are compared with.
+    pub fn first(&mut self) -> &mut Simulation {
+        &mut self.simulations[0]
+    }
+
+    /// The same call on each.
+    pub fn each(&mut self, mut call: impl FnMut(&mut Simulation)) {
+        self.simulations.iter_mut().for_each(&mut call);
+    }
+
+    /// The same call on each, which all refuse or none.
+    pub fn all(&mut self, mut call: impl FnMut(&mut Simulation) -> Result<()>) -> bool {
+        agreed(self.simulations.iter_mut().map(&mut call).collect()).is_some()
+    }
+
+    /// Saves and loads each but the first.
+    pub fn reload(&mut self) {
+        for (simulation, way) in self.simulations.iter_mut().zip(&WAYS).skip(1) {
+            let saved = simulation.save();
+            *simulation = Simulation::load(&saved, (way.backend)()).expect("what was saved");
+        }
+    }
+
+    /// A step of each, which all refuse or none; what is no number is reported, and all have the same bits.
+    pub fn step(&mut self, dt: f32) -> bool {
+        let step = |(simulation, way): (&mut Simulation, &Way)| (way.pool)().install(|| simulation.step(dt));
+        let before = self.simulations[0].hash();
+        let stats = self.simulations.iter_mut().zip(&WAYS).map(step).collect();
+        let Some(stats) = agreed(stats) else {
+            assert_eq!(self.simulations[0].hash(), before, "a step that was refused moved something");
+            return false;
+        };
+        let first = &self.simulations[0];
+        for ((simulation, way), stats) in self.simulations.iter().zip(&WAYS).zip(&stats) {
+            let unreported = simulation.world.first_non_finite();
+            assert_eq!(stats.first_non_finite, unreported, "{}: the first body with a number that is none", way.name);
+            let differs =
+                first.world.bodies.iter().zip(&*simulation.world.bodies).position(|(a, b)| bits(a) != bits(b));
+            assert_eq!(differs, None, "{}: the first body whose bits are others", way.name);
+            assert!(first.events().iter().map(debug).eq(simulation.events().iter().map(debug)), "{}: events", way.name);
+        }
+        true
+    }
+}
+
+/// The motion of a body. What is no number has many bits, which no rule of arithmetic fixes.
+fn bits(body: &Body) -> [u32; 13] {
+    let Body { position: p, rotation: q, linear_velocity: v, angular_velocity: w, .. } = body;
+    let numbers = [p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z];
+    numbers.map(|x| if x.is_nan() { f32::NAN } else { x }.to_bits())
+}
+
+fn debug(event: &drystone::Event) -> String {
+    format!("{event:?}")
+}
+
+/// The values where all are good; none where all are refused with the same line.
+fn agreed<T>(results: Vec<Result<T>>) -> Option<Vec<T>> {
+    let lines: Vec<Option<String>> = results.iter().map(|r| r.as_ref().err().map(ToString::to_string)).collect();
+    assert!(lines.windows(2).all(|pair| pair[0] == pair[1]), "refused in one way and not in another: {lines:?}");
+    results.iter().filter_map(|r| r.as_ref().err()).for_each(is_one_line);
+    results.into_iter().map(good).collect()
+}
