@@ -33,6 +33,11 @@ fn available() -> Option<f64> {
     [machine, process, container].into_iter().flatten().reduce(f64::min)
 }
 
+/// Resident memory of this process (B), as Linux says it; none elsewhere.
+pub fn resident() -> Option<f64> {
+    number_after("/proc/self/status", "VmRSS:").map(|kib| kib * 1024.0)
+}
+
 /// The number behind a word that begins a line; none without the file, the line or a number, as in `unlimited`.
 fn number_after(path: impl AsRef<Path>, head: &str) -> Option<f64> {
     let text = std::fs::read_to_string(path).ok()?;

@@ -19,7 +19,7 @@ const LIBRARY: &[&[&str]] = &[
 ];
 
 /// The modules of the command, above the library.
-const COMMAND: &[&[&str]] = &[&["files", "settings"], &["hard"], &["report", "maze"], &["view"], &["commands"]];
+const COMMAND: &[&[&str]] = &[&["files", "settings"], &["hard"], &["report", "maze", "soak"], &["view"], &["commands"]];
 
 const LIB: &str = include_str!("../src/lib.rs");
 const CLI: &str = include_str!("../cli/src/lib.rs");

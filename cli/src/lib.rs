@@ -8,5 +8,6 @@ pub mod hard;
 pub mod maze;
 pub mod report;
 pub mod settings;
+pub mod soak;
 #[cfg(feature = "view")]
 pub mod view;

@@ -89,7 +89,7 @@ impl HardArgs {
 }
 
 /// `pass  what  value  (at most limit)`.
-fn line(check: &Check) -> String {
+pub(super) fn line(check: &Check) -> String {
     let verdict = if check.passed { "pass" } else { "FAIL" };
     let limit = match check.limit {
         Limit::AtMost(limit) => format!("at most {limit}"),

@@ -16,6 +16,7 @@ mod replay;
 mod report;
 mod run;
 mod scene;
+mod soak;
 mod solve;
 #[cfg(feature = "view")]
 mod view;
@@ -60,6 +61,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Run hard cases and say which pass.
     Hard(hard::HardArgs),
+    /// Let small worlds live for a million steps and say whether memory, time and energy stay level.
+    Soak(soak::SoakArgs),
     /// Play a game.
     Play(play::PlayArgs),
     /// Run a recording again and say where it differs.
@@ -150,6 +153,7 @@ pub fn main() -> std::process::ExitCode {
         #[cfg(feature = "fclib")]
         Command::Export(args) => args.run(),
         Command::Hard(args) => args.run(),
+        Command::Soak(args) => args.run(),
         Command::Play(args) => args.run(),
         Command::Replay(args) => args.run(),
         Command::Render(args) => args.run(),
