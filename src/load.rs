@@ -13,7 +13,8 @@ use rayon::prelude::*;
 
 use crate::config::{SolverConfig, Stabilization};
 use crate::error::{Error, Result, input};
-use crate::world::{Body, BodyKind, World, pose};
+use crate::math::rotation::product;
+use crate::world::{Body, BodyKind, World, placed, pose};
 
 /// Most substeps that the settings take.
 const MOST_SUBSTEPS: f64 = 4096.0;
@@ -187,7 +188,7 @@ fn upright_boxes(world: &World, up_of: impl Fn(usize) -> DMat3) -> Vec<Box3> {
         let turn = up_of(i).as_mat3();
         let rotation = glam::Quat::from_mat3(&turn);
         b.solids().fold(empty, |all, c| {
-            let at = pose(turn * b.position, rotation * b.rotation) * pose(c.position, c.rotation);
+            let at = placed(pose(turn * b.position, product(rotation, b.rotation)), pose(c.position, c.rotation));
             let (low, high) = if c.shape.is_half_space() {
                 (DVec3::NEG_INFINITY, DVec3::new(f64::INFINITY, at.translation.y.into(), f64::INFINITY))
             } else {

@@ -7,6 +7,7 @@
 //! `#[inline(always)]` and no closures: a helper that is not inlined loses the instruction set of its caller.
 
 mod movement;
+pub mod rotation;
 
 pub use movement::NormalMovement;
 

@@ -1,6 +1,8 @@
 //! Times and counts of one step, as data.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+#[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+use std::time::Instant;
 
 /// Times and counts of one step.
 ///
@@ -146,7 +148,7 @@ pub struct Traffic {
     pub longest_submission: Duration,
 }
 
-/// Wall time of each stage of a step.
+/// Wall time of each stage of a step; zero in a browser, whose WebAssembly has no clock.
 ///
 /// ```
 /// # use drystone::{Reference, Scene, Simulation, SolverConfig};
@@ -194,9 +196,32 @@ impl StageTimes {
     }
 }
 
+/// Takes the time since it was started. A browser's WebAssembly has no clock of its own: no time passes there.
+#[derive(Clone, Copy)]
+pub(crate) struct Stopwatch {
+    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+    start: Instant,
+}
+
+impl Stopwatch {
+    pub fn start() -> Self {
+        Self {
+            #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+            start: Instant::now(),
+        }
+    }
+
+    pub fn elapsed(&self) -> Duration {
+        #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+        return self.start.elapsed();
+        #[cfg(all(target_family = "wasm", target_os = "unknown"))]
+        Duration::ZERO
+    }
+}
+
 /// Runs `f` and adds how long it took to `time`.
 pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let result = f();
     *time += start.elapsed();
     result

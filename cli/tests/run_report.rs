@@ -15,7 +15,9 @@ fn the_report_names_the_largest_tower_that_stands() {
     // The measurement begins with a moved body of the tallest tower.
     scene.world.bodies[12].position += Vec3::X;
     let mut report = RunReport::new(&scene, &config, simulation.backend());
+    let hash = format!("{:016x}", simulation.hash());
     report.measure(&scene, simulation);
+    assert_eq!(report.hash, hash);
     assert_eq!((report.in_place, report.bodies), (11, 12));
     let standing: Vec<_> = report.standing.iter().map(|s| (s.group.as_str(), s.bodies, s.in_place)).collect();
     assert_eq!(standing, [("2 cubes", 2, 2), ("4 cubes", 4, 4), ("6 cubes", 6, 5)]);
@@ -24,6 +26,7 @@ fn the_report_names_the_largest_tower_that_stands() {
     assert_eq!(row("in place"), Some("11 of 12"));
     assert_eq!(row("standing"), Some("2 of 3 groups; the largest is 4 cubes"));
     assert_eq!((row("joints"), row("sweeps")), (None, None));
+    assert_eq!(row("hash"), Some(hash.as_str()));
 }
 
 #[test]

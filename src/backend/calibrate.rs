@@ -4,14 +4,13 @@
 //! Both follow from two piles, one of which is all overhead on a GPU. A pile of this kind has the contacts, colors and substeps
 //! of a settled pile of boxes and the default plan; what a GPU has of an earlier step stays there, as in a run.
 
-use std::time::Instant;
-
 use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::plan::StepPlan;
 use crate::problem::carry::{Carry, Preload};
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow, Softness, StepProblem, Substep};
+use crate::stats::Stopwatch;
 use glam::Vec3;
 
 /// Bodies along each side of the two piles.
@@ -50,7 +49,7 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     for _ in 0..=STEPS {
         let mut problem = pile.clone();
         let step = CheckedStep::new(&mut problem, &plan.passes)?;
-        let start = Instant::now();
+        let start = Stopwatch::start();
         backend.step(step, &carry)?;
         // The first compiles kernels and sends everything.
         if carry.on_device || !backend.keeps_rows() {

@@ -5,7 +5,8 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use crate::world::{Body, BodyKind, Collider, Shape};
+use crate::math::rotation::squared_length;
+use crate::world::{Body, BodyKind, Collider, Shape, placed};
 
 /// How a body takes part in the detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +79,7 @@ impl ColliderInfo {
 
     /// The box around it when its body is at `pose`. That of a cuboid needs nothing from elsewhere in memory.
     pub fn aabb(&self, pose: Pose) -> Aabb {
-        let pose = pose * self.local;
+        let pose = placed(pose, self.local);
         let Some(half) = self.cuboid else { return self.shape.compute_aabb(&pose) };
         let axes = glam::Mat3::from_quat(pose.rotation);
         Aabb::from_half_extents(pose.translation, axes.abs() * half)
@@ -160,7 +161,7 @@ impl BodyState {
         let (v, w) = if moves { (body.linear_velocity, body.angular_velocity) } else { (Vec3::ZERO, Vec3::ZERO) };
         let is_near = position.abs().cmple(Vec3::splat(FARTHEST)).all();
         // parry squares lengths, and takes rotations for unit quaternions.
-        let in_range = is_near && (rotation.length_squared() - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());
+        let in_range = is_near && (squared_length(rotation) - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());
         Self {
             rotation,
             center: body.center_of_mass(),

@@ -1,6 +1,7 @@
-//! Vectors and rotations of sixteen pairs side by side, in the order of operations in which glam does them with one: the bits are the same.
+//! Vectors and rotations of sixteen pairs side by side, in the order of operations of one pair: the bits are the same.
 
 use crate::lanes::Lanes;
+pub(super) use crate::math::rotation::paired_product as product;
 use crate::math::{Quat, Vec3, dot3, vec3};
 
 /// A pose of each pair.
@@ -60,20 +61,6 @@ impl<L: Lanes> Turn<L> {
     pub fn of_vector(self, v: Vec3<L>) -> Vec3<L> {
         let (b, twice) = (self.axis, dot3(v, self.axis) * L::constant(2.0));
         v * self.along + b * twice + crate::math::cross3(b, v) * self.across
-    }
-}
-
-/// First b, then a.
-#[inline(always)]
-pub(super) fn product<L: Lanes>(a: Quat<L>, b: Quat<L>) -> Quat<L> {
-    let (p, q) = (a.axis, b.axis);
-    Quat {
-        axis: vec3(
-            (p.x * b.w + a.w * q.x) + (p.y * q.z - p.z * q.y),
-            (a.w * q.y - p.x * q.z) + (p.z * q.x + p.y * b.w),
-            (p.x * q.y + a.w * q.z) + (p.z * b.w - p.y * q.x),
-        ),
-        w: (a.w * b.w - p.x * q.x) + (-(p.z * q.z) - p.y * q.y),
     }
 }
 

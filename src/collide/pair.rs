@@ -11,7 +11,7 @@ use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::random::mixed;
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, BodyKind, World, placed, seen_from};
 
 /// Two colliders whose boxes overlap.
 #[derive(Debug)]
@@ -124,7 +124,7 @@ impl Pair {
         let [(ca, _), (cb, _)] = sides;
         let search = ContactQuery { prediction, size: self.size };
         let [pose_a, pose_b] = sides.map(pose);
-        let pos12 = pose_a.inv_mul(&pose_b);
+        let pos12 = seen_from(pose_a, pose_b);
         let PairScratch { buffers, one, many, renewal } = scratch;
         many.clear();
         let found: &[ParryManifold] = if ca.is_composite() {
@@ -201,7 +201,7 @@ impl Pair {
 
 /// Where a collider is.
 fn pose((c, body): Side) -> Pose {
-    Pose::from_parts(body.position, body.rotation) * c.local
+    placed(Pose::from_parts(body.position, body.rotation), c.local)
 }
 
 /// A point of parry's as one of ours; none if it is not finite or too far away.

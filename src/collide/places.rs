@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::collider::is_in_range;
 use super::tree::{NOWHERE, Tree};
-use crate::world::{Body, Collider, MOST_LENGTH, World, pose};
+use crate::math::rotation::squared_length;
+use crate::world::{Body, Collider, MOST_LENGTH, World, placed, pose};
 
 /// A collider by its body and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,12 +23,12 @@ impl Place {
         let body = world.bodies.get(self.body as usize)?;
         let collider = body.colliders.get(self.collider as usize)?;
         is_placed(body)
-            .then(|| (collider, pose(body.position, body.rotation) * pose(collider.position, collider.rotation)))
+            .then(|| (collider, placed(pose(body.position, body.rotation), pose(collider.position, collider.rotation))))
     }
 }
 
 fn is_placed(body: &Body) -> bool {
-    body.position.abs().cmple(Vec3::splat(MOST_LENGTH)).all() && (body.rotation.length_squared() - 1.0).abs() < 0.1
+    body.position.abs().cmple(Vec3::splat(MOST_LENGTH)).all() && (squared_length(body.rotation) - 1.0).abs() < 0.1
 }
 
 /// Colliders as the tree of a detection has them, with their boxes there.

@@ -6,7 +6,7 @@ use parry3d::query::intersection_test;
 
 use super::collider::{Activity, ColliderInfo};
 use super::world_contacts::{WorldContacts, box_reaches_plane, key};
-use crate::world::{Body, BodyKind, Groups};
+use crate::world::{Body, BodyKind, Groups, placed};
 
 /// The bodies of all worlds, for sensors.
 pub(super) struct Visitors<'a> {
@@ -66,7 +66,7 @@ impl WorldContacts {
             let mut meet = |other: u32| {
                 let c = &self.colliders[other as usize];
                 let overlap = || {
-                    let [at, of] = [pose * sensor.local, visitors.pose(c) * c.local];
+                    let [at, of] = [placed(pose, sensor.local), placed(visitors.pose(c), c.local)];
                     intersection_test(&at, &*sensor.shape, &of, &*c.shape).is_ok_and(|answer| answer.intersecting)
                 };
                 if visitors.may_meet(sensor, c) && overlap() {
@@ -82,7 +82,7 @@ impl WorldContacts {
             strayed.iter().for_each(|&other| meet(other));
             for plane in self.planes.iter().map(|plane| plane.collider) {
                 let c = &self.colliders[plane as usize];
-                if box_reaches_plane(c, visitors.pose(c) * c.local, &aabb) {
+                if box_reaches_plane(c, placed(visitors.pose(c), c.local), &aabb) {
                     meet(plane);
                 }
             }

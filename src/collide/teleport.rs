@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::pair::Pair;
 use super::pairs::Pairs;
+use crate::math::rotation::product;
 use crate::world::{Bodies, Body, BodyKind};
 
 /// Where a body was left by the last step.
@@ -81,11 +82,11 @@ impl<'a> Teleports<'a> {
         if self.now[a] == self.left[a] && self.now[b] == self.left[b] {
             return false;
         }
-        let turned = |i: usize| self.now[i].rotation * self.left[i].rotation.inverse();
+        let turned = |i: usize| product(self.now[i].rotation, self.left[i].rotation.inverse());
         let apart = |from: &[Left]| from[b].position - from[a].position;
         let (turn_a, turn_b) = (turned(a), turned(b));
         let shift = apart(&self.now) - turn_a * apart(self.left);
-        let turn = turn_a.inverse() * turn_b;
+        let turn = product(turn_a.inverse(), turn_b);
         shift.length() + 2.0 * turn.xyz().length() * pairs.reach_b(place) > size
     }
 }

@@ -18,7 +18,7 @@ use super::pairs::Pairs;
 use super::places::{Place, Standing};
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
-use crate::world::{BodyKind, Collider, Groups};
+use crate::world::{BodyKind, Collider, Groups, placed};
 
 /// The input of one detection, for all worlds; body indices count over all worlds.
 pub(super) struct DetectionInput<'a> {
@@ -364,7 +364,7 @@ fn tight(c: &ColliderInfo, input: &DetectionInput) -> Aabb {
 
 fn pose_of(c: &ColliderInfo, input: &DetectionInput) -> Pose {
     let body = &input.moving[c.body as usize];
-    Pose::from_parts(body.position, body.rotation) * c.local
+    placed(Pose::from_parts(body.position, body.rotation), c.local)
 }
 
 /// Whether a box reaches a half-space at `pose`, by its corner that lies deepest.

@@ -10,6 +10,7 @@ use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Par
 use crate::config::{SolverConfig, Stabilization};
 use crate::effort::Effort;
 use crate::math::Lane;
+use crate::math::rotation::{product, unit};
 use crate::world::{Body, BodyKind, World};
 
 /// Bodies that one task works on at least.
@@ -73,7 +74,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
                 principal: principal.to_array(),
                 body: i as u32,
                 inv_principal: principal.recip().to_array(),
-                frame: (b.rotation * b.mass.principal_frame).to_array(),
+                frame: product(b.rotation, b.mass.principal_frame).to_array(),
                 ..InertiaRow::default()
             }
         };
@@ -102,7 +103,7 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
         }
         body.forget_applied_forces();
         let center = body.center_of_mass() + Vec3::from_array(row.dp);
-        body.rotation = (Quat::from_array(row.dq) * body.rotation).normalize();
+        body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
         body.position = center - body.rotation * body.mass.center;
         body.linear_velocity = Vec3::from_array(row.v);
         body.angular_velocity = Vec3::from_array(row.w);

@@ -7,7 +7,7 @@ use parry3d::query::{self, Ray, ShapeCastHit, ShapeCastOptions};
 use parry3d::shape::{HeightField, Shape as ParryShape, Triangle};
 
 use super::boxes::BoxRay;
-use crate::world::Shape;
+use crate::world::{Shape, seen_from};
 
 /// Distance and normal of the place where a ray meets a shape, which it may only from `enters` on, up to `most`.
 ///
@@ -76,7 +76,7 @@ fn do_intersect((a, pose_a): (&dyn ParryShape, &Pose), (b, pose_b): (&dyn ParryS
     }
     if let Some(field) = a.as_heightfield() {
         let mut do_meet = false;
-        let near = b.compute_aabb(&pose_a.inv_mul(pose_b));
+        let near = b.compute_aabb(&seen_from(*pose_a, *pose_b));
         field.map_elements_in_local_aabb(&near, &mut |_, triangle| {
             do_meet = do_meet || do_intersect((triangle, pose_a), (b, pose_b));
         });

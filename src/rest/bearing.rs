@@ -158,7 +158,7 @@ impl Balance {
             return false;
         }
         for ((spring, force), point) in self.springs.iter_mut().zip(&self.forces).zip(points) {
-            let (slip, limit) = (force[1].hypot(force[2]), point.friction * force[0]);
+            let (slip, limit) = (libm::hypot(force[1], force[2]), point.friction * force[0]);
             if slip > limit + ROUNDING * most {
                 spring.slip *= 0.9 * limit / slip;
                 are_within = false;

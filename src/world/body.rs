@@ -5,8 +5,9 @@ use glam::{DVec3, Quat, Vec3};
 use super::groups::Groups;
 use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
-use super::shape::{Shape, pose};
+use super::shape::Shape;
 use crate::error::{Result, ensure};
+use crate::math::rotation;
 use crate::saved::{Archive, Saved};
 
 /// How a body moves.
@@ -409,11 +410,8 @@ impl Body {
         if self.kind != BodyKind::Dynamic {
             return;
         }
-        let solids = self.solids().filter(|c| c.shape.has_volume()).map(|c| {
-            let own = c.shape.0.mass_properties(1.0);
-            own.transform_by(&pose(c.position, c.rotation))
-        });
-        self.mass = MassProperties::of_solids(&solids.collect::<Vec<_>>(), self.density);
+        let solids: Vec<&Collider> = self.solids().filter(|c| c.shape.has_volume()).collect();
+        self.mass = MassProperties::of_solids(&solids, self.density);
     }
 
     /// Whether another body differs from this one in nothing but pose, velocity, forces and torques.
@@ -558,10 +556,10 @@ impl Body {
     pub fn move_to(&mut self, position: Vec3, rotation: Quat, dt: f32) {
         let center = position + rotation * self.mass.center;
         self.linear_velocity = (center - self.center_of_mass()) / dt;
-        let turn = rotation * self.rotation.inverse();
+        let turn = rotation::product(rotation, self.rotation.inverse());
         // The shorter way round.
         let turn = if turn.w < 0.0 { -turn } else { turn };
-        self.angular_velocity = turn.normalize().to_scaled_axis() / dt;
+        self.angular_velocity = rotation::vector_of(rotation::unit(turn)) / dt;
     }
 
     /// Kinetic energy (J), in f64; zero for a body without mass.
@@ -575,13 +573,14 @@ impl Body {
     /// Angular momentum about the world's origin (kg m²/s), in f64.
     pub fn angular_momentum(&self) -> DVec3 {
         let orbital = self.center_of_mass().as_dvec3().cross(self.linear_velocity.as_dvec3());
-        let axes = (self.rotation * self.mass.principal_frame).as_dquat();
+        let axes = rotation::product(self.rotation, self.mass.principal_frame).as_dquat();
         f64::from(self.mass.mass) * orbital + axes * (self.mass.principal_inertia.as_dvec3() * self.principal_spin())
     }
 
     /// Angular velocity along the principal axes.
     fn principal_spin(&self) -> DVec3 {
-        (self.rotation * self.mass.principal_frame).as_dquat().inverse() * self.angular_velocity.as_dvec3()
+        rotation::product(self.rotation, self.mass.principal_frame).as_dquat().inverse()
+            * self.angular_velocity.as_dvec3()
     }
 
     /// Refuses a body that cannot be simulated.

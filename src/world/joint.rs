@@ -4,6 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::joint_axis::{Axis, Bounds};
 use crate::error::Result;
+use crate::math::rotation;
 use crate::saved::{Archive, Saved};
 
 /// Ties a body to another, or to the world.
@@ -186,13 +187,19 @@ impl Joint {
 
     /// Lets the first axis of the joint have this direction in the frames of both bodies.
     pub fn along(self, direction: Vec3) -> Self {
-        let frame = Quat::from_rotation_arc(Vec3::X, direction.normalize_or(Vec3::X));
+        let frame = rotation::arc(Vec3::X, direction.normalize_or(Vec3::X));
         Self { frame_a: frame, frame_b: frame, ..self }
     }
 
     /// Lets all angles be zero where the bodies have these rotations; that of b is the identity for the world.
     pub fn zero_at(self, rotation_a: Quat, rotation_b: Quat) -> Self {
-        Self { frame_a: (rotation_a.inverse() * rotation_b * self.frame_b).normalize(), ..self }
+        Self {
+            frame_a: rotation::unit(rotation::product(
+                rotation::product(rotation_a.inverse(), rotation_b),
+                self.frame_b,
+            )),
+            ..self
+        }
     }
 
     /// Limits the first axis that is not locked, or the distance.

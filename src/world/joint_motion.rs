@@ -9,6 +9,7 @@ use super::joint::{Joint, Linear};
 use super::joint_axis::{Axis, Bounds, Drive};
 use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
 use crate::error::{Result, ensure};
+use crate::math::rotation::{product, unit};
 
 /// Where body a of a joint is against body b, and how fast it moves there: three axes to shift along, then three to turn about.
 ///
@@ -54,8 +55,8 @@ impl World {
         let a = &self.bodies[joint.body_a];
         let b = joint.body_b.map(|b| &self.bodies[b]);
         let offset = anchor_a - anchor_b;
-        let frame_b = b.map_or(Quat::IDENTITY, |b| b.rotation) * joint.frame_b;
-        let relative = (frame_b.inverse() * (a.rotation * joint.frame_a)).normalize();
+        let frame_b = product(b.map_or(Quat::IDENTITY, |b| b.rotation), joint.frame_b);
+        let relative = unit(product(frame_b.inverse(), product(a.rotation, joint.frame_a)));
         let axes_b = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| frame_b * e);
         let first_a = frame_b * (relative * Vec3::X);
 
@@ -111,7 +112,7 @@ fn angles(q: Quat) -> [f32; 3] {
     let length = (q.w * q.w + q.x * q.x).sqrt();
     // Turned by pi about an axis across the first.
     let twist = if length > 0.0 { Quat::from_xyzw(q.x / length, 0.0, 0.0, q.w / length) } else { Quat::IDENTITY };
-    let swing = q * twist.conjugate();
+    let swing = product(q, twist.conjugate());
     let sine = (swing.y * swing.y + swing.z * swing.z).sqrt();
     let per_sine = if sine > 0.0 { 2.0 * libm::atan2f(sine, swing.w) / sine } else { 2.0 };
     [2.0 * libm::atan2f(twist.x, twist.w), swing.y * per_sine, swing.z * per_sine]

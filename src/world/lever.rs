@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::body::{Body, BodyKind, Collider};
 use super::mass::MassProperties;
-use super::shape::pose;
+use super::shape::{placed, pose};
 
 /// Raises the moments of inertia of a body to what [`MassProperties::MOST_LEVERAGE`] asks for.
 pub(super) fn raise_inertia(body: &mut Body) {
@@ -18,7 +18,7 @@ pub(super) fn raise_inertia(body: &mut Body) {
 fn squared_levers(mass: &MassProperties, colliders: &[Collider]) -> Vec3 {
     let to_axes = pose(mass.center, mass.principal_frame).inverse();
     let of_one = |collider: &Collider| {
-        let at = to_axes * pose(collider.position, collider.rotation);
+        let at = placed(to_axes, pose(collider.position, collider.rotation));
         let (aabb, sphere) = (collider.shape.0.compute_aabb(&at), collider.shape.0.compute_bounding_sphere(&at));
         let squared = |v: Vec3| Vec3::new(v.y * v.y + v.z * v.z, v.z * v.z + v.x * v.x, v.x * v.x + v.y * v.y);
         let in_box = squared(aabb.mins.abs().max(aabb.maxs.abs()));

@@ -3,6 +3,7 @@
 use glam::{Quat, Vec3};
 
 use crate::error::{Result, ensure};
+use crate::math::rotation::squared_length;
 
 /// Largest coordinate and size (m): its cube is still a number in single precision.
 pub const MOST_LENGTH: f32 = 1e9;
@@ -23,7 +24,7 @@ pub(super) fn is_within(x: Vec3, most: f32) -> bool {
 
 /// Whether a quaternion is near unit length.
 pub(super) fn is_rotation(q: Quat) -> bool {
-    (q.length() - 1.0).abs() <= 1e-3
+    (squared_length(q).sqrt() - 1.0).abs() <= 1e-3
 }
 
 /// Refuses a point that is no place.

@@ -4,9 +4,15 @@ use std::ops::RangeInclusive;
 
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 use parry3d::mass_properties::MassProperties as ParryMass;
+use parry3d::mass_properties::details::tetrahedron_unit_inertia_tensor_wrt_point;
+use parry3d::math::Pose;
+use parry3d::shape::{ConvexPolyhedron, Tetrahedron};
 
+use super::body::Collider;
 use super::limits::{is_place, is_rotation};
+use super::shape::pose;
 use crate::error::{Result, ensure};
+use crate::math::rotation::product;
 use crate::stats::largest;
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
@@ -79,26 +85,32 @@ impl MassProperties {
         ensure(is_place(center) && is_rotation(principal_frame), message)
     }
 
-    /// Those of some solids of density 1, times `density`. Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its
-    /// density to the last bit.
+    /// Those of some colliders with volume. Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the
+    /// last bit.
     ///
-    /// Parry finds wrong principal axes where the smallest moment is a double one whose plane is not that of x, or where moments are below
+    /// Parry's principal axes are taken only where the solids have theirs along the axes of the body: others need a sine, and the platform's
+    /// differ. Parry also finds wrong axes where the smallest moment is a double one whose plane is not that of x, or where moments are below
     /// 1e-5 kg m²: its tensor is compared with the sum of the tensors of the solids.
-    pub(super) fn of_solids(solids: &[ParryMass], density: f32) -> Self {
-        let all: ParryMass = solids.iter().copied().sum();
-        let about_center = |m: &ParryMass| tensor(m.principal_inertia(), m.principal_inertia_local_frame);
-        let own = |m: &ParryMass| {
-            let out = (all.local_com - m.local_com).as_dvec3();
+    pub(super) fn of_solids(solids: &[&Collider], density: f32) -> Self {
+        let solids: Vec<_> = solids.iter().map(|c| (Solid::of(c), pose(c.position, c.rotation))).collect();
+        let all: ParryMass = solids.iter().map(|(solid, at)| solid.mass.transform_by(at)).sum();
+        let own = |(solid, at): &(Solid, Pose)| {
+            let axes = axes_of(at.rotation);
+            let center = *at * solid.mass.local_com;
+            let out = (all.local_com - center).as_dvec3();
             let across =
                 DMat3::IDENTITY * out.length_squared() - DMat3::from_cols(out * out.x, out * out.y, out * out.z);
-            about_center(m) + across * f64::from(m.mass())
+            axes * solid.tensor * axes.transpose() + across * f64::from(solid.mass.mass())
         };
-        let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
+        let (mut exact, mut is_aligned) = (DMat3::ZERO, true);
+        for tensor in solids.iter().map(own) {
+            exact += tensor;
+            is_aligned &= tensor == DMat3::from_diagonal(diagonal(&tensor));
+        }
         let (mut moments, mut frame) = (all.principal_inertia(), all.principal_inertia_local_frame);
-        let error = about_center(&all) - exact;
         let size = |m: DMat3| largest(0.0, m.abs().to_cols_array());
-        let is_right = size(error) <= 1e-4 * size(exact);
-        if !is_right {
+        let is_right = size(tensor(moments, frame) - exact) <= 1e-4 * size(exact);
+        if !is_aligned || !is_right {
             (moments, frame) = diagonalized(exact);
         }
         Self {
@@ -124,7 +136,7 @@ impl MassProperties {
         if principal.x == principal.y && principal.y == principal.z {
             return Mat3::from_diagonal(principal);
         }
-        let axes = Mat3::from_quat(rotation * self.principal_frame);
+        let axes = Mat3::from_quat(product(rotation, self.principal_frame));
         axes * Mat3::from_diagonal(principal) * axes.transpose()
     }
 
@@ -135,10 +147,50 @@ impl MassProperties {
     }
 }
 
+/// A shape of density 1, in its own frame.
+struct Solid {
+    mass: ParryMass,
+    /// Inertia about the center of mass (kg m²).
+    tensor: DMat3,
+}
+
+impl Solid {
+    fn of(collider: &Collider) -> Self {
+        let mass = collider.shape.0.mass_properties(1.0);
+        let tensor = match collider.shape.0.as_convex_polyhedron() {
+            Some(hull) => tensor_of_hull(hull, mass.local_com),
+            None => tensor(mass.principal_inertia(), mass.principal_inertia_local_frame),
+        };
+        Self { mass, tensor }
+    }
+}
+
+/// Inertia of a hull of density 1 about its center of mass: the sum of the tetrahedra that its triangles make with the center.
+fn tensor_of_hull(hull: &ConvexPolyhedron, center: Vec3) -> DMat3 {
+    let (points, triangles) = hull.to_trimesh();
+    let of_one = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|i| points[i as usize]);
+        let volume = Tetrahedron::new(center, a, b, c).signed_volume();
+        tetrahedron_unit_inertia_tensor_wrt_point(center, center, a, b, c) * volume
+    };
+    let whole: Mat3 = triangles.iter().map(of_one).fold(Mat3::ZERO, |sum, own| sum + own);
+    // A hull whose triangles turn inward has a negative volume.
+    whole.as_dmat3() * f64::from(whole.x_axis.x.signum())
+}
+
+/// The axes of a frame in double precision.
+fn axes_of(frame: Quat) -> DMat3 {
+    DMat3::from_quat(frame.as_dquat().normalize())
+}
+
 /// The tensor with some moments along the axes of a frame.
 fn tensor(moments: Vec3, frame: Quat) -> DMat3 {
-    let axes = DMat3::from_quat(frame.as_dquat().normalize());
+    let axes = axes_of(frame);
     axes * DMat3::from_diagonal(moments.as_dvec3()) * axes.transpose()
+}
+
+fn diagonal(tensor: &DMat3) -> DVec3 {
+    DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z)
 }
 
 /// Principal moments of a symmetric tensor, and the rotation from its principal axes. Jacobi's method: each turn about one axis removes one
@@ -160,6 +212,5 @@ fn diagonalized(tensor: DMat3) -> (Vec3, Quat) {
             axes *= turn;
         }
     }
-    let moments = DVec3::new(diagonal.x_axis.x, diagonal.y_axis.y, diagonal.z_axis.z);
-    (moments.as_vec3(), DQuat::from_mat3(&axes).normalize().as_quat())
+    (self::diagonal(&diagonal).as_vec3(), DQuat::from_mat3(&axes).normalize().as_quat())
 }

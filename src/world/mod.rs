@@ -27,7 +27,7 @@ pub use joints::{JointHandle, Joints};
 pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
 pub use mass::MassProperties;
 pub use shape::Shape;
-pub(crate) use shape::pose;
+pub(crate) use shape::{placed, pose, seen_from};
 pub use surface::Triangles;
 
 use glam::Vec3;

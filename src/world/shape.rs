@@ -9,6 +9,7 @@ use parry3d::shape::{Cylinder, HeightFieldFlags, SharedShape, TriMeshFlags, Type
 
 use super::limits::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result, ensure, input};
+use crate::math::rotation;
 
 /// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
 ///
@@ -215,6 +216,17 @@ impl Shape {
 /// A pose from its two parts.
 pub(crate) fn pose(position: Vec3, rotation: Quat) -> Pose {
     Pose::from_parts(position, rotation)
+}
+
+/// The pose `local` as seen from where the frame of it has the pose `frame`.
+pub(crate) fn placed(frame: Pose, local: Pose) -> Pose {
+    pose(frame.translation + frame.rotation * local.translation, rotation::product(frame.rotation, local.rotation))
+}
+
+/// A pose as seen from another.
+pub(crate) fn seen_from(other: Pose, of: Pose) -> Pose {
+    let back = other.rotation.inverse();
+    pose(back * (of.translation - other.translation), rotation::product(back, of.rotation))
 }
 
 /// Whether the points are finite and not all in one plane, relative to their extent.

@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 use parry3d::shape::TypedShape;
 
 use super::body::Collider;
-use super::shape::{Shape, pose};
+use super::shape::{Shape, placed, pose};
 
 /// Vertices (m) and triangles, counter-clockwise seen from outside.
 pub type Triangles = (Vec<Vec3>, Vec<[u32; 3]>);
@@ -57,7 +57,7 @@ impl Shape {
 impl Collider {
     /// Lower and upper corner of the box along the world's axes around the collider, on a body at this pose (m).
     pub fn bounds(&self, position: Vec3, rotation: Quat) -> (Vec3, Vec3) {
-        let aabb = self.shape.0.compute_aabb(&(pose(position, rotation) * pose(self.position, self.rotation)));
+        let aabb = self.shape.0.compute_aabb(&placed(pose(position, rotation), pose(self.position, self.rotation)));
         (aabb.mins, aabb.maxs)
     }
 }

@@ -103,6 +103,8 @@ pub struct RunReport {
     /// Dynamic bodies whose centers of mass moved by less than half of their height since the start.
     pub in_place: usize,
     pub standing: Vec<Standing>,
+    /// Poses and velocities of the bodies of all worlds at the end, as one number in hexadecimal: [`Simulation::hash`].
+    pub hash: String,
     /// Number of bodies whose pose or velocity is not finite, and the first of them.
     pub non_finite: usize,
     pub first_non_finite: Option<String>,
@@ -265,6 +267,7 @@ impl RunReport {
         if self.asleep > 0 {
             (self.manifolds, self.points) = contacts(&mut simulation);
         }
+        self.hash = format!("{:016x}", simulation.hash());
         let world = &simulation.into_world();
         let penetration = Penetration::of_world(world, &self.config);
         let (speed, body) = fastest(world);

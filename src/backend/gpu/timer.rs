@@ -4,12 +4,12 @@
 //! A backend has a timer only on request: the software adapter ends its work at every timestamp, and a step of a tower of ten took
 //! 2.6 times as long with them.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::submissions::Submissions;
 use super::wgsl::Program;
 use crate::error::Result;
-use crate::stats::KernelTime;
+use crate::stats::{KernelTime, Stopwatch};
 
 /// The features of the adapter that a timer needs.
 pub(super) const FEATURES: wgpu::Features =
@@ -117,7 +117,7 @@ pub(super) fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submission
     let mut seconds = |copies: u32| -> Result<f64> {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
-        let start = Instant::now();
+        let start = Stopwatch::start();
         submissions.submit(encoder);
         submissions.wait(0)?;
         Ok(start.elapsed().as_secs_f64())

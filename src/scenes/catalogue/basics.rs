@@ -1,9 +1,10 @@
 //! One body whose motion is known in closed form, and a ball thrown at a stack.
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::common::{centered, floor, slope};
 use super::stacks::stack;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
@@ -20,7 +21,7 @@ pub(super) fn sphere_plane(height: f32) -> Scene {
 pub(super) fn slide(degrees: f32, mu: f32) -> Scene {
     let block = Body::dynamic().named("block").shape(Shape::cuboid(0.5, 0.25, 0.5));
     let scene = on_slope("slide", block, 0.25, degrees, mu);
-    if degrees.to_radians().tan() < mu { scene.standing() } else { scene }
+    if libm::tanf(degrees.to_radians()) < mu { scene.standing() } else { scene }
 }
 
 /// A ball on a slope of `degrees`; both have the friction `mu`. Rolls with the acceleration 5/7 g sin(angle) without
@@ -38,7 +39,7 @@ pub(super) fn rolling(degrees: f32) -> Scene {
     world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(0.2));
     let plate = Body::dynamic().named("plate").shape(Shape::cuboid(10.0, 0.5, 10.0)).total_mass(10.0).friction(0.8);
     let plate = world.add(plate.position(0.0, 0.5, 0.0));
-    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (sin, cos) = libm::sincosf(degrees.to_radians());
     world.bodies[plate].force = 150.0 * Vec3::new(cos, 0.0, sin);
     for k in 0..25 {
         let [x, z] = [k / 5, k % 5].map(|k| 2.0 * centered(k, 5) as f32);
@@ -53,8 +54,8 @@ fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene
     let angle = degrees.to_radians();
     let mut world = World::new();
     world.add(slope(angle).friction(mu));
-    let (x, y) = (height * angle.sin(), height * angle.cos());
-    world.add(body.friction(mu).position(x, y, 0.0).rotation(Quat::from_rotation_z(-angle)));
+    let (x, y) = (height * libm::sinf(angle), height * libm::cosf(angle));
+    world.add(body.friction(mu).position(x, y, 0.0).rotation(about(Vec3::Z, -angle)));
     Scene::new(name, world, 120)
 }
 

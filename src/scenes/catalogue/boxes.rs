@@ -29,7 +29,7 @@ fn heap(name: &str, n: usize, jitter: f64, seed: u64, mut body: impl FnMut(usize
     const LOWEST: f64 = 0.65;
     // Half of the shift between a layer and the next.
     const SHIFT: f64 = 0.15;
-    let side = (n as f64).cbrt().round() as usize;
+    let side = libm::cbrt(n as f64).round() as usize;
     let layers = n.div_ceil(side * side);
 
     let half = ((side - 1) as f64 / 2.0 * PITCH + 0.5 + SHIFT + CLEARANCE) as f32;

@@ -14,7 +14,7 @@ pub(super) fn floor(half_x: f32, half_z: f32) -> World {
 
 /// A fixed half-space that falls towards x by `angle` (rad).
 pub(super) fn slope(angle: f32) -> Body {
-    Body::fixed().named("slope").shape(Shape::half_space(Vec3::new(angle.sin(), angle.cos(), 0.0)))
+    Body::fixed().named("slope").shape(Shape::half_space(Vec3::new(libm::sinf(angle), libm::cosf(angle), 0.0)))
 }
 
 /// A cube of 1 m and 1000 kg.

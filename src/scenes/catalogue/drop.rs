@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use glam::{Quat, Vec3};
 
 use crate::error::Result;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
@@ -20,7 +21,7 @@ pub(super) fn drop(height: f32) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::fixed().named("floor").shape(Shape::half_space(Vec3::Y)));
 
-    let lying = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    let lying = about(Vec3::X, std::f32::consts::FRAC_PI_2);
     let mut place = |body: Body, name: &str, x: f32, y: f32| world.add(body.named(name).position(x * PITCH, y, 0.0));
 
     place(Body::dynamic().shape(Shape::ball(0.5)), "ball", -3.0, 0.5 + height);
@@ -57,7 +58,8 @@ fn tilted_plate() -> Result<Shape> {
 /// Waves along x, two pitches long in all, with a trough at each quarter of the way: 0.1 m deep.
 fn waves() -> Result<Shape> {
     let columns = 4 * CELLS;
-    let row: Vec<f32> = (0..=columns).map(|k| (TAU * 2.0 * f64::from(k) / f64::from(columns)).cos() as f32).collect();
+    let row: Vec<f32> =
+        (0..=columns).map(|k| libm::cos(TAU * 2.0 * f64::from(k) / f64::from(columns)) as f32).collect();
     Shape::height_field(&vec![row; usize::from(CELLS) + 1], Vec3::new(2.0 * PITCH, 0.05, DEPTH))
 }
 

@@ -2,9 +2,10 @@
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::common::centered;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
@@ -17,7 +18,7 @@ const STAVES: u16 = 12;
 /// `n` boxes of 0.2 m in a hollow drum that turns about the horizontal axis z with `speed` (rad/s): one kinematic body of
 /// twelve staves and two ends, as long inside as its radius, a fifth full.
 pub(super) fn drum(n: usize, speed: f32) -> Scene {
-    let mut radius = (n as f32 * SIDE.powi(3) / (FILL * TAU / 2.0)).cbrt().max(5.0 * SIDE);
+    let mut radius = libm::cbrtf(n as f32 * (SIDE * SIDE * SIDE) / (FILL * TAU / 2.0)).max(5.0 * SIDE);
     let mut places = grid(radius);
     // In small drums fewer boxes find a place.
     while places.len() < n {
@@ -30,7 +31,7 @@ pub(super) fn drum(n: usize, speed: f32) -> Scene {
     for Vec3 { x, y, z } in places.into_iter().take(n) {
         world.add(cube.clone().position(x, y, z));
     }
-    let corner = radius / (TAU / 2.0 / f32::from(STAVES)).cos();
+    let corner = radius / libm::cosf(TAU / 2.0 / f32::from(STAVES));
     let reach = Vec3::new(corner, corner, radius / 2.0);
     Scene { container: Some((-reach, reach)), ..Scene::new("drum", world, 600) }
 }
@@ -39,16 +40,16 @@ pub(super) fn drum(n: usize, speed: f32) -> Scene {
 fn hollow(radius: f32) -> Body {
     // Half of the thickness of staves and ends.
     let half = 0.1 * radius;
-    let width = (radius + 2.0 * half) * (TAU / 2.0 / f32::from(STAVES)).tan();
+    let width = (radius + 2.0 * half) * libm::tanf(TAU / 2.0 / f32::from(STAVES));
     let stave = Shape::cuboid(half, width, radius / 2.0 + 2.0 * half);
     let mut body = Body::kinematic().named("drum");
     for k in 0..STAVES {
-        let turn = Quat::from_rotation_z(TAU * f32::from(k) / f32::from(STAVES));
+        let turn = about(Vec3::Z, TAU * f32::from(k) / f32::from(STAVES));
         body = body.shape_at(stave.clone(), turn * ((radius + half) * Vec3::X), turn);
     }
     let end = Shape::cylinder(half, radius + 2.0 * half);
     for z in [radius / 2.0 + half, -radius / 2.0 - half] {
-        body = body.shape_at(end.clone(), z * Vec3::Z, Quat::from_rotation_x(FRAC_PI_2));
+        body = body.shape_at(end.clone(), z * Vec3::Z, about(Vec3::X, FRAC_PI_2));
     }
     body
 }
@@ -61,7 +62,7 @@ fn grid(radius: f32) -> Vec<Vec3> {
     let at = |k: usize, n: usize| centered(k, n) as f32 * PITCH;
     let mut places = Vec::new();
     for y in (0..across).map(|k| at(k, across)) {
-        let inside = |&x: &f32| (x.abs() + half).hypot(y.abs() + half) < radius;
+        let inside = |&x: &f32| libm::hypotf(x.abs() + half, y.abs() + half) < radius;
         for x in (0..across).map(|k| at(k, across)).filter(inside) {
             places.extend((0..along).map(|k| Vec3::new(x, y, at(k, along))));
         }
@@ -90,7 +91,7 @@ mod tests {
             drum.colliders.iter().any(inside)
         };
         for k in 0..360_u16 {
-            let direction = Quat::from_rotation_z(f32::from(k).to_radians()) * Vec3::X;
+            let direction = glam::Quat::from_rotation_z(f32::from(k).to_radians()) * Vec3::X;
             assert!(solid(2.1 * direction) && !solid(1.99 * direction));
         }
         assert!(solid(Vec3::new(0.5, 0.5, 1.1)) && !solid(Vec3::new(0.5, 0.5, 0.99)));

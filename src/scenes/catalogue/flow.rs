@@ -2,11 +2,12 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::common::centered;
 use crate::error::Result;
 use crate::random::SplitMix64;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Body, Groups, Joint, Shape, World};
@@ -22,7 +23,7 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     let rollers = (length / PITCH).ceil() as usize + 1;
     for k in 0..rollers {
         let roller = Body::kinematic().named(format!("roller {k}")).shape(Shape::cylinder(0.5, ROLLER));
-        let roller = roller.position(PITCH * k as f32, -ROLLER, 0.0).rotation(Quat::from_rotation_x(FRAC_PI_2));
+        let roller = roller.position(PITCH * k as f32, -ROLLER, 0.0).rotation(about(Vec3::X, FRAC_PI_2));
         world.add(roller.velocity(Vec3::ZERO, Vec3::NEG_Z * (speed / ROLLER)));
     }
     // As long as the distance of three rollers, so that two or more bear it. The bottom rises by 1 cm to both ends: a straight edge would hit each
@@ -47,7 +48,7 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
 pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     const WIDTH: f32 = 0.9;
     const BALL: f32 = 0.3;
-    let slope = Quat::from_rotation_z(-8_f32.to_radians());
+    let slope = about(Vec3::Z, -8_f32.to_radians());
     let place = |x: f32, y: f32, z: f32| slope * Vec3::new(x, y, z);
     // The cross passes through the walls, which meet balls alone.
     let (balls, walls, arms) = (0b001, 0b010, 0b100);
@@ -63,7 +64,7 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     }
     // The axis stands in the right wall: arms cross the channel downhill, and go back behind the wall.
     let arm = Shape::cuboid(0.94 * WIDTH, 0.2, 0.03);
-    let across = Quat::from_rotation_y(FRAC_PI_2);
+    let across = about(Vec3::Y, FRAC_PI_2);
     let cross = Body::dynamic().named("cross").shape(arm.clone()).shape_at(arm, Vec3::ZERO, across).total_mass(10.0);
     let at = place(0.0, 0.35, 0.5 * WIDTH);
     let cross = world.add(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));

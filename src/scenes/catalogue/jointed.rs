@@ -1,8 +1,9 @@
 //! Scenes of ball joints: pendulum, chain, bridge, grid.
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::common::centered;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Joint, Shape, World};
 
@@ -10,7 +11,7 @@ use crate::world::{Body, Joint, Shape, World};
 /// so that its period is 0.2 % longer than that of a point.
 pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     let mut world = World::new();
-    let turn = Quat::from_rotation_z(degrees.to_radians());
+    let turn = about(Vec3::Z, degrees.to_radians());
     let Vec3 { x, y, z } = turn * (-length * Vec3::Y);
     let ball =
         world.add(Body::dynamic().named("ball").shape(Shape::ball(0.1 * length)).rotation(turn).position(x, y, z));
@@ -24,7 +25,7 @@ pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
     const HALF: f32 = 0.25;
     const RADIUS: f32 = 0.2;
     let mut world = World::new();
-    let turn = Quat::from_rotation_z(degrees.to_radians());
+    let turn = about(Vec3::Z, degrees.to_radians());
     let along = turn * -Vec3::Y;
     let link = Body::dynamic().shape(Shape::cuboid(0.05, HALF, 0.05)).rotation(turn);
     let mut hang = |body: Body, half: f32, start: f32| {
@@ -51,7 +52,7 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     const HALF: Vec3 = Vec3::new(0.24, 0.05, 1.0);
     /// Slope of the planks at the towers (rad).
     const STEEPEST: f64 = 0.25;
-    let slope = |k: usize| Quat::from_rotation_z((centered(k, planks) * 2.0 * STEEPEST / planks as f64) as f32);
+    let slope = |k: usize| about(Vec3::Z, (centered(k, planks) * 2.0 * STEEPEST / planks as f64) as f32);
     let step = |k: usize| slope(k) * (PITCH * Vec3::X);
     let end: Vec3 = (0..planks).map(step).sum();
     let mut seam = Vec3::new(-0.5 * end.x, 0.0, 0.0);

@@ -5,6 +5,7 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 use glam::{Quat, Vec3};
 
 use super::common::floor;
+use crate::math::rotation::{about, arc};
 use crate::scenes::scene::Scene;
 use crate::world::{Axis, Body, Joint, Linear, Shape, World};
 
@@ -25,7 +26,7 @@ pub(super) fn four_bar(speed: f32) -> Scene {
     let end = top + across.normalize() * along + Vec3::Z.cross(across.normalize()) * up;
     let mut bar = |name: &str, from: Vec3, to: Vec3| {
         let (length, Vec3 { x, y, z }) = (from.distance(to), 0.5 * (from + to));
-        let turned = Quat::from_rotation_arc(Vec3::X, (to - from) / length);
+        let turned = arc(Vec3::X, (to - from) / length);
         let bar = Body::dynamic().named(name).shape(Shape::cuboid(0.5 * length, 0.02, 0.02)).rotation(turned);
         (world.add(bar.position(x, y, z)), 0.5 * length * Vec3::X)
     };
@@ -79,7 +80,7 @@ pub(super) fn car(speed: f32) -> Scene {
     world.bodies[0].material.friction = 1.0;
     for k in 0..8 {
         let bump = Body::fixed().named("bump").shape(Shape::cylinder(5.0, 0.5)).friction(1.0);
-        let lies = Quat::from_rotation_x(FRAC_PI_2);
+        let lies = about(Vec3::X, FRAC_PI_2);
         world.add(bump.rotation(lies).position(8.0 + 3.0 * k as f32, -0.44, 0.0));
     }
     let chassis = Body::dynamic().named("chassis").shape(Shape::cuboid(1.8, 0.3, 0.7)).total_mass(CHASSIS);
@@ -87,7 +88,7 @@ pub(super) fn car(speed: f32) -> Scene {
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
     for (x, z) in [(1.3, -0.9), (1.3, 0.9), (-1.3, -0.9), (-1.3, 0.9)] {
-        let turned = Quat::from_rotation_x(FRAC_PI_2);
+        let turned = about(Vec3::X, FRAC_PI_2);
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(1.0);
         let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
         // A spring is given by the frequency of what it moves, and that is first of all the wheel.

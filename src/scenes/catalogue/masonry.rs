@@ -2,10 +2,11 @@
 
 use std::f64::consts::PI;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::common::{centered, floor, unit_box};
 use crate::error::Result;
+use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
@@ -37,7 +38,7 @@ impl Ring {
 
     /// Top of the middle wedge over the center, if their number is odd (m).
     fn crown(&self) -> f64 {
-        self.outer() * self.half().cos() + GAP / 2.0
+        self.outer() * libm::cos(self.half()) + GAP / 2.0
     }
 
     /// Adds the wedges, the springing at height `y` around `x`.
@@ -45,7 +46,7 @@ impl Ring {
         let (inner, outer) = (2.0 * self.radius - self.outer(), self.outer());
         // In the frame of a wedge x points out of the arch and y along it.
         let corner = |r: f64, angle: f64, z: f32| {
-            Vec3::new((r * angle.cos() - self.radius) as f32, (r * angle.sin()) as f32, z * self.depth)
+            Vec3::new((r * libm::cos(angle) - self.radius) as f32, (r * libm::sin(angle)) as f32, z * self.depth)
         };
         // Both faces of a wedge are half of the gap further in.
         let slit = |r: f64| self.half() - GAP / 2.0 / r;
@@ -54,9 +55,9 @@ impl Ring {
         let wedge = Body::dynamic().shape(Shape::convex_hull(&corners)?).friction(STONE);
         for k in 0..self.voussoirs {
             let angle = (2 * k + 1) as f64 * self.half();
-            let (dx, dy) = (self.radius * angle.cos(), GAP / 2.0 + self.radius * angle.sin());
+            let (dx, dy) = (self.radius * libm::cos(angle), GAP / 2.0 + self.radius * libm::sin(angle));
             let place = wedge.clone().position((x + dx) as f32, (y + dy) as f32, 0.0);
-            world.add(place.rotation(Quat::from_rotation_z(angle as f32)));
+            world.add(place.rotation(about(Vec3::Z, angle as f32)));
         }
         Ok(())
     }
@@ -153,7 +154,7 @@ pub(super) fn kapla(storeys: usize) -> Scene {
 /// `degrees` from the vertical, one pair fewer in each storey, and a plate across the pairs of each storey but the last.
 pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thickness: f64) -> Scene {
     let half_width = 0.4 * length as f32;
-    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (sin, cos) = libm::sincos(degrees.to_radians());
     // From a pair's ridge to the middle of its cards, to the side; from its feet to its highest edges.
     let aside = (thickness * cos + length * sin) / 2.0;
     let rise = thickness * sin + length * cos;
@@ -170,7 +171,7 @@ pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thi
         for k in 0..pairs {
             let ridge = centered(k, pairs) * pitch;
             for side in [-1.0, 1.0] {
-                let lean = Quat::from_rotation_z((side * degrees.to_radians()) as f32);
+                let lean = about(Vec3::Z, (side * degrees.to_radians()) as f32);
                 place(card.clone().rotation(lean), ridge + side * aside, rise / 2.0);
             }
         }

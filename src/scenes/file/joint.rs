@@ -7,6 +7,7 @@ use glam::{Quat, Vec3};
 use super::numbers::{finite, lengths, positive, rotation, unit};
 use super::schema::{AxisFile, BodyRef, JointFile, JointKind, MotorFile, SpringFile};
 use crate::error::{Error, Result, ensure, input};
+use crate::math::rotation as turn;
 use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, World};
 
 impl fmt::Display for BodyRef {
@@ -67,12 +68,12 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     let joint = Joint { body_b: b, collide: *collide, break_force, ..Joint::to_world(a, anchor_a, anchor_b) };
     // Frames that agree as the bodies stand.
     let in_world = |frame: Quat| {
-        let on = |body: usize| (world.bodies[body].rotation.inverse() * frame).normalize();
+        let on = |body: usize| turn::unit(turn::product(world.bodies[body].rotation.inverse(), frame));
         Joint { frame_a: on(a), frame_b: b.map_or(frame, on), ..joint }
     };
     let along = |direction: &[f64; 3]| -> Result<Joint> {
         let direction = Vec3::from(unit("axis", *direction)?);
-        Ok(in_world(Quat::from_rotation_arc(Vec3::X, direction)))
+        Ok(in_world(turn::arc(Vec3::X, direction)))
     };
     const LOCKED: Axis = Axis::LOCKED;
     let joint = match kind {

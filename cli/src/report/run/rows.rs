@@ -102,6 +102,7 @@ impl RunReport {
             let largest = up().max_by_key(|s| s.bodies).map_or("none", |s| &s.group);
             row("standing", format!("{} of {} groups; the largest is {largest}", up().count(), self.standing.len()));
         }
+        row("hash", self.hash.clone());
         if let Some(body) = &self.first_non_finite {
             row("non-finite", format!("{} bodies, first {body}", self.non_finite));
         }
