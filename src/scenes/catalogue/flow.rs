@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::common::centered;
 use crate::error::Result;
-use crate::random::SplitMix64;
 use crate::math::rotation::about;
+use crate::random::SplitMix64;
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Body, Groups, Joint, Shape, World};
@@ -113,7 +113,7 @@ pub(super) fn galton(n: u32, rows: usize, every: u32, seed: u64) -> Scene {
     // The lowest row has a pin above each divider, and each row above has its pins over the gaps. The rows end a pitch off the walls, so that
     // no ball is held between.
     let mut pins = Body::fixed().named("pins");
-    let lying = Quat::from_rotation_x(FRAC_PI_2);
+    let lying = about(Vec3::X, FRAC_PI_2);
     for row in 0..rows {
         let count = if row % 2 == 0 { rows } else { rows - 1 };
         for k in 0..count {
