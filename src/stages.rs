@@ -69,7 +69,18 @@ pub mod compare {
 /// The parts of [`conform`](crate::conform) that tests share: random problems, all kernels, differences.
 #[cfg(feature = "gpu")]
 pub mod conform {
-    pub use crate::conform::{difference, passes, random};
+    /// Differences of worlds and rows.
+    pub mod difference {
+        pub use crate::conform::difference::*;
+    }
+    /// Every kernel by one pass each.
+    pub mod passes {
+        pub use crate::conform::passes::*;
+    }
+    /// Random problems.
+    pub mod random {
+        pub use crate::conform::random::*;
+    }
 }
 
 /// Whether what is asked for fits into memory.

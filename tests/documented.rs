@@ -2,7 +2,7 @@
 //!
 //! The rule: a struct, enum, trait, function or method that a user of the crate can name stands in an example, as a word. That is an example in
 //! the documentation of its own source file, or of a method or the declaration of its type in any file; documentation tests compile and run all of
-//! them. Constants and type aliases need none. The stages one by one (`drystone::stages`) are for tests and measurements and need none.
+//! them, and compile those that need a device (`no_run`). Constants and type aliases need none. The stages one by one (`drystone::stages`) are for tests and measurements and need none.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ fn code<'a>(lines: impl Iterator<Item = &'a str>) -> String {
     let (mut code, mut inside, mut is_rust) = (String::new(), false, false);
     for line in lines.map(str::trim) {
         if let Some(language) = line.strip_prefix("```") {
-            (inside, is_rust) = (!inside, language.is_empty());
+            (inside, is_rust) = (!inside, ["", "no_run"].contains(&language));
         } else if inside && is_rust {
             code += line;
             code += "\n";
@@ -122,7 +122,7 @@ fn items(file: &Path, text: &str) -> Vec<Item> {
 }
 
 /// The names that users can reach: those that public modules declare or re-export.
-fn reach(root: &Path, file: &Path, texts: &BTreeMap<PathBuf, String>, names: &mut BTreeSet<String>) {
+fn reach(file: &Path, texts: &BTreeMap<PathBuf, String>, names: &mut BTreeSet<String>) {
     let text = sources(&texts[file]);
     let folder = if file.ends_with("lib.rs") || file.ends_with("mod.rs") { file.parent() } else { None };
     let folder = folder.map_or_else(|| file.with_extension(""), Path::to_path_buf);
@@ -136,7 +136,7 @@ fn reach(root: &Path, file: &Path, texts: &BTreeMap<PathBuf, String>, names: &mu
             Some("stages") => {}
             Some(module) => {
                 let [a, b] = [folder.join(format!("{module}.rs")), folder.join(module).join("mod.rs")];
-                reach(root, if texts.contains_key(&a) { &a } else { &b }, texts, names);
+                reach(if texts.contains_key(&a) { &a } else { &b }, texts, names);
             }
             None if !line.starts_with(' ') => names.extend(declared(line, false).map(str::to_owned)),
             None => {}
@@ -147,7 +147,7 @@ fn reach(root: &Path, file: &Path, texts: &BTreeMap<PathBuf, String>, names: &mu
 /// The public items that no example names.
 fn unshown(root: &Path, texts: &BTreeMap<PathBuf, String>) -> (usize, Vec<String>) {
     let mut names = BTreeSet::new();
-    reach(root, &root.join("lib.rs"), texts, &mut names);
+    reach(&root.join("lib.rs"), texts, &mut names);
     let items: Vec<Item> = texts.iter().flat_map(|(file, text)| items(file, text)).collect();
     let public: Vec<&Item> =
         items.iter().filter(|item| names.contains(item.of.as_ref().unwrap_or(&item.name))).collect();

@@ -1,18 +1,20 @@
 //! Whether an adapter and its driver are fit: kernels on random problems, scenes, limits, long plans, lost devices.
 //!
 //! ```no_run
-//! use drystone::conform::{ConformOptions, Verdict, conform};
+//! use drystone::conform::{Check, Conformance, ConformOptions, Mode, Verdict, conform};
 //!
-//! let found = conform(&ConformOptions::default(), &mut |check| println!("{} {}", check.verdict, check.name))?;
+//! let options = ConformOptions { modes: vec![Mode::Exact], short: true, ..ConformOptions::default() };
+//! let mut each = |check: &Check| println!("{} {}: {}", check.verdict, check.name, check.figure);
+//! let found: Conformance = conform(&options, &mut each)?;
 //! assert_eq!(found.count(Verdict::Failed), 0, "{} is not fit", found.adapter);
 //! # Ok::<(), drystone::Error>(())
 //! ```
 
 mod device;
-pub mod difference;
+pub(crate) mod difference;
 mod kernels;
-pub mod passes;
-pub mod random;
+pub(crate) mod passes;
+pub(crate) mod random;
 mod scenes;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -170,6 +172,15 @@ pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result
 
 /// A fault on purpose ([`Faults::shader`](crate::backend::gpu::Faults::shader)): accelerations, and the impulses that contacts apply, are one
 /// percent off. Checks of every group find it.
+///
+/// ```no_run
+/// use drystone::conform::{ConformOptions, Verdict, conform, one_percent_off};
+///
+/// let mut options = ConformOptions { short: true, ..ConformOptions::default() };
+/// options.gpu.faults.shader = Some(one_percent_off);
+/// assert!(conform(&options, &mut |_| ())?.count(Verdict::Failed) > 0);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub fn one_percent_off(_: &str, source: String) -> String {
     let source = source
         .replace("masses[i].acceleration * pass_row.substep", "masses[i].acceleration * (1.01 * pass_row.substep)");

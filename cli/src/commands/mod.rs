@@ -61,7 +61,7 @@ enum Command {
     Export(export::ExportArgs),
     /// Run hard cases and say which pass.
     Hard(hard::HardArgs),
-    /// Let small worlds live for a million steps and say whether memory, time and energy stay level.
+    /// Let small worlds live for long and say whether they stay level.
     Soak(soak::SoakArgs),
     /// Play a game.
     Play(play::PlayArgs),

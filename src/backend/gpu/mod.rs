@@ -54,10 +54,10 @@ const MOST_DEVICES: usize = 3;
 /// Follows plans on a device through wgpu.
 ///
 /// ```
-/// use drystone::{Backend, Gpu, backend::gpu::{AdapterChoice, adapters}};
+/// use drystone::{Backend, Gpu, backend::gpu::{AdapterChoice, GpuOptions, adapters}};
 ///
 /// // A machine without an adapter gets one clear line.
-/// match Gpu::new(AdapterChoice::Best, false) {
+/// match Gpu::open(GpuOptions { adapter: AdapterChoice::Best, ..GpuOptions::default() }) {
 ///     Ok(gpu) => assert!(gpu.summary() == &adapters()[0] && !gpu.is_exact() && gpu.cut_as_hardware().name() == "gpu"),
 ///     Err(refusal) => assert!(refusal.to_string().starts_with("no adapter found")),
 /// }

@@ -50,6 +50,18 @@ impl Default for GpuOptions {
 }
 
 /// Faults on purpose, so that tests can show that checks find them and that runs survive them.
+///
+/// ```no_run
+/// use drystone::Gpu;
+/// use drystone::backend::gpu::{Faults, GpuOptions, Loss};
+/// use drystone::conform::one_percent_off;
+///
+/// // The first device is lost while it works on its third submission; the second one stays.
+/// let losses = vec![Loss { submission: 3, during: true }];
+/// let faults = Faults { shader: Some(one_percent_off), losses };
+/// let gpu = Gpu::open(GpuOptions { faults, ..GpuOptions::default() })?;
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
     /// Changes the WGSL of the program of this name before it is compiled.

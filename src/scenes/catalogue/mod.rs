@@ -344,7 +344,7 @@ pub static CATALOGUE: &[Entry] = &[
         summary: "balls roll down a channel and push a cross of four arms on its hinge: one passes in a quarter turn, and all in the end",
         parameters: &[
             Parameter::whole("n", 12, (1.0, 1e6), "number of balls"),
-            Parameter::whole("every", 60, (45.0, 1e6), "steps from one ball to the next"),
+            Parameter::whole("every", 60, (40.0, 1e6), "steps from one ball to the next"),
         ],
         bodies: |_| 1.0,
         build: |v| Ok(flow::turnstile(v[0] as u32, v[1] as u32)),

@@ -60,12 +60,12 @@ fn table() -> World {
 /// A body comes every sixth step, and the oldest ones go; a joint comes and goes likewise.
 fn come_and_go(simulation: &mut Simulation, step: u32) {
     let world = &mut simulation.world;
-    if step % 6 == 0 {
+    if step.is_multiple_of(6) {
         let x = 0.25 * (step % 13) as f32;
-        let shape = if step % 12 == 0 { Shape::ball(0.3) } else { Shape::capsule(0.2, 0.2) };
+        let shape = if step.is_multiple_of(12) { Shape::ball(0.3) } else { Shape::capsule(0.2, 0.2) };
         let body = Body::dynamic().shape(shape).position(x, 3.0, 0.1).velocity(Vec3::new(0.0, -2.0, 0.3), Vec3::X);
         let body = world.insert(body);
-        if step % 18 == 0 {
+        if step.is_multiple_of(18) {
             let other = world.bodies.handles().nth(3).expect("boxes are left").index();
             world.insert_joint(Joint::new(body.index(), Vec3::Y, other, Vec3::Y).rope(4.0));
         }
