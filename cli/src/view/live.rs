@@ -369,8 +369,8 @@ mod tests {
         let mut live = Live::of_recording(replay, BackendChoice::Reference, false, ColorBy::Batch).expect("a scene");
         // Whatever stands before the bodies is not drawn.
         let Bounds { low, high } = live.container().expect("bodies");
-        let mut bodies = live.world().dynamic().map(|body| body.position);
-        assert!(bodies.all(|at| at.cmpgt(low).all() && at.cmplt(high).all()));
+        let is_inside = |at: Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
+        assert!(live.world().dynamic().all(|body| is_inside(body.position)));
         (0..70).for_each(|_| live.step().expect("a step"));
         live.key(&Key::Named(NamedKey::ArrowLeft), true).expect("a key");
         assert_eq!((live.steps, live.simulation.hash()), (10, hashes[9]));
