@@ -90,6 +90,13 @@ impl Gpu {
     /// Opens the adapter that `choice` finds. `exact` asks for shaders that no driver may reassociate, so that results
     /// are the reference's to the last bit.
     ///
+    /// ```no_run
+    /// use drystone::{Backend, Gpu, backend::gpu::AdapterChoice};
+    ///
+    /// assert!(Gpu::new(AdapterChoice::Best, true)?.is_exact());
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// No such adapter; it cannot be opened; or exact shaders are asked of one that cannot take SPIR-V.
     pub fn new(choice: AdapterChoice, exact: bool) -> Result<Self> {
