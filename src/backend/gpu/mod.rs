@@ -91,7 +91,7 @@ impl Gpu {
     /// are the reference's to the last bit.
     ///
     /// ```no_run
-    /// use drystone::{Backend, Gpu, backend::gpu::AdapterChoice};
+    /// use drystone::{Gpu, backend::gpu::AdapterChoice};
     ///
     /// assert!(Gpu::new(AdapterChoice::Best, true)?.is_exact());
     /// # Ok::<(), drystone::Error>(())
