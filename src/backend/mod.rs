@@ -37,6 +37,14 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// simulation.step(scene.dt)?;
 /// assert_eq!(problem.bodies, simulation.problem().bodies);
 /// assert_eq!((backend.traffic().up, backend.kernel_times().len()), (0, 0));
+///
+/// // The same for a page, where other tasks go on meanwhile.
+/// use drystone::stages::{backend::CheckedStep, problem::carry::Carry};
+/// let mut repeated = problem.clone();
+/// pollster::block_on(backend.run_async(CheckedStep::new(&mut repeated, &plan.passes)?))?;
+/// pollster::block_on(backend.step_async(CheckedStep::new(&mut problem, &plan.passes)?, &Carry::default()))?;
+/// assert_eq!(problem.bodies, repeated.bodies);
+/// assert!(pollster::block_on(backend.successor_async()).is_none());
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub trait Backend: Send {

@@ -191,6 +191,16 @@ pub fn open_for_surface(
 
 /// As [`open_for_surface`], for a page, which has no handle of a display: `window` is a canvas there.
 ///
+/// ```no_run
+/// # async fn page(canvas: impl Into<wgpu::SurfaceTarget<'static>>) -> drystone::Result<()> {
+/// use drystone::backend::gpu::{Drawable, open_for_surface_async};
+///
+/// let (surface, adapter, _device, _queue): Drawable = open_for_surface_async(None, canvas).await?;
+/// assert!(adapter.is_surface_supported(&surface));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As of [`open_for_surface`].
 pub async fn open_for_surface_async(

@@ -27,8 +27,8 @@ mod timer;
 pub(crate) mod wgsl;
 
 pub use adapter::{
-    AdapterChoice, AdapterSummary, adapters, adapters_async, open_device, open_device_async, open_for_surface,
-    open_for_surface_async,
+    AdapterChoice, AdapterSummary, Drawable, adapters, adapters_async, open_device, open_device_async,
+    open_for_surface, open_for_surface_async,
 };
 pub use options::{Faults, GpuOptions, Loss};
 
