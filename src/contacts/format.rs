@@ -143,7 +143,7 @@ impl<'a> Reader<'a> {
     fn row<T>(&mut self, head: &str, take: impl FnOnce(&mut Fields) -> Result<T>) -> Result<T> {
         let mut fields = Fields { words: self.next(&format!("{head:?}"))?.split_whitespace() };
         let taken = fields.word(head).and_then(|()| take(&mut fields)).and_then(|row| match fields.words.next() {
-            Some(word) => Err(input!("{word:?} is one field too many")),
+            Some(word) => Err(input!("{} is one field too many", quoted(word))),
             None => Ok(row),
         });
         taken.map_err(|e| e.within(format!("line {}", self.line)))
@@ -152,9 +152,20 @@ impl<'a> Reader<'a> {
     /// Nothing but blank lines follows.
     fn end(mut self) -> Result<()> {
         match self.lines.by_ref().inspect(|_| self.line += 1).find(|line| !line.trim().is_empty()) {
-            Some(line) => Err(input!("line {}: {line:?} after the last contact", self.line)),
+            Some(line) => Err(input!("line {}: {} after the last contact", self.line, quoted(line))),
             None => Ok(()),
         }
+    }
+}
+
+/// Characters of a file that a message quotes.
+const MOST_QUOTED: usize = 80;
+
+/// The text in quotes, or its beginning: a file may be anything.
+fn quoted(text: &str) -> String {
+    match text.char_indices().nth(MOST_QUOTED) {
+        Some((end, _)) => format!("{:?}...", &text[..end]),
+        None => format!("{text:?}"),
     }
 }
 
@@ -167,14 +178,14 @@ impl Fields<'_> {
     fn word(&mut self, expected: &str) -> Result<()> {
         match self.words.next() {
             Some(word) if word == expected => Ok(()),
-            Some(word) => Err(input!("{word:?} where {expected:?} should be")),
+            Some(word) => Err(input!("{} where {expected:?} should be", quoted(word))),
             None => Err(input!("ends where {expected:?} should be")),
         }
     }
 
     fn take<T: FromStr>(&mut self, what: &str) -> Result<T> {
         let word = self.words.next().ok_or_else(|| input!("ends where {what} should be"))?;
-        word.parse().map_err(|_| input!("{what} {word:?}: cannot be read"))
+        word.parse().map_err(|_| input!("{what} {}: cannot be read", quoted(word)))
     }
 
     fn number(&mut self, what: &str) -> Result<f64> {
