@@ -161,8 +161,7 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// Nothing more can be written.
     pub fn finish(mut self, simulation: &mut Simulation) -> Result<W> {
-        let (hash, bodies) = hashes(simulation);
-        self.part(END, &[&hash.to_le_bytes()[..], &bodies].concat())?;
+        write_end(&mut self.out, simulation)?;
         self.out.flush().map_err(Error::file("recording"))?;
         Ok(self.out)
     }
@@ -176,15 +175,62 @@ impl<W: Write> Recorder<W> {
     }
 
     fn part(&mut self, kind: u8, bytes: &[u8]) -> Result<()> {
-        self.write(&[kind])?;
-        self.write(&(bytes.len() as u64).to_le_bytes())?;
-        self.write(&crate::saved::hash_of(bytes).to_le_bytes())?;
-        self.write(bytes)
+        write_part(&mut self.out, kind, bytes)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.out.write_all(bytes).map_err(Error::file("recording"))
     }
+}
+
+impl Recorder<Vec<u8>> {
+    /// The bytes that were written so far. The end is missing.
+    pub fn so_far(&self) -> &[u8] {
+        &self.out
+    }
+
+    /// The recording up to now with its end, while the recorder goes on.
+    ///
+    /// ```
+    /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
+    /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
+    /// let (half, hash) = (recorder.ended(&simulation)?, simulation.hash());
+    /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
+    /// assert!(recorder.so_far().len() > half.len());
+    /// let mut replay = Replay::read(&half)?;
+    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// replay.seek(&mut again, 9)?;
+    /// assert_eq!((replay.len(), again.hash(), replay.first_difference()), (5, hash, None));
+    /// assert_eq!(Replay::read(&recorder.finish(&mut simulation)?)?.len(), 10);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Recorder::finish`]; memory takes all that is written.
+    pub fn ended(&self, simulation: &Simulation) -> Result<Vec<u8>> {
+        let mut all = self.out.clone();
+        write_end(&mut all, simulation)?;
+        Ok(all)
+    }
+}
+
+fn write_part(out: &mut impl Write, kind: u8, bytes: &[u8]) -> Result<()> {
+    let (length, hash) = ((bytes.len() as u64).to_le_bytes(), crate::saved::hash_of(bytes).to_le_bytes());
+    let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(Error::file("recording"));
+    write(&[kind])?;
+    write(&length)?;
+    write(&hash)?;
+    write(bytes)
+}
+
+/// Ends a recording with the hash of the last state.
+fn write_end(out: &mut impl Write, simulation: &Simulation) -> Result<()> {
+    let (hash, bodies) = hashes(simulation);
+    write_part(out, END, &[&hash.to_le_bytes()[..], &bodies].concat())
 }
 
 /// The hash of all bodies, and a byte for each: the lowest of its own hash.
