@@ -3,10 +3,10 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quality {
     /// Samples per pixel, 1 or 4.
-    pub(super) samples: u32,
-    pub(super) shadow_size: u32,
+    pub(crate) samples: u32,
+    pub(crate) shadow_size: u32,
     /// Texels of the shadow map that are compared on each side of a point.
-    pub(super) shadow_reach: u32,
+    pub(crate) shadow_reach: u32,
 }
 
 impl Quality {
@@ -16,9 +16,9 @@ impl Quality {
     pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
 }
 
-pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-pub(super) fn texture(
+pub(crate) fn texture(
     device: &wgpu::Device,
     (width, height): (u32, u32),
     format: wgpu::TextureFormat,
@@ -37,7 +37,7 @@ pub(super) fn texture(
     })
 }
 
-pub(super) fn cleared_depth(
+pub(crate) fn cleared_depth(
     view: &wgpu::TextureView,
     store: wgpu::StoreOp,
 ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
@@ -45,7 +45,7 @@ pub(super) fn cleared_depth(
     wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
-pub(super) fn bind(
+pub(crate) fn bind(
     device: &wgpu::Device,
     kinds: &[wgpu::BindingType],
     resources: &[wgpu::BindingResource],
@@ -60,27 +60,27 @@ pub(super) fn bind(
     (layout, group)
 }
 
-pub(super) fn layout_of<T>(
+pub(crate) fn layout_of<T>(
     step_mode: wgpu::VertexStepMode,
     attributes: &[wgpu::VertexAttribute],
 ) -> wgpu::VertexBufferLayout<'_> {
     wgpu::VertexBufferLayout { array_stride: size_of::<T>() as u64, step_mode, attributes }
 }
 
-pub(super) struct Drawing<'a> {
-    pub(super) layout: &'a wgpu::BindGroupLayout,
-    pub(super) module: &'a wgpu::ShaderModule,
-    pub(super) vertex: &'a str,
+pub(crate) struct Drawing<'a> {
+    pub(crate) layout: &'a wgpu::BindGroupLayout,
+    pub(crate) module: &'a wgpu::ShaderModule,
+    pub(crate) vertex: &'a str,
     /// A pipeline without a fragment shader draws depth only.
-    pub(super) fragment: Option<&'a str>,
-    pub(super) buffers: &'a [wgpu::VertexBufferLayout<'a>],
-    pub(super) topology: wgpu::PrimitiveTopology,
-    pub(super) depth: wgpu::CompareFunction,
-    pub(super) format: wgpu::TextureFormat,
-    pub(super) quality: Quality,
+    pub(crate) fragment: Option<&'a str>,
+    pub(crate) buffers: &'a [wgpu::VertexBufferLayout<'a>],
+    pub(crate) topology: wgpu::PrimitiveTopology,
+    pub(crate) depth: wgpu::CompareFunction,
+    pub(crate) format: wgpu::TextureFormat,
+    pub(crate) quality: Quality,
 }
 
-pub(super) fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
+pub(crate) fn pipeline(device: &wgpu::Device, d: &Drawing) -> wgpu::RenderPipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(d.vertex),
         bind_group_layouts: &[Some(d.layout)],

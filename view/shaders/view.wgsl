@@ -1,4 +1,4 @@
-// What every picture shader reads, and how colors leave it. src/view/renderer.rs writes the uniforms.
+// What every picture shader reads, and how colors leave it. view/src/renderer.rs writes the uniforms.
 
 struct View {
     view_projection: mat4x4f,

@@ -1,4 +1,4 @@
-// Lines over the picture: contacts, joints, boxes. src/view/overlay.rs writes their ends.
+// Lines over the picture: contacts, joints, boxes. view/src/overlay.rs writes their ends.
 
 struct LineFragment {
     @builtin(position) position: vec4f,

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use glam::{Quat, Vec2, Vec3};
 
-use super::map::{Cell, Map};
+use crate::map::{Cell, Map};
 use drystone::{Body, Result, Scene, Shape, World};
 
 // Side of a cell, radii of ball and hole, height of the walls and depth of the holes (m).
@@ -63,7 +63,7 @@ fn corners(map: &Map, row: isize, column: isize) -> [Vec3; 4] {
 
 /// Distances of the ball from floor and walls (m); an overlap is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Gap {
+pub(crate) struct Gap {
     /// None over a hole.
     pub floor: Option<f32>,
     /// Distance from the nearest wall in the cells around; infinite without one.
@@ -71,7 +71,7 @@ pub(super) struct Gap {
 }
 
 /// The gap of a ball with its center at `ball`, in the frame of the board.
-pub(super) fn gap(map: &Map, ball: Vec3) -> Gap {
+pub(crate) fn gap(map: &Map, ball: Vec3) -> Gap {
     let origin = corner(map, 0.0, 0.0);
     let (row, column) = (((ball.z - origin.z) / CELL).floor(), ((ball.x - origin.x) / CELL).floor());
     let mut gap = Gap { floor: Some(ball.y - RADIUS), wall: f32::INFINITY };
@@ -201,7 +201,7 @@ fn hole(surface: &mut Surface, corners: [Vec3; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::maze::BOARDS;
+    use crate::map::BOARDS;
 
     #[test]
     fn the_floor_is_closed_except_for_the_holes_and_the_goal() {

@@ -1,5 +1,5 @@
 // Bodies as instanced meshes under one light with a shadow map, and a sky that is brighter above than below.
-// One instance is one collider: src/view/mesh.rs writes its rows.
+// One instance is one collider: view/src/mesh.rs writes its rows.
 
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;

@@ -5,10 +5,10 @@ use std::collections::{BinaryHeap, HashMap};
 
 use glam::{Vec2, Vec3Swizzles};
 
-use super::board::center_of;
-use super::game::{Game, Outcome};
-use super::map::{Cell, Map};
-use super::script::{Script, TILT_LIMIT};
+use crate::board::{CELL, center_of};
+use crate::game::{Game, Outcome};
+use crate::map::{Cell, Map};
+use crate::script::{Script, TILT_LIMIT};
 use drystone::{Error, Result};
 
 /// Steps between two points of the script: 0.05 s.
@@ -35,7 +35,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
         let at = game.ball().xz();
         let speed = (at - before) / (HOLD as f32 * game.dt());
         before = at;
-        while next + 1 < way.len() && at.distance(way[next]) < 0.25 * super::CELL {
+        while next + 1 < way.len() && at.distance(way[next]) < 0.25 * CELL {
             next += 1;
         }
         let acceleration = PULL * (way[next] - at) - DAMPING * speed;

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::camera::Bounds;
-use super::colors::{Rgba, batch_color};
-use super::mesh::Poses;
+use crate::bounds::Bounds;
+use crate::colors::{Rgba, batch_color};
+use crate::poses::Poses;
 use drystone::{BodyKind, Joint, Linear, Simulation, SolvedManifold, World};
 
 /// An end of a line, in the layout of the shader.

@@ -1,14 +1,13 @@
-//! A scene that runs in a window.
+//! A scene or a recording that runs while it is looked at.
 
 use std::time::Duration;
 
 use glam::Vec3;
 
-use super::camera::Bounds;
-use super::colors::ColorBy;
-use super::film::{bounds, tight_bounds};
-use super::overlay::Overlay;
-use super::show::Pointer;
+use crate::bounds::Bounds;
+use crate::colors::ColorBy;
+use crate::overlay::Overlay;
+use crate::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
 use drystone::scenes::Spawners;
@@ -16,53 +15,58 @@ use drystone::{
     Body, BodyKind, JointHandle, Reference, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig, StepStats,
 };
 
-/// Rate at which a pulled body approaches the mouse (1/s): soft at any stiffness of joints.
+/// Rate at which a pulled body approaches the pointer (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
 /// Speed of a thrown cube over the radius of the scene (1/s).
 const THROW: f32 = 2.0;
 
+/// A scene or a recording that runs while it is looked at: pulled by the pointer, thrown at, kept and taken back.
 pub struct Live {
-    pub(super) scene: Scene,
+    pub(crate) scene: Scene,
     exact: bool,
-    pub(super) choice: BackendChoice,
-    pub(super) simulation: Simulation,
+    /// The backend that was asked for.
+    pub choice: BackendChoice,
+    pub simulation: Simulation,
     spawners: Spawners,
-    pub(super) color: ColorBy,
-    pub(super) overlay: Overlay,
-    pub(super) paused: bool,
+    pub color: ColorBy,
+    pub overlay: Overlay,
+    pub paused: bool,
     /// Requested simulated seconds per second.
-    pub(super) speed: f32,
+    pub speed: f32,
     /// Reached simulated seconds per second, a mean over the last pictures.
-    pub(super) reached: f32,
+    pub reached: f32,
     /// Pictures per second, a mean over the last pictures.
-    pub(super) pictures: f32,
-    pub(super) steps: u32,
-    pub(super) stats: StepStats,
+    pub pictures: f32,
+    /// Steps since the start.
+    pub steps: u32,
+    /// Statistics of the last step.
+    pub stats: StepStats,
     /// Times of the stages, means over the last steps (ms).
-    pub(super) stage_ms: [f64; 5],
-    pub(super) refused: Option<String>,
-    pub(super) owed: f32,
+    pub stage_ms: [f64; 5],
+    /// Why the last change of settings or backend was refused, in one line.
+    pub refused: Option<String>,
+    pub(crate) owed: f32,
     /// Time of the steps before the last picture.
-    pub(super) stepping: Duration,
-    pub(super) grabbed: Option<Grabbed>,
-    pub(super) kept: Option<Kept>,
+    pub(crate) stepping: Duration,
+    pub(crate) grabbed: Option<Grabbed>,
+    pub(crate) kept: Option<Kept>,
     /// The recording that runs again, instead of the scene.
-    pub(super) replay: Option<Replay>,
-    /// Where the mouse points.
-    pub(super) pointer: Option<Pointer>,
-    pub(super) bounds: Bounds,
-    pub(super) light_end: f32,
+    pub(crate) replay: Option<Replay>,
+    /// Where the pointer is.
+    pub(crate) pointer: Option<Pointer>,
+    pub(crate) bounds: Bounds,
+    pub(crate) light_end: f32,
 }
 
-/// A body that the mouse pulls by the last joint of the world.
-pub(super) struct Grabbed {
-    pub(super) body: usize,
+/// A body that the pointer pulls by a joint of the world.
+pub(crate) struct Grabbed {
+    pub(crate) body: usize,
     /// The pulled point in the body's frame (m).
-    pub(super) anchor: Vec3,
+    pub(crate) anchor: Vec3,
     /// Distance of the target from the eye (m).
-    pub(super) distance: f32,
-    pub(super) target: Vec3,
-    pub(super) joint: JointHandle,
+    pub(crate) distance: f32,
+    pub(crate) target: Vec3,
+    pub(crate) joint: JointHandle,
 }
 
 /// The scene of a recording, whose simulation has begun.
@@ -70,13 +74,13 @@ pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
     let mut scene = Scene::new(replay.title(), simulation.world.clone(), replay.len());
     scene.dt = replay.dt().unwrap_or(scene.dt);
     // A recording has no container; near walls hide its bodies all the same.
-    let Bounds { low, high } = tight_bounds(&scene.world);
+    let Bounds { low, high } = Bounds::tight(&scene.world);
     scene.container = low.is_finite().then_some((low, high));
     scene
 }
 
 /// A state to go back to: that of the simulation and of the spawners, and its step.
-pub(super) type Kept = (Snapshot, Spawners, u32);
+pub(crate) type Kept = (Snapshot, Spawners, u32);
 
 impl Live {
     /// A recording that runs again.
@@ -94,7 +98,7 @@ impl Live {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
         Ok(Self {
-            bounds: bounds(&scene.world),
+            bounds: Bounds::of(&scene.world),
             exact,
             choice,
             simulation,
@@ -125,7 +129,7 @@ impl Live {
         self.steps as f32 * self.scene.dt
     }
 
-    pub(super) fn restart(&mut self) -> Result<()> {
+    pub fn restart(&mut self) -> Result<()> {
         if self.replay.is_some() {
             return self.seek(-f64::INFINITY);
         }
@@ -138,12 +142,12 @@ impl Live {
     }
 
     /// Keeps the state, to go back to it.
-    pub(super) fn keep(&mut self) {
+    pub fn keep(&mut self) {
         self.kept = Some((self.simulation.snapshot(), self.spawners.clone(), self.steps));
     }
 
     /// Goes back to the state that was kept.
-    pub(super) fn go_back(&mut self) {
+    pub fn go_back(&mut self) {
         if let Some((snapshot, spawners, steps)) = self.kept.as_ref().filter(|_| self.replay.is_none()) {
             self.simulation.restore(snapshot);
             self.spawners.clone_from(spawners);
@@ -152,7 +156,7 @@ impl Live {
     }
 
     /// Goes so many seconds forth or back in a recording.
-    pub(super) fn seek(&mut self, seconds: f64) -> Result<()> {
+    pub fn seek(&mut self, seconds: f64) -> Result<()> {
         if let Some(replay) = &mut self.replay {
             let step = (f64::from(self.steps) + seconds / f64::from(self.scene.dt)).round().max(0.0);
             replay.seek(&mut self.simulation, step as u32)?;
@@ -161,8 +165,8 @@ impl Live {
         Ok(())
     }
 
-    /// Throws a cube from the eye to where the mouse points.
-    pub(super) fn throw(&mut self) {
+    /// Throws a cube from the eye to where the pointer is.
+    pub fn throw(&mut self) {
         let Some(Pointer { origin, direction, .. }) = self.pointer.filter(|_| self.replay.is_none()) else { return };
         let size = 0.02 * self.bounds.radius();
         let cube = Body::dynamic().named("thrown").shape(Shape::cuboid(size, size, size));
@@ -172,8 +176,8 @@ impl Live {
             .insert(cube.position(x, y, z).velocity(THROW * self.bounds.radius() * direction, Vec3::ZERO));
     }
 
-    /// The dynamic body under the mouse, through other bodies if need be, and how far from the eye (m).
-    pub(super) fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
+    /// The dynamic body under the pointer, through other bodies if need be, and how far from the eye (m).
+    pub fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
         // A recording goes its own way.
         if self.replay.is_some() {
             return None;
@@ -184,8 +188,8 @@ impl Live {
         Some((hit.distance, hit.body.index()))
     }
 
-    /// Takes out the dynamic body under the mouse.
-    pub(super) fn delete(&mut self) {
+    /// Takes out the dynamic body under the pointer.
+    pub fn delete(&mut self) {
         let under = self.pointer.and_then(|pointer| self.body_at(pointer));
         let world = &mut self.simulation.world;
         if let Some(body) = under.and_then(|(_, i)| world.bodies.handle(i)) {
@@ -193,11 +197,11 @@ impl Live {
         }
     }
 
-    pub(super) fn set_config(&mut self, config: SolverConfig) {
+    pub fn set_config(&mut self, config: SolverConfig) {
         self.refused = self.simulation.set_config(config).err().map(|e| e.to_string());
     }
 
-    pub(super) fn set_backend(&mut self, choice: BackendChoice) {
+    pub fn set_backend(&mut self, choice: BackendChoice) {
         match choose(choice, self.scene.world.dynamic_count(), self.exact) {
             Ok((backend, _)) => {
                 self.simulation.set_backend(backend);
@@ -207,7 +211,7 @@ impl Live {
         }
     }
 
-    pub(super) fn step(&mut self) -> Result<()> {
+    pub fn step(&mut self) -> Result<()> {
         if let Some(replay) = &mut self.replay {
             match replay.step(&mut self.simulation)? {
                 Some(stats) => self.note(stats),
@@ -246,10 +250,9 @@ impl Live {
 #[cfg(test)]
 mod tests {
     use glam::Vec2;
-    use winit::keyboard::{Key, NamedKey};
 
-    use super::super::show::{Pointer, Show};
     use super::*;
+    use crate::show::{Key, Pointer, Show};
     use drystone::{Recorder, RecordingIntervals};
 
     fn live(name: &str) -> Live {
@@ -258,7 +261,7 @@ mod tests {
     }
 
     fn press(live: &mut Live, key: &str) {
-        live.key(&Key::Character(key.into()), true).expect("a key");
+        live.key(Key::named(key).expect("a key"), true).expect("a key");
     }
 
     #[test]
@@ -269,7 +272,7 @@ mod tests {
         press(&mut live, "-");
         (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
         assert_eq!(live.steps, 9);
-        live.key(&Key::Named(NamedKey::Space), true).expect("a key");
+        press(&mut live, " ");
         live.advance(0.1).expect("time");
         press(&mut live, "n");
         assert_eq!(live.steps, 10);
@@ -372,9 +375,9 @@ mod tests {
         let is_inside = |at: Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
         assert!(live.world().dynamic().all(|body| is_inside(body.position)));
         (0..70).for_each(|_| live.step().expect("a step"));
-        live.key(&Key::Named(NamedKey::ArrowLeft), true).expect("a key");
+        press(&mut live, "ArrowLeft");
         assert_eq!((live.steps, live.simulation.hash()), (10, hashes[9]));
-        live.key(&Key::Named(NamedKey::ArrowRight), true).expect("a key");
+        press(&mut live, "ArrowRight");
         assert_eq!((live.steps, live.simulation.hash()), (70, hashes[69]));
         (0..30).for_each(|_| live.step().expect("a step"));
         assert_eq!((live.steps, live.paused, live.simulation.hash()), (90, true, hashes[89]));

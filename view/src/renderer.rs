@@ -6,11 +6,13 @@ use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
 use wgpu::util::DeviceExt;
 
-use super::camera::{Bounds, Camera};
-use super::colors::Rgba;
-use super::mesh::{Instance, Meshes, Poses, Vertex};
-use super::overlay::LineEnd;
-use super::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
+use crate::bounds::Bounds;
+use crate::camera::Camera;
+use crate::colors::Rgba;
+use crate::mesh::{Instance, Meshes, Vertex};
+use crate::overlay::LineEnd;
+use crate::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
+use crate::poses::Poses;
 use drystone::{BodyHandle, World};
 
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
@@ -26,7 +28,7 @@ pub struct Shot<'a> {
     pub lines: &'a [LineEnd],
 }
 
-/// As `View` in shaders/view/view.wgsl.
+/// As `View` in shaders/view.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct View {
@@ -109,13 +111,11 @@ impl Renderer {
         let module = |label: &str, source: &str| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
-                source: wgpu::ShaderSource::Wgsl(
-                    [include_str!("../../shaders/view/view.wgsl"), source].concat().into(),
-                ),
+                source: wgpu::ShaderSource::Wgsl([include_str!("../shaders/view.wgsl"), source].concat().into()),
             })
         };
-        let mesh = module("mesh", include_str!("../../shaders/view/mesh.wgsl"));
-        let line = module("line", include_str!("../../shaders/view/line.wgsl"));
+        let mesh = module("mesh", include_str!("../shaders/mesh.wgsl"));
+        let line = module("line", include_str!("../shaders/line.wgsl"));
         let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
         let row = wgpu::vertex_attr_array![2 => Float32x3, 3 => Unorm8x4, 4 => Float32x4, 5 => Float32x3, 6 => Uint32];
         let end = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];

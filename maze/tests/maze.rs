@@ -5,13 +5,11 @@
 mod common;
 
 use std::path::Path;
-use std::process::Command;
 
 use common::gpu;
 use drystone::glam::{Quat, Vec3};
 use drystone::{Backend, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
-use drystone_cli::maze::{BOARD, BOARDS, CELL, Game, Map, Outcome, Played, RADIUS, Script, TILT_LIMIT, pilot, play};
-use serde_json::Value;
+use drystone_maze::{BOARD, BOARDS, CELL, Game, Map, Outcome, Played, RADIUS, Script, TILT_LIMIT, pilot, play};
 
 tests! {
     exact_gpu {
@@ -22,11 +20,8 @@ tests! {
         a_script_that_rolls_into_a_hole_loses_and_a_script_that_ends_decides_nothing,
         lanes_play_the_same_game_to_the_last_bit,
         the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes,
-        the_command_prints_outcome_and_track,
-        the_pilot_writes_a_script_that_wins,
         the_board_tilts_no_further_than_its_limit_and_no_faster_than_its_rate,
         a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before,
-        bad_maps_and_scripts_are_refused_in_one_line_with_line_and_column,
     }
 }
 
@@ -151,46 +146,4 @@ fn a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before() {
     }
     assert_eq!(game.outcome, Some(Outcome::Goal));
     assert!(before >= 0.4 * CELL && far(&game) < 0.4 * CELL, "{before} m, then {} m", far(&game));
-}
-
-/// The output of the command, or its error.
-fn command(arguments: &str) -> Result<String, String> {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("bad.txt"), "S..\n.x.\n..G\n").expect("a file");
-    std::fs::write(folder.path().join("script.txt"), "0 0 0\n1 0 9\n").expect("a file");
-    let root = env!("CARGO_MANIFEST_DIR");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
-    let arguments = arguments.replace("ROOT", root);
-    let output = command.args(arguments.split(' ')).current_dir(&folder).output().expect("the command starts");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    if output.status.success() { Ok(text(output.stdout)) } else { Err(text(output.stderr)) }
-}
-
-fn the_command_prints_outcome_and_track() {
-    let printed = command("play maze easy --script ROOT/tests/maze/easy.txt --json").expect("a game");
-    let game: Value = serde_json::from_str(&printed).expect("JSON");
-    assert_eq!((&game["outcome"], &game["board"]), (&"goal".into(), &"easy".into()));
-    assert!(game["track"].as_array().is_some_and(|t| t.len() > 100 && t[0]["ball"][1].as_f64() > Some(0.014)));
-    assert!(game["slip"]["rms"].as_f64() < Some(1e-3));
-}
-
-fn the_pilot_writes_a_script_that_wins() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("way.txt").display().to_string();
-    command(&format!("play maze medium --pilot {path}")).expect("a script");
-    let printed = command(&format!("play maze medium --script {path}")).expect("a game");
-    assert!(printed.contains("won"), "{printed}");
-}
-
-fn bad_maps_and_scripts_are_refused_in_one_line_with_line_and_column() {
-    for (arguments, parts) in [
-        ("play maze bad.txt --script script.txt", ["bad.txt", "line 2, column 2"]),
-        ("play maze easy --script script.txt", ["script.txt", "line 2, column 5"]),
-        ("play maze easy --script nowhere.txt", ["nowhere.txt", "No such file"]),
-        ("play maze hardest --script script.txt", ["hardest", "easy, medium, hard"]),
-    ] {
-        let message = command(arguments).expect_err(arguments);
-        assert!(parts.iter().all(|part| message.contains(part)), "{arguments}: {message}");
-        assert_eq!(message.lines().count(), 1, "{message}");
-    }
 }

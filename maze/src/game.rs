@@ -3,9 +3,9 @@
 use glam::{Quat, Vec3};
 use serde::Serialize;
 
-use super::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
-use super::map::Map;
-use super::script::{Script, TILT_LIMIT};
+use crate::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
+use crate::map::Map;
+use crate::script::{Script, TILT_LIMIT};
 use drystone::{Backend, Result, Scene, Simulation, SolverConfig, World};
 
 /// Rate of the tilt (degrees/s).

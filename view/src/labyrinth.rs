@@ -1,16 +1,16 @@
-//! The maze game in a window: arrow keys or the mouse tilt the board, R restarts the game.
+//! The maze game: arrow keys or the pointer tilt the board, R restarts the game.
 
 use glam::{Quat, Vec2, Vec3};
-use winit::keyboard::{Key, NamedKey};
 
-use super::camera::{Bounds, Camera};
-use super::canvas::{Canvas, Picture};
-use super::colors::Rgba;
-use super::renderer::Shot;
-use super::show::{Pointer, Show};
-use crate::maze::{BALL, BOARD, BOARDS, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
+use crate::bounds::Bounds;
+use crate::camera::Camera;
+use crate::canvas::{Canvas, Picture};
+use crate::colors::Rgba;
+use crate::renderer::Shot;
+use crate::show::{Key, Pointer, Show};
 use drystone::backend::{BackendChoice, choose};
 use drystone::{Result, SolverConfig, World};
+use drystone_maze::{BALL, BOARD, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];
 const GOAL_COLOR: Rgba = [92, 170, 96, 255];
@@ -49,37 +49,40 @@ pub fn draw_game(
     })
 }
 
+/// The maze game as it is played.
 pub struct Labyrinth {
-    game: Game,
+    pub game: Game,
     map: Map,
     config: SolverConfig,
     backend: BackendChoice,
     /// Whether each arrow key is down: left, right, back, front.
     held: [bool; 4],
-    /// Position of the mouse in the window while its button is down.
-    mouse: Option<Vec2>,
-    begun: bool,
+    /// Position of the pointer in the picture while it is held down.
+    held_at: Option<Vec2>,
+    /// Whether the board was tilted; the clock waits for it.
+    pub begun: bool,
     owed: f32,
-    best: Option<f32>,
+    /// Shortest time of a game that was won (s).
+    pub best: Option<f32>,
 }
 
 impl Labyrinth {
     pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
         let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
         let held = [false; 4];
-        Ok(Self { game, map, config, backend, held, mouse: None, begun: false, owed: 0.0, best: None })
+        Ok(Self { game, map, config, backend, held, held_at: None, begun: false, owed: 0.0, best: None })
     }
 
     fn restart(&mut self) -> Result<()> {
         let fresh = Self::new(self.map.clone(), self.config.clone(), self.backend)?;
-        *self = Self { held: self.held, mouse: self.mouse, best: self.best, ..fresh };
+        *self = Self { held: self.held, held_at: self.held_at, best: self.best, ..fresh };
         Ok(())
     }
 
-    /// Tilts that keys and mouse request, to the right and to the front (degrees).
+    /// Tilts that keys and pointer request, to the right and to the front (degrees).
     fn wanted(&self) -> [f32; 2] {
         let arrow = |less: usize, more: usize| f32::from(self.held[more]) - f32::from(self.held[less]);
-        match self.mouse {
+        match self.held_at {
             Some(at) => [at.x, -at.y].map(|x| (1.5 * x).clamp(-1.0, 1.0) * TILT_LIMIT),
             None => [arrow(0, 1), arrow(2, 3)].map(|x| x * TILT_LIMIT),
         }
@@ -123,50 +126,25 @@ impl Show for Labyrinth {
         Ok(())
     }
 
-    fn key(&mut self, key: &Key, down: bool) -> Result<()> {
-        let arrows = [NamedKey::ArrowLeft, NamedKey::ArrowRight, NamedKey::ArrowUp, NamedKey::ArrowDown];
-        match key.as_ref() {
-            Key::Named(name) => {
-                if let Some(arrow) = arrows.iter().position(|a| *a == name) {
-                    self.held[arrow] = down;
-                }
-            }
-            Key::Character("r") if down => self.restart()?,
-            _ => {}
+    fn key(&mut self, key: Key, down: bool) -> Result<()> {
+        let arrows = [Key::Left, Key::Right, Key::Up, Key::Down];
+        if let Some(arrow) = arrows.iter().position(|a| *a == key) {
+            self.held[arrow] = down;
         }
-        Ok(())
+        if key == Key::Character('r') && down { self.restart() } else { Ok(()) }
     }
 
     fn grab(&mut self, pointer: &Pointer) -> bool {
-        self.mouse = Some(pointer.at);
+        self.held_at = Some(pointer.at);
         true
     }
 
     fn drag(&mut self, pointer: &Pointer) {
-        self.mouse = Some(pointer.at);
+        self.held_at = Some(pointer.at);
     }
 
     fn release(&mut self) {
-        self.mouse = None;
-    }
-
-    fn panel(&mut self, ui: &mut egui::Ui) {
-        ui.heading(match self.game.outcome {
-            Some(Outcome::Goal) => "won",
-            Some(_) => "lost: R starts again",
-            None if self.begun => "to the green square",
-            None => "arrow keys, or hold the mouse",
-        });
-        ui.monospace(format!("time {:6.2} s", self.game.time()));
-        if let Some(best) = self.best {
-            ui.monospace(format!("best {best:6.2} s"));
-        }
-        let [right, front] = self.game.tilt;
-        ui.monospace(format!("tilt {right:5.1} {front:5.1} degrees"));
-        ui.label("arrows or left mouse: tilt, right mouse: turn the view");
-        ui.label("r again, f whole board, h panel, esc close");
-        let known = BOARDS.map(|b| b.0).join(", ");
-        ui.label(format!("boards: {known}, or a file of your own"));
+        self.held_at = None;
     }
 }
 
@@ -185,17 +163,17 @@ mod tests {
         game.advance(0.5).expect("time");
         assert_eq!(game.game.time(), 0.0);
         let start = game.game.ball();
-        game.key(&Key::Named(NamedKey::ArrowRight), true).expect("a key");
+        game.key(Key::Right, true).expect("a key");
         (0..30).for_each(|_| game.advance(1.0 / 60.0).expect("time"));
         assert!(game.game.ball().x > start.x + 0.03, "{} m", game.game.ball().x - start.x);
-        game.key(&Key::Named(NamedKey::ArrowRight), false).expect("a key");
+        game.key(Key::Right, false).expect("a key");
         assert_eq!(game.wanted(), [0.0, 0.0]);
-        game.key(&Key::Character("r".into()), true).expect("a key");
+        game.key(Key::Character('r'), true).expect("a key");
         assert_eq!((game.game.time(), game.game.ball()), (0.0, start));
     }
 
     #[test]
-    fn the_board_tilts_towards_the_mouse() {
+    fn the_board_tilts_towards_the_pointer() {
         let mut game = labyrinth();
         let at = Vec2::new(0.2, -0.9);
         assert!(game.grab(&Pointer { at, origin: Vec3::ZERO, direction: Vec3::NEG_Z }));

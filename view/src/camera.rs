@@ -4,50 +4,13 @@ use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{Mat4, Quat, Vec2, Vec3};
 
+use crate::bounds::Bounds;
+
 /// Vertical angle of view (rad).
 const FIELD: f32 = 0.6;
 
-/// A box along the world's axes: lower and upper corner (m).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    pub low: Vec3,
-    pub high: Vec3,
-}
-
-impl Bounds {
-    /// An empty box; joined with another box it gives the other.
-    pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
-
-    pub fn around(center: Vec3, reach: f32) -> Self {
-        Self { low: center - reach, high: center + reach }
-    }
-
-    /// The smallest box that contains both. A box that is not finite is empty.
-    pub fn join(self, other: Self) -> Self {
-        if !(other.low.is_finite() && other.high.is_finite()) {
-            return self;
-        }
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
-    }
-
-    /// Center (m); the origin if the box is empty.
-    pub fn center(&self) -> Vec3 {
-        if self.low.is_finite() { 0.5 * (self.low + self.high) } else { Vec3::ZERO }
-    }
-
-    /// Radius of the sphere around the box (m); 1 if the box is empty.
-    pub fn radius(&self) -> f32 {
-        if self.low.is_finite() { (0.5 * (self.high - self.low).length()).max(1e-3) } else { 1.0 }
-    }
-
-    pub fn corners(&self) -> [Vec3; 8] {
-        let pick = |k: usize, bit: usize, axis: usize| if k >> bit & 1 == 0 { self.low[axis] } else { self.high[axis] };
-        std::array::from_fn(|k| Vec3::new(pick(k, 0, 0), pick(k, 1, 1), pick(k, 2, 2)))
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
 /// `distance` is that of the eye from `target` (m); `up` is a unit vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub target: Vec3,
     pub distance: f32,

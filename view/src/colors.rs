@@ -1,8 +1,12 @@
 //! Colors of bodies.
 
-use drystone::{BodyKind, Simulation, SolvedManifold, World};
+use std::fmt;
+use std::str::FromStr;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+use drystone::{BodyKind, Error, Result, Simulation, SolvedManifold, World};
+
+/// The quantity that the color of a body shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorBy {
     /// Density, friction and restitution: equal materials have equal colors.
     #[default]
@@ -19,9 +23,40 @@ pub enum ColorBy {
     Effort,
 }
 
-impl std::fmt::Display for ColorBy {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        clap::ValueEnum::to_possible_value(self).expect("none is skipped").get_name().fmt(f)
+impl ColorBy {
+    /// All, in their order.
+    pub const ALL: [Self; 6] = [Self::Material, Self::Batch, Self::Speed, Self::Impulse, Self::Sleeping, Self::Effort];
+
+    /// Its name on command lines, in addresses and in messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Material => "material",
+            Self::Batch => "batch",
+            Self::Speed => "speed",
+            Self::Impulse => "impulse",
+            Self::Sleeping => "sleeping",
+            Self::Effort => "effort",
+        }
+    }
+
+    /// The one after it; the first after the last.
+    pub fn next(self) -> Self {
+        Self::ALL[(self as usize + 1) % Self::ALL.len()]
+    }
+}
+
+impl fmt::Display for ColorBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.name().fmt(f)
+    }
+}
+
+impl FromStr for ColorBy {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let unknown = || Error::input(format!("{name:?} is none of {}", Self::ALL.map(Self::name).join(", ")));
+        Self::ALL.into_iter().find(|color| color.name() == name).ok_or_else(unknown)
     }
 }
 
@@ -65,7 +100,7 @@ impl ColorBy {
         self.values_of(&simulation.world, &manifolds, &asleep)
     }
 
-    pub(super) fn values_of(self, world: &World, manifolds: &[SolvedManifold], asleep: &[bool]) -> Vec<f32> {
+    pub(crate) fn values_of(self, world: &World, manifolds: &[SolvedManifold], asleep: &[bool]) -> Vec<f32> {
         match self {
             Self::Sleeping => (0..world.bodies.len()).map(|i| f32::from(asleep.get(i) == Some(&true))).collect(),
             Self::Material => materials(world),
@@ -178,6 +213,15 @@ mod tests {
             simulation.step(scene.dt).expect("a step");
         }
         simulation
+    }
+
+    #[test]
+    fn a_quantity_is_found_by_its_name_and_all_follow_each_other() {
+        assert!(ColorBy::ALL.into_iter().all(|color| color.name().parse::<ColorBy>().ok() == Some(color)));
+        let message = "mass".parse::<ColorBy>().expect_err("no color").to_string();
+        assert_eq!(message, "\"mass\" is none of material, batch, speed, impulse, sleeping, effort");
+        let next = ColorBy::ALL.map(ColorBy::next);
+        assert!(next[..5] == ColorBy::ALL[1..] && next[5] == ColorBy::ALL[0]);
     }
 
     #[test]

@@ -28,9 +28,9 @@ pub struct Map {
 }
 
 pub const BOARDS: [(&str, &str); 3] = [
-    ("easy", include_str!("../../mazes/easy.txt")),
-    ("medium", include_str!("../../mazes/medium.txt")),
-    ("hard", include_str!("../../mazes/hard.txt")),
+    ("easy", include_str!("../boards/easy.txt")),
+    ("medium", include_str!("../boards/medium.txt")),
+    ("hard", include_str!("../boards/hard.txt")),
 ];
 
 /// Largest number of rows and columns.

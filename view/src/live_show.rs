@@ -1,17 +1,15 @@
-//! Picture, keys, mouse and panel of a live scene.
+//! Picture, keys and pointer of a live scene.
 
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
-use winit::keyboard::{Key, NamedKey};
 
-use super::camera::{Bounds, Camera};
-use super::colors::Rgba;
-use super::film::bounds;
-use super::live::{Grabbed, Live};
-use super::overlay::{LineEnd, Overlay, lines};
-use super::panel;
-use super::show::{Pointer, Show};
+use crate::bounds::Bounds;
+use crate::camera::Camera;
+use crate::colors::Rgba;
+use crate::live::{Grabbed, Live};
+use crate::overlay::{LineEnd, Overlay, lines};
+use crate::show::{Key, Pointer, Show};
 use drystone::{Joint, Result, World};
 
 /// Longest time of the steps before a picture, unless drawing takes longer.
@@ -28,7 +26,7 @@ impl Show for Live {
 
     fn bounds(&self) -> Bounds {
         // The bounds follow the bodies, unless one of them is far away.
-        let now = self.bounds.join(bounds(self.world()));
+        let now = self.bounds.join(Bounds::of(self.world()));
         if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
     }
 
@@ -80,29 +78,29 @@ impl Show for Live {
         self.pointer = Some(*pointer);
     }
 
-    fn key(&mut self, key: &Key, down: bool) -> Result<()> {
+    fn key(&mut self, key: Key, down: bool) -> Result<()> {
         if !down {
             return Ok(());
         }
-        match key.as_ref() {
-            Key::Named(NamedKey::Space) => self.paused = !self.paused,
-            Key::Character("n") => {
+        match key {
+            Key::Character(' ') => self.paused = !self.paused,
+            Key::Character('n') => {
                 self.paused = true;
                 self.step()?;
             }
-            Key::Character("r") => self.restart()?,
-            Key::Character("b") => self.throw(),
-            Key::Character("x") | Key::Named(NamedKey::Delete) => self.delete(),
-            Key::Character("s") => self.keep(),
-            Key::Character("l") => self.go_back(),
-            Key::Named(NamedKey::ArrowLeft) => self.seek(-1.0)?,
-            Key::Named(NamedKey::ArrowRight) => self.seek(1.0)?,
-            Key::Character("c") => self.color = self.color.next(),
-            Key::Character("1") => self.overlay.contacts = !self.overlay.contacts,
-            Key::Character("2") => self.overlay.joints = !self.overlay.joints,
-            Key::Character("3") => self.overlay.boxes = !self.overlay.boxes,
-            Key::Character("+" | "=") => self.speed = (self.speed * 2.0).min(16.0),
-            Key::Character("-") => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
+            Key::Character('r') => self.restart()?,
+            Key::Character('b') => self.throw(),
+            Key::Character('x') | Key::Delete => self.delete(),
+            Key::Character('s') => self.keep(),
+            Key::Character('l') => self.go_back(),
+            Key::Left => self.seek(-1.0)?,
+            Key::Right => self.seek(1.0)?,
+            Key::Character('c') => self.color = self.color.next(),
+            Key::Character('1') => self.overlay.contacts = !self.overlay.contacts,
+            Key::Character('2') => self.overlay.joints = !self.overlay.joints,
+            Key::Character('3') => self.overlay.boxes = !self.overlay.boxes,
+            Key::Character('+' | '=') => self.speed = (self.speed * 2.0).min(16.0),
+            Key::Character('-') => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
             _ => {}
         }
         Ok(())
@@ -130,9 +128,5 @@ impl Show for Live {
         if let Some(grabbed) = self.grabbed.take() {
             self.simulation.world.remove_joint(grabbed.joint);
         }
-    }
-
-    fn panel(&mut self, ui: &mut egui::Ui) {
-        panel::show(self, ui);
     }
 }

@@ -1,7 +1,7 @@
 //! Pictures without a window: the renderer draws into a texture, which is read back.
 
-use super::pipeline::{Quality, texture};
-use super::renderer::{Renderer, Shot};
+use crate::pipeline::{Quality, texture};
+use crate::renderer::{Renderer, Shot};
 use drystone::backend::gpu::{AdapterChoice, open_device};
 use drystone::{Error, Result, World};
 

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use glam::{Quat, Vec3};
 
-use super::camera::Bounds;
+use crate::bounds::Bounds;
+use crate::poses::Poses;
 use drystone::world::{Collider, Triangles};
 use drystone::{BodyKind, Shape, World};
 
@@ -27,14 +28,7 @@ pub struct Instance {
     pattern: u32,
 }
 
-/// Position (m) and rotation of each body of a world.
-pub type Poses = [(Vec3, Quat)];
-
-pub fn poses(world: &World) -> Vec<(Vec3, Quat)> {
-    world.bodies.iter().map(|b| (b.position, b.rotation)).collect()
-}
-
-// The patterns of shaders/view/mesh.wgsl.
+// The patterns of shaders/mesh.wgsl.
 const PLAIN: u32 = 0;
 const CHECKERED: u32 = 1;
 const OCTANTS: u32 = 2;
