@@ -8,14 +8,28 @@ use wgpu::util::DeviceExt;
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
-use crate::colors::Rgba;
-use crate::mesh::{Instance, Meshes, Vertex};
+use crate::colors::{FIXED, Rgba};
+use crate::mesh::{Ground, Instance, Meshes, Vertex};
 use crate::overlay::LineEnd;
 use crate::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
 use crate::poses::Poses;
 use drystone::{BodyHandle, World};
 
-const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
+/// The colors of what is no body that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shades {
+    /// Behind all bodies; the ground fades into it (sRGB, 0 to 1).
+    pub background: [f32; 3],
+    /// The ground: half-spaces that are fixed.
+    pub ground: Rgba,
+}
+
+impl Shades {
+    /// Dark bodies before a light background.
+    pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED };
+    /// Light bodies before a dark background.
+    pub const DARK: Self = Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255] };
+}
 
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
@@ -40,7 +54,9 @@ struct View {
     background: [f32; 4],
 }
 
+/// Draws the bodies of a world.
 pub struct Renderer {
+    pub shades: Shades,
     device: wgpu::Device,
     queue: wgpu::Queue,
     meshes: Meshes,
@@ -134,6 +150,7 @@ impl Renderer {
             bodies: make(&main_layout, &mesh, "transform", Some("shade"), &rows, TriangleList, Less),
             // Contacts lie inside bodies; lines are drawn on top.
             lines: make(&shadow_layout, &line, "end_of_line", Some("paint_line"), &ends, LineList, Always),
+            shades: Shades::LIGHT,
             device: device.clone(),
             queue: queue.clone(),
             meshes,
@@ -152,10 +169,15 @@ impl Renderer {
     /// Takes over bodies that came or went since the last picture.
     pub fn follow(&mut self, world: &World) {
         if !world.bodies.handles().eq(self.drawn.iter().copied()) {
-            self.meshes = Meshes::new(world);
-            self.drawn = world.bodies.handles().collect();
-            self.vertices = vertex_buffer(&self.device, &self.meshes);
+            self.replace(world);
         }
+    }
+
+    /// Takes over the bodies of another world, or of one in which shapes changed.
+    pub fn replace(&mut self, world: &World) {
+        self.meshes = Meshes::new(world);
+        self.drawn = world.bodies.handles().collect();
+        self.vertices = vertex_buffer(&self.device, &self.meshes);
     }
 
     /// Draws `shot` into `target` of width and height `size` (pixels).
@@ -164,8 +186,9 @@ impl Renderer {
         let eye = shot.camera.eye();
         let container = shot.container.filter(|c| c.low.is_finite() && c.high.is_finite());
         let hidden = |b: &Bounds| container.is_some_and(|c| stands_before(b, &c, eye));
-        let ground = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
-        let instances = self.meshes.instances(shot.poses, shot.colors, ground, hidden);
+        let (middle, reach) = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
+        let ground = Ground { middle, reach, color: self.shades.ground };
+        let instances = self.meshes.instances(shot.poses, shot.colors, &ground, hidden);
         let buffer = |bytes: &[u8]| {
             let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
             let usage = wgpu::BufferUsages::VERTEX;
@@ -196,7 +219,7 @@ impl Renderer {
             });
             draw_bodies(&mut pass, &self.shadow, &self.shadow_group);
         }
-        let [r, g, b] = BACKGROUND.map(f64::from);
+        let [r, g, b] = self.shades.background.map(f64::from);
         let attachment = wgpu::RenderPassColorAttachment {
             view: color.as_ref().unwrap_or(target),
             depth_slice: None,
@@ -238,7 +261,7 @@ impl Renderer {
             light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
             // The side of the squares on the ground is a power of ten (m).
             up: camera.up.extend(10.0_f32.powf((radius.log10() - 0.5).round())).to_array(),
-            background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
+            background: Vec3::from_array(self.shades.background).extend(1.0).to_array(),
         };
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
     }
