@@ -124,6 +124,24 @@ impl Live {
         })
     }
 
+    /// The scene as it began.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene as it is now: the world, and the spawners with what is left of them.
+    pub fn scene_now(&self) -> Scene {
+        let (spawners, leaving) = self.spawners.remaining(self.scene.dt);
+        let mut world = self.simulation.world.clone();
+        self.grabbed.iter().for_each(|grabbed| drop(world.remove_joint(grabbed.joint)));
+        Scene { world, spawners, leaving, ..self.scene.clone() }
+    }
+
+    /// Whether a recording runs again.
+    pub fn is_recording(&self) -> bool {
+        self.replay.is_some()
+    }
+
     /// Simulated time (s).
     pub fn time(&self) -> f32 {
         self.steps as f32 * self.scene.dt
@@ -212,13 +230,40 @@ impl Live {
     }
 
     pub fn step(&mut self) -> Result<()> {
-        if let Some(replay) = &mut self.replay {
-            match replay.step(&mut self.simulation)? {
-                Some(stats) => self.note(stats),
-                None => self.paused = true,
+        let stats = match &mut self.replay {
+            Some(replay) => replay.step(&mut self.simulation)?,
+            None => {
+                self.before_step();
+                Some(self.simulation.step(self.scene.dt)?)
             }
-            return Ok(());
+        };
+        self.note(stats);
+        Ok(())
+    }
+
+    /// As [`Self::step`], for a page, which cannot wait for a device.
+    pub async fn step_async(&mut self) -> Result<()> {
+        let stats = match &mut self.replay {
+            Some(replay) => replay.step_async(&mut self.simulation).await?,
+            None => {
+                self.before_step();
+                Some(self.simulation.step_async(self.scene.dt).await?)
+            }
+        };
+        self.note(stats);
+        Ok(())
+    }
+
+    /// Notes a step that was made; a recording without another one stops.
+    fn note(&mut self, stats: Option<StepStats>) {
+        match stats {
+            Some(stats) => self.after_step(stats),
+            None => self.paused = true,
         }
+    }
+
+    /// Lets bodies come and go and pulls the body that was taken, before a step that the caller makes.
+    pub fn before_step(&mut self) {
         let dt = self.scene.dt;
         self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
@@ -232,13 +277,10 @@ impl Live {
             }
             self.simulation.wake(grabbed.body);
         }
-        let stats = self.simulation.step(dt)?;
-        self.note(stats);
-        Ok(())
     }
 
     /// Notes a step that was made.
-    fn note(&mut self, stats: StepStats) {
+    pub fn after_step(&mut self, stats: StepStats) {
         self.stats = stats;
         self.steps += 1;
         for (mean, (_, time)) in self.stage_ms.iter_mut().zip(self.stats.times.stages()) {

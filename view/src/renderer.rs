@@ -15,6 +15,7 @@ use crate::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, p
 use crate::poses::Poses;
 use drystone::{BodyHandle, World};
 
+/// The background of a new renderer.
 const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
 
 #[derive(Clone, Copy)]
@@ -56,6 +57,8 @@ pub struct Renderer {
     lines: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
     quality: Quality,
+    /// The color behind the bodies, into which the ground fades (sRGB, 0 to 1).
+    pub background: [f32; 3],
     /// Textures of the size of the picture: depth, and color with several samples.
     targets: Option<Targets>,
 }
@@ -145,6 +148,7 @@ impl Renderer {
             main_group,
             format,
             quality,
+            background: BACKGROUND,
             targets: None,
         }
     }
@@ -152,10 +156,15 @@ impl Renderer {
     /// Takes over bodies that came or went since the last picture.
     pub fn follow(&mut self, world: &World) {
         if !world.bodies.handles().eq(self.drawn.iter().copied()) {
-            self.meshes = Meshes::new(world);
-            self.drawn = world.bodies.handles().collect();
-            self.vertices = vertex_buffer(&self.device, &self.meshes);
+            self.replace(world);
         }
+    }
+
+    /// Takes over the bodies of another world.
+    pub fn replace(&mut self, world: &World) {
+        self.meshes = Meshes::new(world);
+        self.drawn = world.bodies.handles().collect();
+        self.vertices = vertex_buffer(&self.device, &self.meshes);
     }
 
     /// Draws `shot` into `target` of width and height `size` (pixels).
@@ -196,7 +205,7 @@ impl Renderer {
             });
             draw_bodies(&mut pass, &self.shadow, &self.shadow_group);
         }
-        let [r, g, b] = BACKGROUND.map(f64::from);
+        let [r, g, b] = self.background.map(f64::from);
         let attachment = wgpu::RenderPassColorAttachment {
             view: color.as_ref().unwrap_or(target),
             depth_slice: None,
@@ -214,10 +223,13 @@ impl Renderer {
                 ..Default::default()
             });
             draw_bodies(&mut pass, &self.bodies, &self.main_group);
-            pass.set_pipeline(&self.lines);
-            pass.set_bind_group(0, &self.shadow_group, &[]);
-            pass.set_vertex_buffer(0, ends.slice(..));
-            pass.draw(0..shot.lines.len() as u32, 0..1);
+            // A browser warns of a draw of nothing.
+            if !shot.lines.is_empty() {
+                pass.set_pipeline(&self.lines);
+                pass.set_bind_group(0, &self.shadow_group, &[]);
+                pass.set_vertex_buffer(0, ends.slice(..));
+                pass.draw(0..shot.lines.len() as u32, 0..1);
+            }
         }
         self.queue.submit([encoder.finish()]);
     }
@@ -238,7 +250,7 @@ impl Renderer {
             light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
             // The side of the squares on the ground is a power of ten (m).
             up: camera.up.extend(10.0_f32.powf((radius.log10() - 0.5).round())).to_array(),
-            background: [BACKGROUND[0], BACKGROUND[1], BACKGROUND[2], 1.0],
+            background: Vec3::from_array(self.background).extend(1.0).to_array(),
         };
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
     }
