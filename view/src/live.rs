@@ -133,7 +133,9 @@ impl Live {
     pub fn scene_now(&self) -> Scene {
         let (spawners, leaving) = self.spawners.remaining(self.scene.dt);
         let mut world = self.simulation.world.clone();
-        self.grabbed.iter().for_each(|grabbed| drop(world.remove_joint(grabbed.joint)));
+        if let Some(grabbed) = &self.grabbed {
+            world.remove_joint(grabbed.joint);
+        }
         Scene { world, spawners, leaving, ..self.scene.clone() }
     }
 
