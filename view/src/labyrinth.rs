@@ -74,8 +74,8 @@ impl Labyrinth {
         }
     }
 
-    /// Lets the time pass.
-    fn pass(&mut self, seconds: f32) -> Result<()> {
+    /// Lets the time pass, as [`Show::advance`], and waits for the steps.
+    pub fn pass(&mut self, seconds: f32) -> Result<()> {
         if self.again {
             self.restart()?;
         }

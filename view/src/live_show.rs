@@ -31,7 +31,7 @@ impl Show for Live {
 
     fn camera(&self, aspect: f32) -> Camera {
         let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
-        Camera::framing(&self.bounds, up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
+        Camera::framing(&self.bounds(), up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
     }
 
     fn colors(&mut self) -> Vec<Rgba> {

@@ -29,6 +29,12 @@ impl Shades {
     pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED };
     /// Light bodies before a dark background.
     pub const DARK: Self = Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255] };
+
+    /// A background of the caller with the ground of the light or the dark shades.
+    pub fn before(background: [f32; 3]) -> Self {
+        let is_dark = background.iter().sum::<f32>() < 1.5;
+        Self { background, ..if is_dark { Self::DARK } else { Self::LIGHT } }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -237,10 +243,13 @@ impl Renderer {
                 ..Default::default()
             });
             draw_bodies(&mut pass, &self.bodies, &self.main_group);
-            pass.set_pipeline(&self.lines);
-            pass.set_bind_group(0, &self.shadow_group, &[]);
-            pass.set_vertex_buffer(0, ends.slice(..));
-            pass.draw(0..shot.lines.len() as u32, 0..1);
+            // A browser warns of a draw of nothing.
+            if !shot.lines.is_empty() {
+                pass.set_pipeline(&self.lines);
+                pass.set_bind_group(0, &self.shadow_group, &[]);
+                pass.set_vertex_buffer(0, ends.slice(..));
+                pass.draw(0..shot.lines.len() as u32, 0..1);
+            }
         }
         self.queue.submit([encoder.finish()]);
     }
