@@ -317,12 +317,11 @@ function panel() {
   told();
   if (isMaze) {
     element("board").value = chosen.maze;
-    element("runs-on").textContent = "runs on the CPU";
+    element("runs-on").lastElementChild.textContent = "CPU";
     element("picture").setAttribute("aria-label", `Picture of the maze ${chosen.maze}`);
     return;
   }
-  const backend = { cpu: "the CPU", webgpu: "WebGPU", both: "the CPU and WebGPU" }[chosen.backend];
-  element("runs-on").textContent = `runs on ${backend}`;
+  element("runs-on").lastElementChild.textContent = { cpu: "CPU", webgpu: "WebGPU", both: "CPU and WebGPU" }[chosen.backend];
   element("picture").setAttribute("aria-label", `Picture of ${file ? file.name : chosen.scene}`);
   document.querySelector(`input[name="backend"][value="${chosen.backend}"]`).checked = true;
   element("settings").hidden = shows[0].is_recording();
