@@ -110,7 +110,7 @@ function replace(made, opened, next, nextFile) {
   const world = ({ scene, parameters }) => JSON.stringify([scene, parameters]);
   const isSame = shows.length > 0 && made.length > 0 && nextFile === file && world(next) === world(chosen);
   for (const show of made) if (isSame) show.look_as(shows[0]);
-  if (!isSame) framed = null;
+  if (!isSame || framed !== "by hand") framed = null;
   [...shows, ...(game ? [game] : [])].forEach((old) => old.free());
   [shows, game, chosen, file] = [made, opened, next, nextFile];
   [owed, last, difference, tilts.pressed] = [0, null, null, null];
@@ -146,11 +146,13 @@ async function besides() {
   }
 }
 
-/// Shows all of the scene, unless the view was turned or moved since.
+/// Shows all of the scene and follows its bodies, until the view is turned or moved or a body is touched.
 function whole() {
-  if (framed === "by hand" || framed === aspect()) return;
-  framed = aspect();
-  (game ? [game] : shows).forEach((show) => show.whole(framed));
+  if (framed === "by hand") return;
+  if (framed !== aspect()) {
+    framed = aspect();
+    (game ? [game] : shows).forEach((show) => show.whole(framed));
+  } else if (!paused) shows.forEach((show) => show.follow(framed));
 }
 
 /// Steps as much as time has passed since the last picture, and draws.
@@ -540,6 +542,10 @@ function dropping() {
 }
 
 const both = (call) => tried(() => shows.map(call)[0]);
+const touched = (call) => {
+  framed = "by hand";
+  return both(call);
+};
 const turned = (call) =>
   tried(() => {
     framed = "by hand";
@@ -550,11 +556,11 @@ const act = {
   pan: (by) => turned((show) => show.pan(...by)),
   zoom: (notches) => turned((show) => show.zoom(notches)),
   whole: () => tried(() => (framed = null)),
-  grab: (at) => (game ? Promise.resolve(false) : both((show) => show.grab(...at, aspect()))),
+  grab: (at) => (game ? Promise.resolve(false) : touched((show) => show.grab(...at, aspect()))),
   drag: (at) => both((show) => show.drag(...at, aspect())),
   release: () => both((show) => show.release()),
-  throw: (at) => both((show) => show.throw_cube(...at, aspect())),
-  delete: (at) => both((show) => show.delete_body(...at, aspect())),
+  throw: (at) => touched((show) => show.throw_cube(...at, aspect())),
+  delete: (at) => touched((show) => show.delete_body(...at, aspect())),
   point: (at) => (pointer = at),
   /// Whether arrow keys tilt a board.
   tilts: () => game !== null,
