@@ -1,18 +1,48 @@
-//! The panel of a live scene: measurements, controls and settings.
+//! The panel beside a show: for a scene measurements, controls and settings.
 
-use clap::ValueEnum;
-
-use super::colors::ColorBy;
-use super::live::Live;
 use drystone::backend::BackendChoice;
 use drystone::config::Friction;
+use drystone_maze::{BOARDS, Outcome};
+use drystone_view::{ColorBy, Labyrinth, Live, Order, Show};
 
-pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
-    numbers(live, ui);
-    ui.separator();
-    controls(live, ui);
-    ui.separator();
-    settings(live, ui);
+/// A show with a panel.
+pub trait Panel: Show {
+    fn panel(&mut self, ui: &mut egui::Ui);
+}
+
+impl Panel for Live {
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        numbers(self, ui);
+        ui.separator();
+        controls(self, ui);
+        ui.separator();
+        settings(self, ui);
+        keys(ui);
+    }
+}
+
+impl Panel for Labyrinth {
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.heading(match self.game.outcome {
+            Some(Outcome::Goal) => "won",
+            Some(_) => "lost: R starts again",
+            None if self.begun => "to the green square",
+            None => "arrow keys, or hold the mouse",
+        });
+        ui.monospace(format!("time {:6.2} s", self.game.time()));
+        if let Some(best) = self.best {
+            ui.monospace(format!("best {best:6.2} s"));
+        }
+        let [right, front] = self.game.tilt;
+        ui.monospace(format!("tilt {right:5.1} {front:5.1} degrees"));
+        ui.label("arrows or left mouse: tilt, right mouse: turn the view");
+        ui.label("r again, f whole board, h panel, esc close");
+        let known = BOARDS.map(|b| b.0).join(", ");
+        ui.label(format!("boards: {known}, or a file of your own"));
+    }
+}
+
+fn keys(ui: &mut egui::Ui) {
     ui.collapsing("keys and mouse", |ui| {
         for line in [
             "space pause, n one step, r restart, + - speed",
@@ -60,21 +90,18 @@ fn numbers(live: &mut Live, ui: &mut egui::Ui) {
 }
 
 fn controls(live: &mut Live, ui: &mut egui::Ui) {
-    let mut restart = false;
     ui.horizontal(|ui| {
         ui.toggle_value(&mut live.paused, "pause");
         if ui.button("step").clicked() {
-            live.paused = true;
-            live.refused = live.step().err().map(|e| e.to_string());
+            live.order(Order::Step);
         }
-        restart = ui.button("restart").clicked();
+        if ui.button("restart").clicked() {
+            live.order(Order::Restart);
+        }
     });
-    if restart {
-        live.refused = live.restart().err().map(|e| e.to_string());
-    }
     ui.add(egui::Slider::new(&mut live.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
     let mut color = live.color;
-    choice(ui, "color", ColorBy::value_variants(), &mut color);
+    choice(ui, "color", &ColorBy::ALL, &mut color);
     live.color = color;
     ui.horizontal(|ui| {
         ui.checkbox(&mut live.overlay.contacts, "contacts");
@@ -97,12 +124,12 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
         }
     });
     if config != before {
-        live.set_config(config);
+        live.refused = live.simulation.set_config(config).err().map(|e| e.to_string());
     }
     let mut backend = live.choice;
     choice(ui, "backend", &BackendChoice::ALL, &mut backend);
     if backend != live.choice {
-        live.set_backend(backend);
+        live.refused = live.set_backend(backend).err().map(|e| e.to_string());
     }
     if let Some(refused) = &live.refused {
         ui.colored_label(egui::Color32::from_rgb(200, 40, 40), refused);
@@ -116,12 +143,4 @@ fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str
             ui.selectable_value(value, *option, option.to_string());
         }
     });
-}
-
-impl ColorBy {
-    pub fn next(self) -> Self {
-        let all = Self::value_variants();
-        let at = all.iter().position(|&c| c == self).map_or(0, |i| i + 1);
-        all[at % all.len()]
-    }
 }

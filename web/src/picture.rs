@@ -1,0 +1,77 @@
+//! Pictures on a canvas of the browser.
+
+use drystone::Result;
+use drystone_view::{Camera, Next, Shades, Sight, wgpu};
+use wasm_bindgen::prelude::*;
+use web_sys::HtmlCanvasElement;
+
+use crate::maze::Maze;
+use crate::show::Show;
+use crate::thrown;
+
+/// A canvas that worlds are drawn on.
+#[wasm_bindgen]
+pub struct Picture {
+    sight: Sight,
+    /// What was drawn last ([`next_number`](crate::next_number)).
+    drawn: u32,
+}
+
+impl Picture {
+    async fn on(canvas: HtmlCanvasElement) -> Result<Self> {
+        let size = (canvas.width(), canvas.height());
+        Ok(Self { sight: Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size).await?, drawn: 0 })
+    }
+
+    /// Draws what has the number `number` on a canvas of `size` pixels.
+    fn paint(
+        &mut self,
+        number: u32,
+        show: &mut dyn drystone_view::Show,
+        camera: &Camera,
+        size: (u32, u32),
+        background: [f32; 3],
+    ) {
+        if self.sight.size() != size {
+            self.sight.resize(size);
+        }
+        if std::mem::replace(&mut self.drawn, number) != number {
+            self.sight.renderer.replace(show.world());
+        }
+        self.sight.renderer.shades = Shades::before(background);
+        if let Next::Frame(frame) = self.sight.next() {
+            self.sight.paint(&frame, show, camera);
+            self.sight.present(frame);
+        }
+    }
+}
+
+#[wasm_bindgen]
+impl Picture {
+    /// A picture on a canvas: by WebGPU, else by WebGL.
+    pub async fn open(canvas: HtmlCanvasElement) -> std::result::Result<Picture, JsError> {
+        thrown(Self::on(canvas).await)
+    }
+
+    /// What draws: `WebGPU` or `WebGL`.
+    pub fn api(&self) -> String {
+        if self.sight.api() == wgpu::Backend::BrowserWebGpu { "WebGPU" } else { "WebGL" }.into()
+    }
+
+    /// Whether the device of the picture is lost, so that another picture has to be opened.
+    pub fn is_lost(&self) -> bool {
+        self.sight.is_lost()
+    }
+
+    /// Draws a scene on a canvas of `width` times `height` pixels, before a background of some color (sRGB, 0 to 1).
+    pub fn draw(&mut self, show: &mut Show, width: u32, height: u32, red: f32, green: f32, blue: f32) {
+        let camera = show.camera;
+        self.paint(show.number, &mut show.live, &camera, (width, height), [red, green, blue]);
+    }
+
+    /// Draws a maze likewise.
+    pub fn draw_maze(&mut self, maze: &mut Maze, width: u32, height: u32, red: f32, green: f32, blue: f32) {
+        let camera = maze.camera;
+        self.paint(maze.number, &mut maze.labyrinth, &camera, (width, height), [red, green, blue]);
+    }
+}
