@@ -46,6 +46,8 @@ pub struct Ground {
     pub reach: f32,
     /// The color of half-spaces that are fixed.
     pub color: [u8; 4],
+    /// The color of other fixed bodies.
+    pub fixed: [u8; 4],
 }
 
 struct Part {
@@ -56,8 +58,8 @@ struct Part {
     pattern: u32,
     /// Outward normal of a half-space.
     plane: Option<Vec3>,
-    /// Whether it is a half-space of a fixed body.
-    is_ground: bool,
+    /// Whether the body is fixed.
+    is_fixed: bool,
     /// A collider of a body that is not dynamic; it can hide dynamic bodies.
     screen: Option<Collider>,
 }
@@ -95,8 +97,8 @@ impl Meshes {
                 };
                 let screen = (body.kind != BodyKind::Dynamic && plane.is_none()).then(|| collider.clone());
                 let (position, rotation) = (collider.position, collider.rotation);
-                let is_ground = body.kind == BodyKind::Fixed && plane.is_some();
-                let part = Part { body: i, position, rotation, scale, pattern, plane, is_ground, screen };
+                let is_fixed = body.kind == BodyKind::Fixed;
+                let part = Part { body: i, position, rotation, scale, pattern, plane, is_fixed, screen };
                 // Bodies of one shape often follow each other: the search begins at the end.
                 match known.iter().rposition(|k| k.is_same(shape)) {
                     Some(group) => meshes.groups[group].parts.push(part),
@@ -148,7 +150,8 @@ impl Meshes {
                 position: center.to_array(),
                 color: match part.pattern {
                     SENSOR => SENSOR_COLOR,
-                    _ if part.is_ground => ground.color,
+                    _ if part.is_fixed && part.plane.is_some() => ground.color,
+                    _ if part.is_fixed => ground.fixed,
                     _ => colors[part.body],
                 },
                 rotation: turn.to_array(),

@@ -21,13 +21,16 @@ pub struct Shades {
     pub background: [f32; 3],
     /// The ground: half-spaces that are fixed.
     pub ground: Rgba,
+    /// Other fixed bodies.
+    pub fixed: Rgba,
 }
 
 impl Shades {
     /// Dark bodies before a light background.
-    pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED };
+    pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED, fixed: FIXED };
     /// Light bodies before a dark background.
-    pub const DARK: Self = Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255] };
+    pub const DARK: Self =
+        Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255], fixed: [92, 97, 107, 255] };
 
     /// A background of the caller with the ground of the light or the dark shades.
     pub fn before(background: [f32; 3]) -> Self {
@@ -192,7 +195,8 @@ impl Renderer {
         let container = shot.container.filter(|c| c.low.is_finite() && c.high.is_finite());
         let hidden = |b: &Bounds| container.is_some_and(|c| stands_before(b, &c, eye));
         let (middle, reach) = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
-        let ground = Ground { middle, reach, color: self.shades.ground };
+        let Shades { ground: color, fixed, .. } = self.shades;
+        let ground = Ground { middle, reach, color, fixed };
         let instances = self.meshes.instances(shot.poses, shot.colors, &ground, hidden);
         let (device, queue) = (&self.device, &self.queue);
         let rows = vertex_buffer(device, queue, bytemuck::cast_slice(&instances));

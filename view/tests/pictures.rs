@@ -129,6 +129,16 @@ fn dark_shades_change_the_ground_and_what_is_behind_it_and_no_body() {
     assert!(same > 1000 && darker > 20_000 && same + darker == all, "{same} same, {darker} darker of {all}");
     let is_background = |p: &[u8]| (0..3).all(|k| (f32::from(p[k]) / 255.0 - Shades::DARK.background[k]).abs() < 0.01);
     assert!(is_background(&dark.rgba[..4]), "{:?}", &dark.rgba[..4]);
+    // The mesh and the height field of this scene are fixed, and gray.
+    let drop = self::scene("drop", &[]);
+    let mut canvas = self::canvas(&drop);
+    let mut grays = |shades| {
+        canvas.renderer.shades = shades;
+        let gray = |p: &&[u8]| p[0].abs_diff(p[2]) < 20 && p[0] > 140;
+        drawn_on(&mut canvas, &drop).rgba.chunks_exact(4).filter(gray).count()
+    };
+    let (in_light, in_dark) = (grays(Shades::LIGHT), grays(Shades::DARK));
+    assert!(in_light > 10_000 && in_dark < 100, "{in_light} light gray pixels, {in_dark} before a dark background");
 }
 
 /// A browser without WebGPU gives no more than these.
