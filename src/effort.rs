@@ -28,10 +28,10 @@ pub struct Interface {
     pub b: u32,
     /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
     pub need: f32,
-    /// How deep its surfaces overlap, over the sag that the settings promise; 0 of a joint, and of a contact that class 0 is enough for.
-    pub overlap: f32,
     /// Whether it is a joint, which no other takes load from.
     pub is_joint: bool,
+    /// The row of the contact or joint.
+    pub row: u32,
 }
 
 /// The class of effort of each island, and which islands are heaps.
@@ -180,8 +180,9 @@ impl Effort {
     }
 
     /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` gives the contacts and joints between bodies that are
-    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives. Where no body is
-    /// above class 0 and none has to be, nothing goes over them.
+    /// awake, where a body counts as movable that a pass moves; `overlap` gives how deep the surfaces of the contact of a row overlap, over the
+    /// sag that the settings promise; `is_above` says whether any needs more than class 0 gives. Where no body is above class 0 and none has to
+    /// be, nothing goes over them.
     pub fn follow<I: Iterator<Item = Interface> + Clone>(
         &mut self,
         world: &World,
@@ -189,7 +190,7 @@ impl Effort {
         config: &SolverConfig,
         dt: f32,
         is_above: bool,
-        interfaces: impl FnOnce() -> I,
+        (interfaces, overlap): (impl FnOnce() -> I, impl Fn(u32) -> f32),
     ) -> bool {
         self.highest = Self::highest(config);
         self.judged_from = (JUDGED_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
@@ -223,7 +224,7 @@ impl Effort {
         let is_restless = !self.restless.is_empty();
         let is_squeezed = self.overlapped.iter().any(|&before| before > 0.0);
         let changed = (is_first || self.any_above || is_above || is_squeezed || looks || has_kinds || is_restless)
-            && self.follow_islands(world, asleep, interfaces(), looks);
+            && self.follow_islands(world, asleep, interfaces(), overlap, looks);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
             self.restless.retain(|&body| {
@@ -272,10 +273,10 @@ impl Effort {
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
-            Interface { a, b, need: need as f32, overlap: 0.0, is_joint: false }
+            Interface { a, b, need: need as f32, is_joint: false, row: 0 }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
-        self.follow_islands(world, &[], interfaces.iter().copied(), false);
+        self.follow_islands(world, &[], interfaces.iter().copied(), |_| 0.0, false);
     }
 
     fn follow_islands(
@@ -283,6 +284,7 @@ impl Effort {
         world: &World,
         asleep: &[bool],
         interfaces: impl Iterator<Item = Interface> + Clone,
+        overlap: impl Fn(u32) -> f32,
         looks_for_heaps: bool,
     ) -> bool {
         let bodies = world.bodies.len();
@@ -296,7 +298,7 @@ impl Effort {
         let root = |body: u32| roots[body as usize] as usize;
         self.of_root.clear();
         self.of_root.resize(bodies, Island::NONE);
-        for Interface { a, b, need, overlap, is_joint } in interfaces {
+        for Interface { a, b, need, is_joint, .. } in interfaces.clone() {
             let body = if a == IMMOVABLE { b } else { a };
             if body != IMMOVABLE {
                 let island = &mut self.of_root[root(body)];
@@ -305,7 +307,6 @@ impl Effort {
                     island.has_joints = true;
                 } else {
                     island.needs.add(need);
-                    island.overlap = island.overlap.max(overlap);
                     island.contacts += 1;
                 }
             }
@@ -329,10 +330,24 @@ impl Effort {
             let need = &mut self.of_root[root(body)].whole_need;
             *need = need.max(self.restless_need);
         }
+        let mut any_asks = false;
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
             if looks_for_heaps {
                 island.is_heap = self.has_heaps && island.becomes_heap();
             }
+            any_asks |= island.asks_for_more(self.highest);
+        }
+        // Overlaps of few islands count, and each costs a look at the poses of two bodies.
+        for Interface { a, b, need, is_joint, row } in interfaces.filter(|_| any_asks) {
+            let body = if a == IMMOVABLE { b } else { a };
+            if body != IMMOVABLE && !is_joint && need > 1.0 {
+                let island = &mut self.of_root[root(body)];
+                if island.asks_for_more(self.highest) {
+                    island.overlap = island.overlap.max(overlap(row));
+                }
+            }
+        }
+        for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
             (island.class, island.calm_for, island.overlapped) = island.next(self.highest, self.judged_from);
         }
         let mut changed = false;

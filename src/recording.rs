@@ -133,6 +133,44 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// As [`Simulation::step`], and the recording then has nothing of it; or nothing more can be written.
     pub fn step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
+        let record = self.begin_step(simulation, dt)?;
+        let stats = simulation.step(dt)?;
+        self.end_step(record, simulation)?;
+        Ok(stats)
+    }
+
+    /// As [`Self::step`], for a page ([`Simulation::step_async`]).
+    ///
+    /// ```
+    /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # pollster::block_on(async {
+    /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
+    /// for _ in 0..10 {
+    ///     recorder.step_async(&mut simulation, 0.01).await?;
+    /// }
+    /// let mut replay = Replay::read(&recorder.finish(&mut simulation)?)?;
+    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// while replay.step_async(&mut again).await?.is_some() {}
+    /// assert!(again.hash() == simulation.hash() && replay.first_difference().is_none());
+    /// # Ok::<(), drystone::Error>(())
+    /// # })?;
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Simulation::step_async`], and the recording then has nothing of it; or nothing more can be written.
+    pub async fn step_async(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
+        let record = self.begin_step(simulation, dt)?;
+        let stats = simulation.step_async(dt).await?;
+        self.end_step(record, simulation)?;
+        Ok(stats)
+    }
+
+    /// What the caller changed since the last step.
+    fn begin_step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepRecord> {
         if self.restored != simulation.restored() {
             self.part(JUMP, &simulation.save())?;
             self.follow(simulation);
@@ -141,10 +179,13 @@ impl<W: Write> Recorder<W> {
         let woken = self.asleep.iter().zip(simulation.asleep()).enumerate().filter(|(_, (was, is))| **was && !**is);
         let woken = woken.map(|(i, _)| i as u32).collect();
         let config = (*simulation.config() != self.config).then(|| simulation.config().clone());
-        let stats = simulation.step(dt)?;
+        Ok(StepRecord { dt, change, config, woken, hash: None })
+    }
+
+    /// Writes a step that was made.
+    fn end_step(&mut self, mut record: StepRecord, simulation: &mut Simulation) -> Result<()> {
         self.steps += 1;
-        let hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
-        let mut record = StepRecord { dt, change, config, woken, hash };
+        record.hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
         self.shapes = Writer::behind(std::mem::take(&mut self.shapes));
         record.walk(&mut self.shapes)?;
         let bytes = std::mem::take(&mut self.shapes.bytes);
@@ -153,7 +194,7 @@ impl<W: Write> Recorder<W> {
             self.part(STATE, &simulation.save())?;
         }
         self.follow(simulation);
-        Ok(stats)
+        Ok(())
     }
 
     /// Ends the recording with the hash of the last state.
@@ -161,8 +202,7 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// Nothing more can be written.
     pub fn finish(mut self, simulation: &mut Simulation) -> Result<W> {
-        let (hash, bodies) = hashes(simulation);
-        self.part(END, &[&hash.to_le_bytes()[..], &bodies].concat())?;
+        write_end(&mut self.out, simulation)?;
         self.out.flush().map_err(Error::file("recording"))?;
         Ok(self.out)
     }
@@ -176,15 +216,62 @@ impl<W: Write> Recorder<W> {
     }
 
     fn part(&mut self, kind: u8, bytes: &[u8]) -> Result<()> {
-        self.write(&[kind])?;
-        self.write(&(bytes.len() as u64).to_le_bytes())?;
-        self.write(&crate::saved::hash_of(bytes).to_le_bytes())?;
-        self.write(bytes)
+        write_part(&mut self.out, kind, bytes)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.out.write_all(bytes).map_err(Error::file("recording"))
     }
+}
+
+impl Recorder<Vec<u8>> {
+    /// The bytes that were written so far. The end is missing.
+    pub fn so_far(&self) -> &[u8] {
+        &self.out
+    }
+
+    /// The recording up to now with its end, while the recorder goes on.
+    ///
+    /// ```
+    /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
+    /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
+    /// let (half, hash) = (recorder.ended(&simulation)?, simulation.hash());
+    /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
+    /// assert!(recorder.so_far().len() > half.len());
+    /// let mut replay = Replay::read(&half)?;
+    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// replay.seek(&mut again, 9)?;
+    /// assert_eq!((replay.len(), again.hash(), replay.first_difference()), (5, hash, None));
+    /// assert_eq!(Replay::read(&recorder.finish(&mut simulation)?)?.len(), 10);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Recorder::finish`]; memory takes all that is written.
+    pub fn ended(&self, simulation: &Simulation) -> Result<Vec<u8>> {
+        let mut all = self.out.clone();
+        write_end(&mut all, simulation)?;
+        Ok(all)
+    }
+}
+
+fn write_part(out: &mut impl Write, kind: u8, bytes: &[u8]) -> Result<()> {
+    let (length, hash) = ((bytes.len() as u64).to_le_bytes(), crate::saved::hash_of(bytes).to_le_bytes());
+    let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(Error::file("recording"));
+    write(&[kind])?;
+    write(&length)?;
+    write(&hash)?;
+    write(bytes)
+}
+
+/// Ends a recording with the hash of the last state.
+fn write_end(out: &mut impl Write, simulation: &Simulation) -> Result<()> {
+    let (hash, bodies) = hashes(simulation);
+    write_part(out, END, &[&hash.to_le_bytes()[..], &bodies].concat())
 }
 
 /// The hash of all bodies, and a byte for each: the lowest of its own hash.
@@ -383,6 +470,25 @@ impl Replay {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn step(&mut self, simulation: &mut Simulation) -> Result<Option<StepStats>> {
+        let Some(dt) = self.begin_step(simulation)? else { return Ok(None) };
+        let stats = simulation.step(dt)?;
+        self.end_step(simulation);
+        Ok(Some(stats))
+    }
+
+    /// As [`Self::step`], for a page ([`Simulation::step_async`]). [`Recorder::step_async`] has an example.
+    ///
+    /// # Errors
+    /// As [`Simulation::step_async`].
+    pub async fn step_async(&mut self, simulation: &mut Simulation) -> Result<Option<StepStats>> {
+        let Some(dt) = self.begin_step(simulation)? else { return Ok(None) };
+        let stats = simulation.step_async(dt).await?;
+        self.end_step(simulation);
+        Ok(Some(stats))
+    }
+
+    /// Makes the changes of the caller before the next step, and gives its length (s); none at the end.
+    fn begin_step(&mut self, simulation: &mut Simulation) -> Result<Option<f32>> {
         if self.step == self.len() {
             return Ok(None);
         }
@@ -395,7 +501,12 @@ impl Replay {
             simulation.set_config(config.clone())?;
         }
         record.woken.iter().for_each(|&body| simulation.wake(body as usize));
-        let stats = simulation.step(record.dt)?;
+        Ok(Some(record.dt))
+    }
+
+    /// Compares the bodies after a step that was made.
+    fn end_step(&mut self, simulation: &Simulation) {
+        let record = &self.steps[self.step as usize];
         self.step += 1;
         if let Some((hash, bodies)) = &record.hash {
             if *hash == simulation.hash() {
@@ -409,7 +520,6 @@ impl Replay {
                     Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });
             }
         }
-        Ok(Some(stats))
     }
 
     /// Goes to the state after so many steps, or to the end: from the nearest state that the recording kept before it.

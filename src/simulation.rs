@@ -17,8 +17,9 @@ use crate::error::{Error, Result};
 use crate::metrics::Penetration;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
+use crate::problem::carry::Carry;
 use crate::queries::Queries;
-use crate::stats::{StepStats, timed};
+use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
 use crate::world::{BodyHandle, World};
@@ -107,6 +108,8 @@ pub struct Simulation {
     unfinished: Option<Box<Unfinished>>,
     /// How often the simulation went back to a snapshot.
     restored: u64,
+    /// Whether the future of a step is pending, or was dropped before its end.
+    is_pending: bool,
 }
 
 impl Simulation {
@@ -126,6 +129,7 @@ impl Simulation {
             on_device: false,
             unfinished: None,
             restored: 0,
+            is_pending: false,
         })
     }
 
@@ -138,6 +142,32 @@ impl Simulation {
         let mut stats = StepStats::default();
         if self.begin_step(dt, &mut stats)? {
             self.end_step(dt, &mut stats)?;
+        }
+        Ok(stats)
+    }
+
+    /// As [`Self::step`], for a page: other tasks go on while a device works. On the CPU the step ends before the first wait.
+    ///
+    /// ```
+    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// pollster::block_on(simulation.step_async(0.01))?;
+    /// assert!(simulation.world.bodies[ball].linear_velocity.y < -0.09);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::step`]; and of each step after one whose future was dropped before its end, until the simulation goes back to a snapshot.
+    pub async fn step_async(&mut self, dt: f32) -> Result<StepStats> {
+        let mut stats = StepStats::default();
+        if self.begin_step(dt, &mut stats)? {
+            self.is_pending = true;
+            let ended = self.end_step_async(dt, &mut stats).await;
+            self.is_pending = false;
+            ended?;
         }
         Ok(stats)
     }
@@ -253,6 +283,9 @@ impl Simulation {
     fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         self.stages.events.all.clear();
         check_step_length(dt)?;
+        if self.is_pending {
+            return Err(Error::input("a step was dropped before its end: go back to a snapshot"));
+        }
         if let Some(unfinished) = self.unfinished.take()
             && unfinished.dt == dt
             && unfinished.state == self.world_and_settings()
@@ -277,14 +310,35 @@ impl Simulation {
 
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
-        let stages = &mut self.stages;
-        let (carry, passes) = (&stages.contacts.carry, &stages.plan.passes);
-        let step = CheckedStep::built(&mut stages.problem, passes);
-        let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
-        if let Err(error) = ran {
-            self.on_device = false;
-            return self.repeat_step(error, dt, stats);
+        loop {
+            let (step, carry) = assembled(&mut self.stages);
+            let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
+            let Err(error) = ran else { break };
+            let successor = if is_lost(&error) { self.backend.successor() } else { None };
+            self.repeat_step(error, successor, dt, stats)?;
         }
+        self.store_step(dt, stats);
+        Ok(())
+    }
+
+    /// The same, while other tasks go on.
+    async fn end_step_async(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
+        loop {
+            let (step, carry) = assembled(&mut self.stages);
+            let start = Stopwatch::start();
+            let ran = self.backend.step_async(step, carry).await;
+            stats.times.run += start.elapsed();
+            let Err(error) = ran else { break };
+            let successor = if is_lost(&error) { self.backend.successor_async().await } else { None };
+            self.repeat_step(error, successor, dt, stats)?;
+        }
+        self.store_step(dt, stats);
+        Ok(())
+    }
+
+    /// Stores what ran.
+    fn store_step(&mut self, dt: f32, stats: &mut StepStats) {
+        let stages = &mut self.stages;
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
@@ -293,14 +347,18 @@ impl Simulation {
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
         stats.first_non_finite = self.world.first_non_finite();
-        Ok(())
     }
 
-    /// Lets another backend repeat a step whose device was lost. Other errors leave the step to the caller.
-    fn repeat_step(&mut self, error: Error, dt: f32, stats: &mut StepStats) -> Result<()> {
+    /// Lets another backend repeat a step whose device was lost. Without one the step is left to the caller.
+    fn repeat_step(
+        &mut self,
+        error: Error,
+        successor: Option<Box<dyn Backend>>,
+        dt: f32,
+        stats: &mut StepStats,
+    ) -> Result<()> {
+        self.on_device = false;
         self.stages.contacts.carry.on_device = false;
-        let is_lost = matches!(error, Error::Lost(_));
-        let successor = if is_lost { self.backend.successor() } else { None };
         let Some(successor) = successor else {
             let state = self.world_and_settings();
             self.unfinished = Some(Box::new(Unfinished { dt, state, stats: stats.clone() }));
@@ -310,7 +368,7 @@ impl Simulation {
         let (name, adapter) = (successor.name(), successor.adapter());
         stats.fault = Some(format!("{before}{error}; {name} ({adapter}) repeats the step and goes on"));
         self.backend = successor;
-        self.end_step(dt, stats)
+        Ok(())
     }
 
     /// The next step of `dt` seconds as values, the problem and its plan. The call changes nothing of the run.
@@ -480,4 +538,13 @@ impl Simulation {
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
+}
+
+/// What is assembled, for a backend.
+fn assembled(stages: &mut Stages) -> (CheckedStep<'_>, &Carry) {
+    (CheckedStep::built(&mut stages.problem, &stages.plan.passes), &stages.contacts.carry)
+}
+
+fn is_lost(error: &Error) -> bool {
+    matches!(error, Error::Lost(_))
 }

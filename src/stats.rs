@@ -3,6 +3,8 @@
 use std::time::Duration;
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
 use std::time::Instant;
+#[cfg(all(target_family = "wasm", target_os = "unknown", feature = "gpu"))]
+use web_time::Instant;
 
 /// Times and counts of one step.
 ///
@@ -196,26 +198,35 @@ impl StageTimes {
     }
 }
 
-/// Takes the time since it was started. A browser's WebAssembly has no clock of its own: no time passes there.
+/// Takes the time since it was started.
 #[derive(Clone, Copy)]
 pub(crate) struct Stopwatch {
-    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
     start: Instant,
+}
+
+/// WebAssembly has no clock of its own, and the clock of a page comes with the feature `gpu`. Without the feature no time passes.
+#[cfg(all(target_family = "wasm", target_os = "unknown", not(feature = "gpu")))]
+#[derive(Clone, Copy)]
+struct Instant;
+
+#[cfg(all(target_family = "wasm", target_os = "unknown", not(feature = "gpu")))]
+impl Instant {
+    fn now() -> Self {
+        Self
+    }
+
+    fn elapsed(&self) -> Duration {
+        Duration::ZERO
+    }
 }
 
 impl Stopwatch {
     pub fn start() -> Self {
-        Self {
-            #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-            start: Instant::now(),
-        }
+        Self { start: Instant::now() }
     }
 
     pub fn elapsed(&self) -> Duration {
-        #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-        return self.start.elapsed();
-        #[cfg(all(target_family = "wasm", target_os = "unknown"))]
-        Duration::ZERO
+        self.start.elapsed()
     }
 }
 

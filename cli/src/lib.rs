@@ -1,11 +1,10 @@
-//! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and a game.
+//! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and the window of a game.
 
 #![deny(unsafe_code)]
 
 pub mod commands;
 pub mod files;
 pub mod hard;
-pub mod maze;
 pub mod report;
 pub mod settings;
 pub mod soak;

@@ -9,9 +9,9 @@ use drystone::residuals::Residuals;
 use drystone::scenes::{CATALOGUE, SceneFile};
 use drystone::solver::{Order, Solver};
 use drystone::{ContactProblem, Cpu, Scene, Simulation, SolverConfig};
-use drystone_cli::maze::{Map, Script};
 use drystone_cli::report::bench::{self, Bench};
 use drystone_cli::report::comparison::{self, Extent, Origin, Report, Survey};
+use drystone_maze::{Map, Script};
 
 use crate::good;
 
@@ -145,7 +145,7 @@ pub fn board(data: &[u8]) {
 }
 
 pub fn boards() -> Vec<Vec<u8>> {
-    drystone_cli::maze::BOARDS.iter().map(|(_, text)| text.as_bytes().to_vec()).collect()
+    drystone_maze::BOARDS.iter().map(|(_, text)| text.as_bytes().to_vec()).collect()
 }
 
 pub fn script(data: &[u8]) {

@@ -10,11 +10,16 @@ pub mod gpu;
 pub(crate) use checked::CheckedStep;
 pub use choose::{BackendChoice, BackendKind, choose};
 
+use std::pin::Pin;
+
 use crate::error::Result;
 use crate::plan::Pass;
 use crate::problem::StepProblem;
 use crate::problem::carry::Carry;
 use crate::stats::{KernelTime, Traffic};
+
+/// Work of a device that goes on while its future is awaited. A run whose future is dropped before its end leaves the problem as it was.
+pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
 /// Something that can run the passes of a plan.
 ///
@@ -66,6 +71,16 @@ pub trait Backend: Send {
         self.run_checked(step)
     }
 
+    /// As [`Self::run_checked`], for a page: a backend with a device of its own lets other tasks go on while the device works.
+    fn run_async<'a>(&'a mut self, step: CheckedStep<'a>) -> Running<'a> {
+        Box::pin(std::future::ready(self.run_checked(step)))
+    }
+
+    /// As [`Self::step`], likewise.
+    fn step_async<'a>(&'a mut self, step: CheckedStep<'a>, carry: &'a Carry) -> Running<'a> {
+        Box::pin(std::future::ready(self.step(step, carry)))
+    }
+
     /// Whether the rows of the last step are on a device, so that the next step can go on from them.
     fn keeps_rows(&self) -> bool {
         false
@@ -74,6 +89,11 @@ pub trait Backend: Send {
     /// The backend that goes on after this one lost its device ([`Error::Lost`](crate::Error::Lost)); none if there is no such backend.
     fn successor(&mut self) -> Option<Box<dyn Backend>> {
         None
+    }
+
+    /// As [`Self::successor`], for a page.
+    fn successor_async(&mut self) -> Running<'_, Option<Box<dyn Backend>>> {
+        Box::pin(std::future::ready(self.successor()))
     }
 
     /// The bytes that the last step moved to a device and back.

@@ -7,9 +7,9 @@ use glam::Vec3;
 use super::difference::{differing, largest as largest_difference};
 use super::scenes::Warm;
 use super::{Ended, Group, Outcome, PLAIN_PASS, PLAIN_STEP, Run, failed};
-use crate::backend::Backend;
 use crate::backend::cpu::{Cpu, Reference};
 use crate::backend::gpu::{Gpu, GpuOptions, Loss};
+use crate::backend::{Backend, CheckedStep};
 use crate::compare::BodyDifference;
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass};
@@ -24,13 +24,13 @@ const LONGEST: Duration = Duration::from_millis(500);
 /// Steps that a pile of 27 boxes falls until its boxes touch.
 const LANDED: u32 = 60;
 
-fn open(options: GpuOptions) -> Result<Box<dyn Backend>> {
-    Ok(Box::new(Gpu::open(options)?))
+async fn open(options: GpuOptions) -> Result<Box<dyn Backend>> {
+    Ok(Box::new(Gpu::open_async(options).await?))
 }
 
 /// A pile that lies, small enough for one dispatch. Its boxes get velocities, so that contacts have more to do than to hold.
-fn pile() -> Result<Warm> {
-    let mut warm = Warm::of("pile", &["n=27"], LANDED)?;
+async fn pile() -> Result<Warm> {
+    let mut warm = Warm::of("pile", &["n=27"], LANDED).await?;
     let mut random = SplitMix64::new(3);
     for body in warm.simulation.world.bodies.iter_mut().filter(|body| body.kind == BodyKind::Dynamic) {
         body.linear_velocity += Vec3::from_array([(); 3].map(|()| random.symmetric() as f32));
@@ -38,21 +38,23 @@ fn pile() -> Result<Warm> {
     Ok(warm)
 }
 
-pub(super) fn check_limits(run: &mut Run) {
-    run.check(Group::Limits, "large buffers", large_buffers);
-    run.check(Group::Limits, "a buffer beyond the limit is refused", |run| {
+pub(super) async fn check_limits(run: &mut Run<'_>) {
+    run.check(Group::Limits, "large buffers", large_buffers).await;
+    run.check(Group::Limits, "a buffer beyond the limit is refused", async |run| {
         let options = GpuOptions { buffer_limit: 4096, ..run.gpu_options() };
-        refused(run, options)
-    });
-    run.check(Group::Limits, "memory that is not there is refused", |run| {
+        refused(run, options).await
+    })
+    .await;
+    run.check(Group::Limits, "memory that is not there is refused", async |run| {
         let options = GpuOptions { memory: 10_000, ..run.gpu_options() };
-        refused(run, options)
-    });
+        refused(run, options).await
+    })
+    .await;
 }
 
 /// As many bodies as fit into a large buffer move for a step.
-fn large_buffers(run: &mut Run) -> Outcome {
-    let gpu = Gpu::open(run.gpu_options())?;
+async fn large_buffers(run: &mut Run<'_>) -> Outcome {
+    let gpu = Gpu::open_async(run.gpu_options()).await?;
     let most = gpu.summary().buffer_limit.min(if run.options.short { 16 << 20 } else { 128 << 20 });
     let count = (most as usize / size_of::<MassRow>().max(size_of::<BodyRow>())).min(1 << 21);
     let mut random = SplitMix64::new(7);
@@ -72,7 +74,7 @@ fn large_buffers(run: &mut Run) -> Outcome {
     let mut results = [problem.clone(), problem];
     Reference::<f32>::new().run(&mut results[0], &passes)?;
     let mut gpu: Box<dyn Backend> = Box::new(gpu);
-    gpu.run(&mut results[1], &passes)?;
+    gpu.run_async(CheckedStep::new(&mut results[1], &passes)?).await?;
     let [ours, theirs] = &results;
     let (count_of_numbers, apart) = (differing(ours, theirs), largest_difference(ours, theirs));
     let mib = (count * size_of::<BodyRow>()) >> 20;
@@ -83,35 +85,40 @@ fn large_buffers(run: &mut Run) -> Outcome {
 }
 
 /// A step that the device of these options refuses in one line, and that the processor does instead.
-fn refused(run: &mut Run, options: GpuOptions) -> Outcome {
-    let mut warm = pile()?;
-    let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options)?));
-    let line = match theirs.step() {
+async fn refused(run: &mut Run<'_>, options: GpuOptions) -> Outcome {
+    let mut warm = pile().await?;
+    let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options).await?));
+    let line = match theirs.step().await {
         Err(Error::TooLarge(line)) => line,
         Err(error) => return failed!("{error}"),
         Ok(_) => return failed!("it was not refused"),
     };
     theirs.simulation.set_backend(Box::new(Cpu::new()));
-    ours.step()?;
-    theirs.step()?;
+    ours.step().await?;
+    theirs.step().await?;
     same_worlds(&ours, &theirs)?;
     // The device has room for the same step without these limits.
-    let mut again = warm.fork(open(run.gpu_options())?);
-    again.step()?;
+    let mut again = warm.fork(open(run.gpu_options()).await?);
+    again.step().await?;
     near(run, &ours, &again)?;
     Ok(line)
 }
 
-pub(super) fn check_long_plans(run: &mut Run) {
-    run.check(Group::LongDispatch, "a plan in several submissions", |run| {
-        let mut warm = pile()?;
+pub(super) async fn check_long_plans(run: &mut Run<'_>) {
+    run.check(Group::LongDispatch, "a plan in several submissions", async |run| {
+        let mut warm = pile().await?;
         let options = GpuOptions { submission: Duration::from_micros(50), ..run.gpu_options() };
-        let [mut ours, mut whole, mut cut] =
-            [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, open(run.gpu_options())?, open(options)?]
-                .map(|backend| warm.fork(backend));
+        let [mut ours, mut whole, mut cut] = [
+            Box::new(Reference::<f32>::new()) as Box<dyn Backend>,
+            open(run.gpu_options()).await?,
+            open(options).await?,
+        ]
+        .map(|backend| warm.fork(backend));
         let mut submissions = 0;
         for _ in 0..4 {
-            [&mut ours, &mut whole, &mut cut].into_iter().try_for_each(|warm| warm.step().map(drop))?;
+            for warm in [&mut ours, &mut whole, &mut cut] {
+                warm.step().await?;
+            }
             submissions = submissions.max(cut.simulation.backend().traffic().submissions);
             same_worlds(&whole, &cut)?;
         }
@@ -125,15 +132,16 @@ pub(super) fn check_long_plans(run: &mut Run) {
         } else {
             failed!("it was not cut")
         }
-    });
-    run.check(Group::LongDispatch, "no submission takes half a second", |run| {
-        let mut warm = Warm::of("pile", &["n=125"], LANDED)?;
+    })
+    .await;
+    run.check(Group::LongDispatch, "no submission takes half a second", async |run| {
+        let mut warm = Warm::of("pile", &["n=125"], LANDED).await?;
         let mut config = warm.simulation.config().clone();
         (config.substeps, config.fuse_colors_below) = (if run.options.short { 60 } else { 400 }, 0);
         warm.simulation.set_config(config)?;
-        let (mut ours, mut theirs) = (warm.fork(Box::new(Cpu::new())), warm.fork(open(run.gpu_options())?));
-        ours.step()?;
-        theirs.step()?;
+        let (mut ours, mut theirs) = (warm.fork(Box::new(Cpu::new())), warm.fork(open(run.gpu_options()).await?));
+        ours.step().await?;
+        theirs.step().await?;
         if run.is_exact() {
             same_worlds(&ours, &theirs)?;
         }
@@ -143,19 +151,20 @@ pub(super) fn check_long_plans(run: &mut Run) {
             if traffic.longest_submission < LONGEST {
                 break;
             }
-            theirs.step()?;
+            theirs.step().await?;
             traffic = theirs.simulation.backend().traffic();
         }
         let (submissions, longest, dispatches) = (traffic.submissions, traffic.longest_submission, traffic.dispatches);
         let figure = format!("{dispatches} dispatches in {submissions} submissions, the longest {longest:.1?}");
         if longest < LONGEST { Ok(figure) } else { failed!("{figure}") }
-    });
+    })
+    .await;
 }
 
 /// Submissions, and whether the device is lost during each or after it.
 type Losses = &'static [(u32, bool)];
 
-pub(super) fn check_losses(run: &mut Run) {
+pub(super) async fn check_losses(run: &mut Run<'_>) {
     // The name of the check, the submission and the moment of each loss, and the backend that goes on.
     let cases: [(&str, Losses, &str); 3] = [
         ("a device lost between two steps", &[(1, false)], "gpu"),
@@ -163,15 +172,16 @@ pub(super) fn check_losses(run: &mut Run) {
         ("the processor goes on after three devices", &[(1, true), (1, false), (1, true)], "cpu"),
     ];
     for (name, losses, goes_on) in cases {
-        run.check(Group::DeviceLost, name, |run| {
+        run.check(Group::DeviceLost, name, async |run| {
             let mut options = run.gpu_options();
             options.faults.losses = losses.iter().map(|&(submission, during)| Loss { submission, during }).collect();
-            let mut warm = pile()?;
-            let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options)?));
+            let mut warm = pile().await?;
+            let (mut ours, mut theirs) =
+                (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options).await?));
             let mut lines = Vec::new();
             for _ in 0..4 {
-                ours.step()?;
-                lines.extend(theirs.step()?);
+                ours.step().await?;
+                lines.extend(theirs.step().await?);
                 if run.is_exact() {
                     same_worlds(&ours, &theirs)?;
                 } else {
@@ -185,7 +195,8 @@ pub(super) fn check_losses(run: &mut Run) {
                 }
                 (Some(line), _) => Ok(line.clone()),
             }
-        });
+        })
+        .await;
     }
 }
 

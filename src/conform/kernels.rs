@@ -3,8 +3,8 @@
 use super::difference::{differing, largest};
 use super::passes::{every_kernel, has_patches, ways_to_run};
 use super::{Group, Outcome, PLAIN_PASS, Run, failed, random};
-use crate::backend::Backend;
 use crate::backend::cpu::Reference;
+use crate::backend::{Backend, CheckedStep};
 use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
@@ -14,7 +14,7 @@ const FEW: usize = 3;
 /// Scales of problems whose numbers, or their squares, are subnormal.
 const TINY: [f32; 3] = [1e-20, 1e-22, 1e-40];
 
-pub(super) fn check(run: &mut Run) {
+pub(super) async fn check(run: &mut Run<'_>) {
     let all = every_kernel();
     let mut names: Vec<&str> = Vec::new();
     for kernel in &all {
@@ -26,7 +26,7 @@ pub(super) fn check(run: &mut Run) {
     let problems: Vec<_> = seeds.flat_map(|seed| [random::problem(seed, false), random::problem(seed, true)]).collect();
     for name in names {
         let own: Vec<_> = all.iter().filter(|kernel| kernel.name() == name).copied().collect();
-        run.check(Group::Kernels, name, |run| of_kernel(run, &some(run, own), &problems));
+        run.check(Group::Kernels, name, async |run| of_kernel(run, &some(run, own), &problems).await).await;
     }
     if run.is_exact() {
         let tiny: Vec<_> = [false, true]
@@ -36,7 +36,7 @@ pub(super) fn check(run: &mut Run) {
         // Variants differ in what they do, and hardly in the numbers.
         let few = |name: &&str| all.iter().find(|kernel| kernel.name() == *name).copied();
         let few: Vec<_> = ["solve_contacts", "solve_joints", "integrate_positions"].iter().filter_map(few).collect();
-        run.check(Group::Kernels, "subnormal numbers", |run| of_kernel(run, &few, &tiny));
+        run.check(Group::Kernels, "subnormal numbers", async |run| of_kernel(run, &few, &tiny).await).await;
     }
 }
 
@@ -47,15 +47,14 @@ fn some(run: &Run, all: Vec<Kernel>) -> Vec<Kernel> {
 }
 
 /// Runs variants of a kernel on the device and on the reference, on those of the problems that have what each needs.
-fn of_kernel(run: &mut Run, kernels: &[Kernel], problems: &[StepProblem]) -> Outcome {
-    let mut gpu = run.take_gpu()?;
+async fn of_kernel(run: &mut Run<'_>, kernels: &[Kernel], problems: &[StepProblem]) -> Outcome {
+    let mut gpu = run.take_gpu().await?;
     let (mut worst, mut count) = (0.0_f64, 0);
     for &kernel in kernels {
         for problem in problems.iter().filter(|problem| problem.has_patches() == has_patches(kernel)) {
             for passes in ways_to_run(kernel, problem) {
-                let [ours, theirs] =
-                    [after(&mut Reference::<f32>::new(), problem, &passes), after(&mut *gpu, problem, &passes)];
-                let (ours, theirs) = (ours?, theirs?);
+                let ours = after(&mut Reference::<f32>::new(), problem, &passes).await?;
+                let theirs = after(&mut *gpu, problem, &passes).await?;
                 let (count_of_numbers, apart) = (differing(&ours, &theirs), largest(&ours, &theirs));
                 worst = worst.max(apart);
                 count += 1;
@@ -78,8 +77,8 @@ fn of_kernel(run: &mut Run, kernels: &[Kernel], problems: &[StepProblem]) -> Out
     })
 }
 
-fn after(backend: &mut dyn Backend, problem: &StepProblem, passes: &[Pass]) -> crate::error::Result<StepProblem> {
+async fn after(backend: &mut dyn Backend, problem: &StepProblem, passes: &[Pass]) -> crate::error::Result<StepProblem> {
     let mut result = problem.clone();
-    backend.run(&mut result, passes)?;
+    backend.run_async(CheckedStep::new(&mut result, passes)?).await?;
     Ok(result)
 }

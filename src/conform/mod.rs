@@ -18,12 +18,14 @@ pub(crate) mod random;
 mod scenes;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::pin::pin;
+use std::task::Poll;
 
 use crate::backend::Backend;
-use crate::backend::gpu::{AdapterSummary, Gpu, GpuOptions};
+use crate::backend::gpu::{AdapterSummary, Gpu, GpuOptions, block_on};
 use crate::error::{Error, Result};
 use crate::names::named;
+use crate::stats::Stopwatch;
 
 /// Largest difference of a number after one kernel of plain WGSL, relative to 1 plus its size ([`difference::largest`]). Measured over
 /// 24 seeds on software Vulkan: 3.9e-6, a sweep of joints; five times that. An impulse of 0.1 that is one percent off: 9e-4.
@@ -145,8 +147,25 @@ impl Conformance {
 /// # Errors
 /// There is no such adapter, or it cannot be opened; or exact mode alone is asked of an adapter without it.
 pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
+    block_on(conform_async(options, each))
+}
+
+/// As [`conform`], for a page: other tasks go on while the device works.
+///
+/// ```no_run
+/// use drystone::conform::{Conformance, ConformOptions, conform_async};
+///
+/// # async fn page() -> drystone::Result<()> {
+/// let found: Conformance = conform_async(&ConformOptions::default(), &mut |check| println!("{}", check.figure)).await?;
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// As of [`conform`].
+pub async fn conform_async(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
     let only_exact = options.modes == [Mode::Exact];
-    let opened = Gpu::open(GpuOptions { exact: only_exact, ..options.gpu.clone() })?;
+    let opened = Gpu::open_async(GpuOptions { exact: only_exact, ..options.gpu.clone() }).await?;
     let adapter = opened.summary().clone();
     drop(opened);
     let mut run = Run { options, mode: Mode::Plain, gpu: None, checks: Vec::new(), each };
@@ -155,15 +174,16 @@ pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result
         run.gpu = None;
         for &group in &options.groups {
             if mode == Mode::Exact && !adapter.exact {
-                run.check(group, "exact mode", |_| Err(Ended::Skipped("the adapter takes no SPIR-V".into())));
+                let skipped = || Ended::Skipped("the adapter takes no SPIR-V".into());
+                run.check(group, "exact mode", async |_| Err(skipped())).await;
                 continue;
             }
             match group {
-                Group::Kernels => kernels::check(&mut run),
-                Group::Scenes => scenes::check(&mut run),
-                Group::Limits => device::check_limits(&mut run),
-                Group::LongDispatch => device::check_long_plans(&mut run),
-                Group::DeviceLost => device::check_losses(&mut run),
+                Group::Kernels => kernels::check(&mut run).await,
+                Group::Scenes => scenes::check(&mut run).await,
+                Group::Limits => device::check_limits(&mut run).await,
+                Group::LongDispatch => device::check_long_plans(&mut run).await,
+                Group::DeviceLost => device::check_losses(&mut run).await,
             }
         }
     }
@@ -208,6 +228,16 @@ macro_rules! failed {
 }
 use failed;
 
+/// What a future gives, or its panic.
+async fn caught<T>(future: impl Future<Output = T>) -> std::thread::Result<T> {
+    let mut future = pin!(future);
+    std::future::poll_fn(|context| match catch_unwind(AssertUnwindSafe(|| future.as_mut().poll(context))) {
+        Ok(polled) => polled.map(Ok),
+        Err(panic) => Poll::Ready(Err(panic)),
+    })
+    .await
+}
+
 /// The checks that ran so far, and the device of the present mode.
 struct Run<'a> {
     options: &'a ConformOptions,
@@ -229,10 +259,10 @@ impl Run<'_> {
     }
 
     /// The device of the present mode. A check gives it back by [`Run::give_back`].
-    fn take_gpu(&mut self) -> Result<Box<dyn Backend>> {
+    async fn take_gpu(&mut self) -> Result<Box<dyn Backend>> {
         match self.gpu.take() {
             Some(gpu) => Ok(gpu),
-            None => Ok(Box::new(Gpu::open(self.gpu_options())?)),
+            None => Ok(Box::new(Gpu::open_async(self.gpu_options()).await?)),
         }
     }
 
@@ -241,13 +271,13 @@ impl Run<'_> {
     }
 
     /// Runs a check and notes its verdict. A panic of a driver's layer is a check that failed.
-    fn check(&mut self, group: Group, name: &str, body: impl FnOnce(&mut Self) -> Outcome) {
+    async fn check(&mut self, group: Group, name: &str, body: impl AsyncFnOnce(&mut Self) -> Outcome) {
         let names = &self.options.names;
         if !(names.is_empty() || names.iter().any(|part| name.contains(part.as_str()))) {
             return;
         }
-        let start = Instant::now();
-        let outcome = catch_unwind(AssertUnwindSafe(|| body(self)));
+        let start = Stopwatch::start();
+        let outcome = caught(body(self)).await;
         let (verdict, figure) = match outcome {
             Ok(Ok(figure)) => (Verdict::Passed, figure),
             Ok(Err(Ended::Failed(why))) => (Verdict::Failed, why),

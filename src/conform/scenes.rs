@@ -2,8 +2,8 @@
 
 use super::difference::of_velocities;
 use super::{Group, Outcome, Run, failed};
-use crate::backend::Backend;
 use crate::backend::cpu::{Cpu, Reference};
+use crate::backend::{Backend, CheckedStep};
 use crate::compare::BodyDifference;
 use crate::config::SolverConfig;
 use crate::error::Result;
@@ -43,14 +43,16 @@ pub(super) struct Warm {
 
 impl Warm {
     /// Runs a scene for so many steps.
-    pub fn of(name: &str, parameters: &[&str], steps: u32) -> Result<Self> {
+    pub async fn of(name: &str, parameters: &[&str], steps: u32) -> Result<Self> {
         let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
         let scene = Scene::find(name, &parameters)?;
         let config = SolverConfig::default().without_sleep();
         let spawners = Spawners::new(&scene);
         let mut warm =
             Self { dt: scene.dt, simulation: Simulation::new(scene.world, config, Box::new(Cpu::new()))?, spawners };
-        (0..steps).try_for_each(|_| warm.step().map(drop))?;
+        for _ in 0..steps {
+            warm.step().await?;
+        }
         Ok(warm)
     }
 
@@ -60,9 +62,9 @@ impl Warm {
     }
 
     /// One step; returns the line of a device that was lost.
-    pub fn step(&mut self) -> Result<Option<String>> {
+    pub async fn step(&mut self) -> Result<Option<String>> {
         self.spawners.before_step(&mut self.simulation.world, self.dt);
-        Ok(self.simulation.step(self.dt)?.fault)
+        Ok(self.simulation.step_async(self.dt).await?.fault)
     }
 
     /// Takes the backend back.
@@ -71,25 +73,26 @@ impl Warm {
     }
 }
 
-pub(super) fn check(run: &mut Run) {
+pub(super) async fn check(run: &mut Run<'_>) {
     for entry in CATALOGUE {
         let parameters = SMALL.iter().find(|(name, _)| *name == entry.name).map_or(&[][..], |(_, own)| own);
-        run.check(Group::Scenes, entry.name, |run| {
+        run.check(Group::Scenes, entry.name, async |run| {
             let steps = if run.options.short { 45 } else { 60 };
-            let warm = Warm::of(entry.name, parameters, steps)?;
-            if run.is_exact() { of_steps(run, warm) } else { of_single_steps(run, warm) }
-        });
+            let warm = Warm::of(entry.name, parameters, steps).await?;
+            if run.is_exact() { of_steps(run, warm).await } else { of_single_steps(run, warm).await }
+        })
+        .await;
     }
 }
 
 /// Steps one after another, which have the bits of the reference.
-fn of_steps(run: &mut Run, mut warm: Warm) -> Outcome {
+async fn of_steps(run: &mut Run<'_>, mut warm: Warm) -> Outcome {
     let steps = if run.options.short { 8 } else { 40 };
-    let (mut ours, gpu) = (warm.fork(Box::new(Reference::<f32>::new())), run.take_gpu()?);
+    let (mut ours, gpu) = (warm.fork(Box::new(Reference::<f32>::new())), run.take_gpu().await?);
     let mut theirs = warm.fork(gpu);
     for step in 1..=steps {
-        ours.step()?;
-        if let Some(fault) = theirs.step()? {
+        ours.step().await?;
+        if let Some(fault) = theirs.step().await? {
             return failed!("step {step}: {fault}");
         }
         if let Some(first) = BodyDifference::first(&ours.simulation.world, &theirs.simulation.world) {
@@ -103,22 +106,24 @@ fn of_steps(run: &mut Run, mut warm: Warm) -> Outcome {
 }
 
 /// Single steps, each from the state of the reference, because trajectories part.
-fn of_single_steps(run: &mut Run, mut ours: Warm) -> Outcome {
+async fn of_single_steps(run: &mut Run<'_>, mut ours: Warm) -> Outcome {
     let moments = if run.options.short { 3 } else { 9 };
-    let mut gpu = run.take_gpu()?;
+    let mut gpu = run.take_gpu().await?;
     let (mut apart, mut speed) = (Vec::new(), 1.0);
     for _ in 0..moments {
         let (problem, plan) = ours.simulation.next_problem(ours.dt)?;
         let mut results = [problem.clone(), problem];
         Reference::<f32>::new().run(&mut results[0], &plan.passes)?;
-        gpu.run(&mut results[1], &plan.passes)?;
+        gpu.run_async(CheckedStep::new(&mut results[1], &plan.passes)?).await?;
         let [a, b] = &results;
         apart.push(of_velocities(a, b));
         speed = largest(
             speed,
             a.bodies.iter().flat_map(|body| body.v.into_iter().chain(body.w)).map(|x| f64::from(x.abs())),
         );
-        (0..3).try_for_each(|_| ours.step().map(drop))?;
+        for _ in 0..3 {
+            ours.step().await?;
+        }
     }
     run.give_back(gpu);
     let (middle, most) = (median(&apart) / speed, PLAIN_SCENE);

@@ -24,7 +24,7 @@ impl Needs {
 pub struct Island {
     /// The needs of its contacts.
     pub needs: Needs,
-    /// The deepest overlap of its contacts, over the promise.
+    /// The deepest overlap of its contacts, over the promise, where it asks for more; else 0.
     pub overlap: f32,
     /// The largest need of its joints, and of restless bodies: no other contact takes load from them.
     pub whole_need: f32,
@@ -73,6 +73,12 @@ impl Island {
     pub fn becomes_heap(&self) -> bool {
         let least = if self.is_heap { HEAP_LEAVES } else { HEAP_BEGINS };
         !self.has_joints && self.contacts as f32 > least * self.bodies as f32
+    }
+
+    /// Whether its contacts ask for a class above its own.
+    pub fn asks_for_more(&self, highest: u8) -> bool {
+        let of_contacts = self.counted(self.needs);
+        of_contacts > self.whole_need && class_for(of_contacts) > self.class.min(highest)
     }
 
     /// The next class, for how many steps the island has been calm or waited, and its deepest overlap when the class changed in the hope of less.

@@ -15,6 +15,9 @@ pub enum InstructionSet {
     /// Sixteen numbers in one register; the same holds.
     #[cfg(target_arch = "x86_64")]
     Avx512,
+    /// Four numbers in one register of WebAssembly, in a program that is compiled for it.
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    Simd128,
 }
 
 impl InstructionSet {
@@ -26,6 +29,8 @@ impl InstructionSet {
             Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => std::arch::is_x86_feature_detected!("avx512f"),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => true,
         };
         let known = [
             Self::Portable,
@@ -33,6 +38,8 @@ impl InstructionSet {
             Self::Avx2,
             #[cfg(target_arch = "x86_64")]
             Self::Avx512,
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128,
         ];
         known.into_iter().filter(has)
     }
@@ -45,6 +52,8 @@ impl InstructionSet {
             Self::Avx2 => "AVX2",
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => "AVX-512",
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => "simd128",
         }
     }
 }
@@ -73,6 +82,8 @@ impl InstructionSet {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => unsafe { run_avx512(work, groups) },
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => work.over::<super::simd128::Simd128>(groups),
         }
     }
 }

@@ -13,6 +13,8 @@ mod avx512;
 mod instructions;
 mod portable;
 mod shared;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 #[cfg(test)]
 mod tests;
 

@@ -81,13 +81,6 @@ impl Materials {
     }
 }
 
-/// How deep the surfaces of a contact overlap where its bodies are now (m). A look at the rows would not do: a device may have them.
-fn overlap(world: &World, slot: &Slot, detector: &Detector) -> f32 {
-    let pair = detector.pair(slot.world, slot.pair);
-    let manifold = &pair.manifolds[slot.manifold as usize];
-    pair.overlaps(manifold, world).map(|(overlap, _)| overlap).fold(0.0, f32::max)
-}
-
 /// Slots that one task goes over.
 const SLOTS_A_TASK: usize = 4096;
 
@@ -211,11 +204,10 @@ impl ContactRows {
         &'a self,
         world: &'a World,
         detector: &'a Detector,
-        config: &'a SolverConfig,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
         let any_driven = world.bodies.iter().any(Body::is_driven);
-        let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
-        all.map(move |(slot, edge)| {
+        let all = (0..).zip(self.slots.all.iter().zip(&self.slots.edges)).filter(|(_, (slot, _))| slot.takes_part);
+        all.map(move |(row, (slot, edge))| {
             let (mut a, mut b) = (edge.a, edge.b);
             if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
                 let pair = detector.pair(slot.world, slot.pair);
@@ -225,10 +217,17 @@ impl ContactRows {
                     }
                 }
             }
-            let is_judged = slot.need > 1.0;
-            let overlap = if is_judged { overlap(world, slot, detector) / config.promised_sag(slot.size) } else { 0.0 };
-            Interface { a, b, need: slot.need, overlap, is_joint: false }
+            Interface { a, b, need: slot.need, is_joint: false, row }
         })
+    }
+
+    /// How deep the surfaces of a contact overlap where its bodies are now, over the sag that the settings promise. A look at the rows would not
+    /// do: a device may have them.
+    pub fn overlap(&self, row: u32, world: &World, detector: &Detector, config: &SolverConfig) -> f32 {
+        let slot = &self.slots.all[row as usize];
+        let pair = detector.pair(slot.world, slot.pair);
+        let overlaps = pair.overlaps(&pair.manifolds[slot.manifold as usize], world).map(|(overlap, _)| overlap);
+        overlaps.fold(0.0, f32::max) / config.promised_sag(slot.size)
     }
 
     /// The contacts that take part and jam, ascending.

@@ -239,8 +239,8 @@ impl JointRows {
             a: end(joint.body_a),
             b: joint.body_b.map_or(IMMOVABLE, end),
             need: self.needs.get(i).copied().unwrap_or(0.0),
-            overlap: 0.0,
             is_joint: true,
+            row: i as u32,
         })
     }
 

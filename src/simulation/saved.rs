@@ -57,7 +57,16 @@ impl Simulation {
     /// ```
     pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
         let Snapshot { world, config, stages } = self.snapshot();
-        Self { world, config, backend, stages: *stages, on_device: false, unfinished: None, restored: 0 }
+        Self {
+            world,
+            config,
+            backend,
+            stages: *stages,
+            on_device: false,
+            unfinished: None,
+            restored: 0,
+            is_pending: false,
+        }
     }
 
     /// The state between two steps, to go back to.
@@ -76,7 +85,7 @@ impl Simulation {
     /// # Ok::<(), drystone::Error>(())
     /// ```
     pub fn snapshot(&mut self) -> Snapshot {
-        let Self { world, config, stages, backend: _, on_device: _, unfinished: _, restored: _ } = self;
+        let Self { world, config, stages, backend: _, on_device: _, unfinished: _, restored: _, is_pending: _ } = self;
         Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
     }
 
@@ -95,6 +104,7 @@ impl Simulation {
         self.stages.clone_from(&*snapshot.stages);
         self.on_device = false;
         self.unfinished = None;
+        self.is_pending = false;
         self.restored += 1;
     }
 
@@ -146,7 +156,8 @@ impl Simulation {
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
         let stages = Stages::new(&world, &config);
-        let mut simulation = Self { stages, world, config, backend, on_device: false, unfinished: None, restored: 0 };
+        let mut simulation =
+            Self { stages, world, config, backend, on_device: false, unfinished: None, restored: 0, is_pending: false };
         let mut reader = Reader::new(content);
         simulation.walk(&mut reader).map_err(refused)?;
         ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
@@ -162,7 +173,7 @@ impl Simulation {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, restored: _ } = self;
+        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, restored: _, is_pending: _ } = self;
         world.walk(archive)?;
         config.walk(archive)?;
         if A::READS {

@@ -18,7 +18,7 @@ pub use entrant::{Engine, Entrant};
 pub use team::team;
 
 use drystone::Result;
-use drystone_cli::maze::{Game, Map};
+use drystone_maze::{Game, Map};
 
 /// The maze game on `map` in Rapier's hands; `frequency` as in [`Entrant`], `unit` the size of things [m], 1 unless told: Rapier's
 /// margins and thresholds go with it.

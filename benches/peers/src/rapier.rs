@@ -2,7 +2,6 @@
 
 use drystone::world::{BodyKind, MassProperties as Mass};
 use drystone::{Body, Error, Result, Scene, World};
-use drystone_cli::maze;
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::prelude::*;
 
@@ -101,7 +100,7 @@ impl Rapier {
 }
 
 /// Moves a game's board and ball.
-impl maze::Engine for Rapier {
+impl drystone_maze::Engine for Rapier {
     fn name(&self) -> String {
         let parameters = &self.physics.integration_parameters;
         let hertz = parameters.contact_softness.natural_frequency;

@@ -7,10 +7,10 @@ use clap::{Args, Subcommand};
 use super::output::{print, print_json, replacing};
 use super::scene::BackendArgs;
 use crate::files;
-use crate::maze::{Game, Map, Outcome, Script, pilot, play};
 use crate::settings;
 use drystone::backend::choose;
 use drystone::{Error, Result, SolverConfig};
+use drystone_maze::{Game, Map, Outcome, Played, Script, pilot, play};
 
 #[derive(Args)]
 pub struct PlayArgs {
@@ -84,9 +84,10 @@ impl MazeArgs {
     }
 
     #[cfg(feature = "view")]
-    fn draw(&self, game: Game, script: &Script, out: &std::path::Path) -> Result<crate::maze::Played> {
-        use crate::maze::SAMPLES;
-        use crate::view::{Canvas, Output, draw_game, poses};
+    fn draw(&self, game: Game, script: &Script, out: &std::path::Path) -> Result<Played> {
+        use crate::view::Output;
+        use drystone_maze::SAMPLES;
+        use drystone_view::{Canvas, draw_game, poses};
         // Errors of the canvas and the file are reported before the game.
         let (map, world) = (game.map.clone(), game.world().clone());
         let mut canvas = Canvas::new(&world, self.size)?;
@@ -103,8 +104,8 @@ impl MazeArgs {
 
     #[cfg(feature = "view")]
     fn window(&self, map: Map, config: SolverConfig) -> Result<()> {
-        use crate::view::{Labyrinth, window};
-        window::run(Box::new(Labyrinth::new(map, config, self.backend.choice)?))
+        let labyrinth = drystone_view::Labyrinth::new(map, config, self.backend.choice)?;
+        crate::view::window::run(Box::new(labyrinth))
     }
 
     #[cfg(not(feature = "view"))]
@@ -112,7 +113,7 @@ impl MazeArgs {
         Err(Error::input("play maze: a window needs a build with `--features view`; --script FILE plays without one"))
     }
 
-    fn print(&self, played: &crate::maze::Played) -> Result<()> {
+    fn print(&self, played: &Played) -> Result<()> {
         if self.json {
             return print_json(played);
         }

@@ -9,12 +9,13 @@ use super::progress::Progress;
 use super::scene::{MACHINE, SceneArgs, SleepArgs, WorldsArgs};
 use super::words;
 use crate::files;
-use crate::view::{Canvas, ColorBy, Film, Look, Output, evenly, scene_of};
+use crate::view::{Output, recorded};
 use drystone::backend::{BackendChoice, choose};
 use drystone::scenes::CATALOGUE;
 use drystone::scenes::Spawners;
 use drystone::stages::memory;
 use drystone::{Error, Reference, Replay, Result, Scene, Simulation, SolverConfig};
+use drystone_view::{Canvas, ColorBy, Film, Look, evenly, scene_of};
 
 /// Memory of a body in a frame: pose and color (bytes).
 const FRAME: f64 = 32.0;
@@ -42,7 +43,7 @@ pub struct RenderArgs {
     #[arg(long, help_heading = PICTURES, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
     size: (u32, u32),
     /// Quantity that the colors of bodies show.
-    #[arg(long, help_heading = PICTURES, value_enum, default_value_t)]
+    #[arg(long, help_heading = PICTURES, value_parser = words::of::<ColorBy>(), default_value_t)]
     color: ColorBy,
     /// Angle of the camera around the scene, in degrees.
     #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 30.0)]
@@ -91,7 +92,7 @@ impl RenderArgs {
         let seconds = f64::from(scene.steps) * f64::from(scene.dt);
         let mut output = Output::open(out, self.size, f64::from(frames) / seconds.max(1e-3))?;
         let film = match &self.from {
-            Some(path) => Film::read(scene, self.color, path)?.thinned(frames as usize),
+            Some(path) => recorded(scene, self.color, path)?.thinned(frames as usize),
             None => self.shoot(scene, config, replay, frames, args.json)?,
         };
         film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;

@@ -3,8 +3,10 @@
 use clap::Args;
 
 use super::scene::{BackendArgs, SceneArgs, SleepArgs, WorldsArgs};
-use crate::view::{ColorBy, Live, window};
+use super::words;
+use crate::view::window;
 use drystone::Result;
+use drystone_view::{ColorBy, Live};
 
 #[derive(Args)]
 pub struct ViewArgs {
@@ -15,7 +17,7 @@ pub struct ViewArgs {
     #[command(flatten)]
     sleep: SleepArgs,
     /// Quantity that the colors of bodies show.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = words::of::<ColorBy>(), default_value_t)]
     color: ColorBy,
 }
 

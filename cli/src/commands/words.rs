@@ -8,6 +8,8 @@ use drystone::config::Method;
 use drystone::conform::Group;
 use drystone::preset::Preset;
 use drystone::solver::Order;
+#[cfg(feature = "view")]
+use drystone_view::ColorBy;
 
 pub(super) trait Named: FromStr<Err = drystone::Error> + Clone + Send + Sync + 'static {
     /// The name and the help of each value.
@@ -100,6 +102,18 @@ impl Named for BackendKind {
     ];
 }
 
+#[cfg(feature = "view")]
+impl Named for ColorBy {
+    const WORDS: &'static [(&'static str, &'static str)] = &[
+        ("material", "Density, friction and restitution: equal materials have equal colors"),
+        ("batch", "The color in the constraint graph of the contact with the largest impulse on the body"),
+        ("speed", "Speed of the center of mass, dark to light"),
+        ("impulse", "Sum of the normal impulses on the body in the last substep, dark to light"),
+        ("sleeping", "Sleeping bodies are dark, awake bodies light"),
+        ("effort", "Substeps that the island of the body takes, dark to light: doubled with each shade"),
+    ];
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,5 +129,7 @@ mod tests {
         same(&Order::ALL);
         same(&BackendChoice::ALL);
         same(&BackendKind::ALL);
+        #[cfg(feature = "view")]
+        same(&ColorBy::ALL);
     }
 }

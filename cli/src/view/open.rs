@@ -8,16 +8,12 @@ use glam::Vec2;
 use winit::dpi::{LogicalSize, PhysicalPosition};
 use winit::event::MouseButton;
 use winit::event_loop::ActiveEventLoop;
-use winit::keyboard::Key;
 use winit::window::Window;
 
-use super::camera::Camera;
-use super::mesh::poses;
-use super::pipeline::Quality;
-use super::renderer::{Renderer, Shot};
-use super::show::{Pointer, Show};
+use super::panel::Panel;
 use drystone::backend::gpu::open_for_surface;
 use drystone::{Error, Result};
+use drystone_view::{Camera, Key, Pointer, Quality, Renderer, Shot, poses};
 
 pub(super) fn no_display() -> Error {
     let without =
@@ -52,7 +48,7 @@ pub(super) struct Open {
 }
 
 impl Open {
-    pub(super) fn new(events: &ActiveEventLoop, show: &dyn Show) -> Result<Self> {
+    pub(super) fn new(events: &ActiveEventLoop, show: &dyn Panel) -> Result<Self> {
         let attributes =
             Window::default_attributes().with_title(show.title()).with_inner_size(LogicalSize::new(1100.0, 720.0));
         let window = Arc::new(events.create_window(attributes).map_err(|_| no_display())?);
@@ -115,7 +111,7 @@ impl Open {
     }
 
     /// Sets the camera of `show` for the part of the window beside the panel.
-    fn frame_scene(&mut self, show: &dyn Show) {
+    fn frame_scene(&mut self, show: &dyn Panel) {
         let (width, height) = (self.surface_config.width as f32, self.surface_config.height as f32);
         // The panel counts for at most half of the window.
         let panel = if self.panel { self.panel_width.min(0.5 * width) } else { 0.0 };
@@ -123,11 +119,11 @@ impl Open {
         self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
     }
 
-    pub(super) fn key(&mut self, key: &Key, down: bool, show: &mut dyn Show) {
+    pub(super) fn key(&mut self, key: Key, down: bool, show: &mut dyn Panel) {
         show.point(&self.pointer());
-        match key.as_ref() {
-            Key::Character("f") if down => self.frame_scene(show),
-            Key::Character("h") if down => self.panel = !self.panel,
+        match key {
+            Key::Character('f') if down => self.frame_scene(show),
+            Key::Character('h') if down => self.panel = !self.panel,
             _ => {}
         }
     }
@@ -140,7 +136,7 @@ impl Open {
         Pointer { at, origin, direction }
     }
 
-    pub(super) fn button(&mut self, button: MouseButton, down: bool, show: &mut dyn Show) {
+    pub(super) fn button(&mut self, button: MouseButton, down: bool, show: &mut dyn Panel) {
         if !down && self.drag == Drag::Body {
             show.release();
         }
@@ -152,7 +148,7 @@ impl Open {
         };
     }
 
-    pub(super) fn moved(&mut self, to: PhysicalPosition<f64>, show: &mut dyn Show) {
+    pub(super) fn moved(&mut self, to: PhysicalPosition<f64>, show: &mut dyn Panel) {
         let by = Vec2::new((to.x - self.mouse.x) as f32, (to.y - self.mouse.y) as f32);
         let by = by / self.surface_config.height as f32;
         self.mouse = to;
@@ -165,7 +161,7 @@ impl Open {
     }
 
     /// Advances the time and draws; returns whether the window still exists.
-    pub(super) fn frame(&mut self, show: &mut dyn Show) -> Result<bool> {
+    pub(super) fn frame(&mut self, show: &mut dyn Panel) -> Result<bool> {
         let now = Instant::now();
         show.advance((now - self.last).as_secs_f32())?;
         self.last = now;
@@ -201,7 +197,7 @@ impl Open {
         Ok(true)
     }
 
-    fn draw_panel(&mut self, view: &wgpu::TextureView, show: &mut dyn Show) {
+    fn draw_panel(&mut self, view: &wgpu::TextureView, show: &mut dyn Panel) {
         let context = self.ui.egui_ctx().clone();
         let input = self.ui.take_egui_input(&self.window);
         let panel = self.panel;

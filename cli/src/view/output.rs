@@ -5,9 +5,9 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::canvas::Picture;
 use crate::files::Draft;
 use drystone::{Error, Result};
+use drystone_view::Picture;
 
 /// An open file or folder for pictures, which appears under its name with [`Output::finish`].
 pub struct Output {

@@ -1,18 +1,48 @@
-//! The panel of a live scene: measurements, controls and settings.
+//! The panel beside a show: for a scene measurements, controls and settings.
 
-use clap::ValueEnum;
-
-use super::colors::ColorBy;
-use super::live::Live;
 use drystone::backend::BackendChoice;
 use drystone::config::Friction;
+use drystone_maze::{BOARDS, Outcome};
+use drystone_view::{ColorBy, Labyrinth, Live, Show};
 
-pub(super) fn show(live: &mut Live, ui: &mut egui::Ui) {
-    numbers(live, ui);
-    ui.separator();
-    controls(live, ui);
-    ui.separator();
-    settings(live, ui);
+/// A show with a panel.
+pub trait Panel: Show {
+    fn panel(&mut self, ui: &mut egui::Ui);
+}
+
+impl Panel for Live {
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        numbers(self, ui);
+        ui.separator();
+        controls(self, ui);
+        ui.separator();
+        settings(self, ui);
+        keys(ui);
+    }
+}
+
+impl Panel for Labyrinth {
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.heading(match self.game.outcome {
+            Some(Outcome::Goal) => "won",
+            Some(_) => "lost: R starts again",
+            None if self.begun => "to the green square",
+            None => "arrow keys, or hold the mouse",
+        });
+        ui.monospace(format!("time {:6.2} s", self.game.time()));
+        if let Some(best) = self.best {
+            ui.monospace(format!("best {best:6.2} s"));
+        }
+        let [right, front] = self.game.tilt;
+        ui.monospace(format!("tilt {right:5.1} {front:5.1} degrees"));
+        ui.label("arrows or left mouse: tilt, right mouse: turn the view");
+        ui.label("r again, f whole board, h panel, esc close");
+        let known = BOARDS.map(|b| b.0).join(", ");
+        ui.label(format!("boards: {known}, or a file of your own"));
+    }
+}
+
+fn keys(ui: &mut egui::Ui) {
     ui.collapsing("keys and mouse", |ui| {
         for line in [
             "space pause, n one step, r restart, + - speed",
@@ -74,7 +104,7 @@ fn controls(live: &mut Live, ui: &mut egui::Ui) {
     }
     ui.add(egui::Slider::new(&mut live.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
     let mut color = live.color;
-    choice(ui, "color", ColorBy::value_variants(), &mut color);
+    choice(ui, "color", &ColorBy::ALL, &mut color);
     live.color = color;
     ui.horizontal(|ui| {
         ui.checkbox(&mut live.overlay.contacts, "contacts");
@@ -116,12 +146,4 @@ fn choice<T: std::fmt::Display + PartialEq + Copy>(ui: &mut egui::Ui, what: &str
             ui.selectable_value(value, *option, option.to_string());
         }
     });
-}
-
-impl ColorBy {
-    pub fn next(self) -> Self {
-        let all = Self::value_variants();
-        let at = all.iter().position(|&c| c == self).map_or(0, |i| i + 1);
-        all[at % all.len()]
-    }
 }

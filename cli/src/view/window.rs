@@ -1,4 +1,4 @@
-//! The event loop of a window with a [`Show`].
+//! The event loop of a window with a [`Show`](drystone_view::Show).
 
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, KeyEvent, MouseScrollDelta, WindowEvent};
@@ -7,10 +7,11 @@ use winit::keyboard::{Key, NamedKey};
 use winit::window::WindowId;
 
 use super::open::{Open, no_display};
-use super::show::Show;
+use super::panel::Panel;
 use drystone::{Error, Result};
+use drystone_view::Key as ShowKey;
 
-pub fn run(show: Box<dyn Show>) -> Result<()> {
+pub fn run(show: Box<dyn Panel>) -> Result<()> {
     let events = EventLoop::new().map_err(|_| no_display())?;
     events.set_control_flow(ControlFlow::Poll);
     let mut app = App { show, open: None, failed: None };
@@ -19,7 +20,7 @@ pub fn run(show: Box<dyn Show>) -> Result<()> {
 }
 
 struct App {
-    show: Box<dyn Show>,
+    show: Box<dyn Panel>,
     open: Option<Open>,
     failed: Option<Error>,
 }
@@ -48,17 +49,12 @@ impl ApplicationHandler for App {
             },
             WindowEvent::KeyboardInput { event: KeyEvent { logical_key, state, repeat, .. }, .. } if !taken => {
                 let down = state == ElementState::Pressed;
-                // Keys are independent of shift and caps lock.
-                let logical_key = match logical_key {
-                    Key::Character(text) => Key::Character(text.to_lowercase().into()),
-                    other => other,
-                };
                 if logical_key == Key::Named(NamedKey::Escape) {
                     return events.exit();
                 }
-                if !repeat {
-                    open.key(&logical_key, down, &mut *self.show);
-                    let result = self.show.key(&logical_key, down);
+                if let Some(key) = key_of(&logical_key).filter(|_| !repeat) {
+                    open.key(key, down, &mut *self.show);
+                    let result = self.show.key(key, down);
                     self.end(events, result);
                 }
             }
@@ -83,6 +79,19 @@ impl ApplicationHandler for App {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // The window must be dropped before the event loop.
         self.open = None;
+    }
+}
+
+fn key_of(key: &Key) -> Option<ShowKey> {
+    match key.as_ref() {
+        Key::Character(text) => ShowKey::named(text),
+        Key::Named(NamedKey::Space) => Some(ShowKey::Character(' ')),
+        Key::Named(NamedKey::Delete) => Some(ShowKey::Delete),
+        Key::Named(NamedKey::ArrowLeft) => Some(ShowKey::Left),
+        Key::Named(NamedKey::ArrowRight) => Some(ShowKey::Right),
+        Key::Named(NamedKey::ArrowUp) => Some(ShowKey::Up),
+        Key::Named(NamedKey::ArrowDown) => Some(ShowKey::Down),
+        _ => None,
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::block_on;
+
 use crate::error::{Error, Result};
 
 /// An adapter, as reports name it.
@@ -69,7 +71,18 @@ const INSTALL: &str = "install a graphics driver, or the software one: `apt-get 
 /// }
 /// ```
 pub fn adapters() -> Vec<AdapterSummary> {
-    found().into_iter().map(|(_, summary)| summary).collect()
+    block_on(async { Ok(adapters_async().await) }).unwrap_or_default()
+}
+
+/// As [`adapters`], for a page, where `adapters` finds none.
+///
+/// ```
+/// use drystone::backend::gpu::{adapters, adapters_async};
+///
+/// assert_eq!(pollster::block_on(adapters_async()), adapters());
+/// ```
+pub async fn adapters_async() -> Vec<AdapterSummary> {
+    found().await.into_iter().map(|(_, summary)| summary).collect()
 }
 
 /// The variable `DRYSTONE_ADAPTER`; empty if it is not set.
@@ -78,12 +91,12 @@ fn wanted() -> String {
 }
 
 /// The best adapter of those that `choice` allows and whose summary contains `name`.
-pub(super) fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, AdapterSummary)> {
+pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, AdapterSummary)> {
     let lower = name.to_lowercase();
     let fits = |s: &AdapterSummary| {
         (choice == AdapterChoice::Best || s.hardware) && s.to_string().to_lowercase().contains(&lower)
     };
-    found().into_iter().find(|(_, s)| fits(s)).ok_or_else(|| {
+    found().await.into_iter().find(|(_, s)| fits(s)).ok_or_else(|| {
         let variable = format!("DRYSTONE_ADAPTER={}", wanted());
         let named = match (name, &wanted()[..]) {
             ("", "") => String::new(),
@@ -91,9 +104,11 @@ pub(super) fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, 
             (_, "") => format!("one that {name:?} names, for "),
             _ => format!("one that {name:?} and {variable} name, for "),
         };
-        Error::Adapter(format!(
-            "no adapter found; looked for {named}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}"
-        ))
+        Error::Adapter(if cfg!(target_family = "wasm") {
+            "no adapter found: this browser offers no WebGPU here".into()
+        } else {
+            format!("no adapter found; looked for {named}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}")
+        })
     })
 }
 
@@ -110,12 +125,27 @@ pub(super) fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, 
 /// # Errors
 /// No such adapter, or it cannot be opened.
 pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
-    let (adapter, summary) = find(choice, "")?;
-    let (device, queue) = open(&adapter, false)?;
+    block_on(open_device_async(choice))
+}
+
+/// As [`open_device`], for a page.
+///
+/// ```
+/// use drystone::backend::gpu::{AdapterChoice, adapters, open_device_async};
+///
+/// let hardware = adapters().iter().any(|adapter| adapter.hardware);
+/// assert_eq!(pollster::block_on(open_device_async(AdapterChoice::Hardware)).is_ok(), hardware);
+/// ```
+///
+/// # Errors
+/// No such adapter, or it cannot be opened.
+pub async fn open_device_async(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
+    let (adapter, summary) = find(choice, "").await?;
+    let (device, queue) = open(&adapter, false).await?;
     Ok((device, queue, summary))
 }
 
-fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
+async fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
     // `none` loads no driver.
     if wanted().eq_ignore_ascii_case("none") {
         return Vec::new();
@@ -127,7 +157,7 @@ fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         });
-        let usable = usable(&instance, backends);
+        let usable = usable(&instance, backends).await;
         if !usable.is_empty() {
             return usable;
         }
@@ -136,14 +166,17 @@ fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
 }
 
 /// Adapters of an instance that can run the kernels and whose summary contains the wanted name, the one with the most hardware first.
-fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgpu::Adapter, AdapterSummary)> {
+async fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgpu::Adapter, AdapterSummary)> {
     let wanted = wanted().to_lowercase();
-    let all = pollster::block_on(instance.enumerate_adapters(backends)).into_iter().filter(can_compute);
+    let all = instance.enumerate_adapters(backends).await.into_iter().filter(can_compute);
     let mut usable: Vec<_> = all.map(|adapter| (adapter.clone(), summarize(&adapter))).collect();
     usable.retain(|(_, s)| wanted != "none" && s.to_string().to_lowercase().contains(&wanted));
     usable.sort_by_key(|(a, _)| KINDS.iter().position(|(kind, _)| *kind == a.get_info().device_type));
     usable
 }
+
+/// A surface to draw on, and an opened adapter that can.
+pub type Drawable = (wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue);
 
 /// Opens the best adapter that can draw on `window`.
 ///
@@ -152,16 +185,29 @@ fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgpu::Ada
 pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
-) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {
+) -> Result<Drawable> {
+    block_on(open_for_surface_async(Some(display), window))
+}
+
+/// As [`open_for_surface`], for a page, which has no handle of a display: `window` is a canvas there.
+///
+/// # Errors
+/// As of [`open_for_surface`].
+pub async fn open_for_surface_async(
+    display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>,
+    window: impl Into<wgpu::SurfaceTarget<'static>>,
+) -> Result<Drawable> {
     let none = |why: String| Error::Adapter(format!("no adapter can draw on this display{why}: {INSTALL}"));
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
-        flags: wgpu::InstanceFlags::empty(),
-        ..wgpu::InstanceDescriptor::new_with_display_handle(display)
-    });
+    let mut descriptor = match display {
+        Some(display) => wgpu::InstanceDescriptor::new_with_display_handle(display),
+        None => wgpu::InstanceDescriptor::new_without_display_handle(),
+    };
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    let instance = wgpu::Instance::new(descriptor);
     let surface = instance.create_surface(window).map_err(|e| none(format!(" ({e})")))?;
-    let mut usable = usable(&instance, wgpu::Backends::all()).into_iter();
+    let mut usable = usable(&instance, wgpu::Backends::all()).await.into_iter();
     let (adapter, _) = usable.find(|(a, _)| a.is_surface_supported(&surface)).ok_or_else(|| none(String::new()))?;
-    let (device, queue) = open(&adapter, false)?;
+    let (device, queue) = open(&adapter, false).await?;
     Ok((surface, adapter, device, queue))
 }
 
@@ -190,11 +236,11 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
         buffer_limit: adapter.limits().max_storage_buffer_binding_size.min(adapter.limits().max_buffer_size),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         api: format!("{:?}", info.backend),
-        name: info.name,
+        name: if info.name.is_empty() { "an adapter without a name".into() } else { info.name },
     }
 }
 
-pub(super) fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
+pub(super) async fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
     let offered = adapter.limits();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("drystone"),
@@ -208,6 +254,6 @@ pub(super) fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device
         },
         ..Default::default()
     };
-    pollster::block_on(adapter.request_device(&descriptor))
-        .map_err(|e| Error::Adapter(format!("{}: {e}", adapter.get_info().name)))
+    let opened = adapter.request_device(&descriptor).await;
+    opened.map_err(|e| Error::Adapter(format!("{}: {e}", adapter.get_info().name)))
 }

@@ -1,6 +1,9 @@
 //! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
 
 use std::ops::Range;
+use std::pin::Pin;
+
+use futures_channel::oneshot;
 
 use super::bindings::Binding;
 use super::submissions::Submissions;
@@ -19,12 +22,20 @@ pub(super) struct Buffers {
     /// Most memory that all buffers take together (B).
     memory: u64,
     slots: Vec<Slot>,
+    /// New buffers, for which the device may lack memory.
+    created: Vec<Created>,
     /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back before the next
     /// submission.
     staging: Option<wgpu::Buffer>,
     /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
     pub generation: u64,
     sent: u64,
+}
+
+/// A new buffer: the refusal where the device lacks the memory, and what the device says of that.
+struct Created {
+    refusal: Error,
+    is_refused: Pin<Box<dyn Future<Output = Option<wgpu::Error>> + Send>>,
 }
 
 #[derive(Default)]
@@ -39,7 +50,18 @@ impl Buffers {
         let slots = Binding::ALL.iter().map(|_| Slot::default()).collect();
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(limit);
-        Self { device, queue, adapter, limit, memory, slots, staging: None, generation: 0, sent: 0 }
+        Self {
+            device,
+            queue,
+            adapter,
+            limit,
+            memory,
+            slots,
+            created: Vec::new(),
+            staging: None,
+            generation: 0,
+            sent: 0,
+        }
     }
 
     /// The buffer of a binding.
@@ -77,10 +99,11 @@ impl Buffers {
     }
 
     /// Makes room for `size` bytes; the first `kept` bytes stay.
-    pub fn grow(&mut self, binding: Binding, kept: usize, size: usize) -> Result<()> {
+    pub async fn grow(&mut self, binding: Binding, kept: usize, size: usize) -> Result<()> {
         let before = self.slots[binding as usize].buffer.clone();
         self.reserve(binding, size)?;
         if let Some(before) = before.filter(|b| b != self.get(binding)) {
+            self.settle().await?;
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.copy_buffer_to_buffer(&before, 0, self.get(binding), 0, kept as u64);
             self.queue.submit([encoder.finish()]);
@@ -132,9 +155,20 @@ impl Buffers {
         known.extend_from_slice(bytes);
     }
 
+    /// Waits until the device has said of each new buffer whether there is memory for it.
+    pub async fn settle(&mut self) -> Result<()> {
+        let mut refusals = Vec::new();
+        for Created { refusal, is_refused } in std::mem::take(&mut self.created) {
+            if is_refused.await.is_some() {
+                refusals.push(refusal);
+            }
+        }
+        refusals.into_iter().next().map_or(Ok(()), Err)
+    }
+
     /// Submits the encoder, which has work on so many `rows`, with copies of the `wanted` bindings, and of the first bytes of another buffer
     /// `more`. Waits, writes the copies to `wanted`, and returns those of `more` as numbers. Nothing is written where anything fails.
-    pub fn read_back(
+    pub async fn read_back(
         &mut self,
         submissions: &mut Submissions,
         (mut encoder, rows): (wgpu::CommandEncoder, usize),
@@ -146,29 +180,32 @@ impl Buffers {
         let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
         if size == 0 {
             submissions.submit(encoder);
-            submissions.wait(rows)?;
+            submissions.wait(rows).await?;
             return Ok(Vec::new());
         }
-        if self.staging.as_ref().is_none_or(|b| b.size() < size) {
-            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-            self.staging = None;
-            self.staging = Some(self.create("read back", size, self.device.limits().max_buffer_size, usage)?);
-        }
-        let staging = self.staging.as_ref().expect("made above");
+        // A step that is given up leaves its buffer to wgpu.
+        let staging = match self.staging.take().filter(|b| b.size() >= size) {
+            Some(staging) => staging,
+            None => {
+                let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+                self.create("read back", size, self.device.limits().max_buffer_size, usage)?
+            }
+        };
+        self.settle().await?;
         let mut at = 0;
         for (binding, rows) in wanted.iter().filter(|w| !w.1.is_empty()) {
-            encoder.copy_buffer_to_buffer(self.get(*binding), 0, staging, at, rows.len() as u64);
+            encoder.copy_buffer_to_buffer(self.get(*binding), 0, &staging, at, rows.len() as u64);
             at += rows.len() as u64;
         }
         if let Some((buffer, bytes)) = more {
-            encoder.copy_buffer_to_buffer(buffer, 0, staging, own, bytes);
+            encoder.copy_buffer_to_buffer(buffer, 0, &staging, own, bytes);
         }
         submissions.submit(encoder);
         let slice = staging.slice(..size);
-        let (sender, receiver) = std::sync::mpsc::channel();
+        let (sender, receiver) = oneshot::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
-        submissions.wait(rows)?;
-        receiver.try_recv().map_err(|e| submissions.lost(e))?.map_err(|e| submissions.lost(e))?;
+        submissions.wait(rows).await?;
+        receiver.await.map_err(|e| submissions.lost(e))?.map_err(|e| submissions.lost(e))?;
         let mapped = slice.get_mapped_range().map_err(|e| submissions.lost(e))?;
         let mut rest = &mapped[..];
         for (_, rows) in wanted {
@@ -177,11 +214,12 @@ impl Buffers {
         let numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
         drop(mapped);
         staging.unmap();
+        self.staging = Some(staging);
         Ok(numbers)
     }
 
-    /// A buffer for `size` bytes.
-    fn create(&self, name: &str, size: u64, limit: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+    /// A buffer for `size` bytes. Before its use [`Self::settle`] says whether the device has the memory.
+    fn create(&mut self, name: &str, size: u64, limit: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let size = size_of_buffer(size, limit);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -192,13 +230,13 @@ impl Buffers {
         });
         let all = self.slots.iter().filter_map(|slot| slot.buffer.as_ref()).chain(&self.staging);
         let is_full = all.map(wgpu::Buffer::size).sum::<u64>() + size > self.memory;
-        match pollster::block_on(scope.pop()) {
-            None if !is_full => Ok(buffer),
-            _ => {
-                let (size, adapter) = (SizeText(size), &self.adapter);
-                Err(Error::TooLarge(format!("{adapter} has no {size} of memory for the {name}: use --backend cpu")))
-            }
+        let (size, adapter) = (SizeText(size), &self.adapter);
+        let refusal = Error::TooLarge(format!("{adapter} has no {size} of memory for the {name}: use --backend cpu"));
+        if is_full {
+            return Err(refusal);
         }
+        self.created.push(Created { refusal, is_refused: Box::pin(scope.pop()) });
+        Ok(buffer)
     }
 }
 

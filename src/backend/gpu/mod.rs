@@ -26,11 +26,14 @@ mod submissions;
 mod timer;
 pub(crate) mod wgsl;
 
-pub use adapter::{AdapterChoice, AdapterSummary, adapters, open_device, open_for_surface};
+pub use adapter::{
+    AdapterChoice, AdapterSummary, adapters, adapters_async, open_device, open_device_async, open_for_surface,
+    open_for_surface_async,
+};
 pub use options::{Faults, GpuOptions, Loss};
 
 use super::cpu::Cpu;
-use super::{Backend, CheckedStep};
+use super::{Backend, CheckedStep, Running};
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::carry::Carry;
@@ -103,24 +106,45 @@ impl Gpu {
         Self::open(GpuOptions { adapter: choice, exact, ..GpuOptions::default() })
     }
 
-    /// Opens an adapter as `options` say.
+    /// Opens an adapter as `options` say. Waits on this thread; the page of a browser opens one by [`Gpu::open_async`].
     ///
     /// # Errors
     /// As of [`Gpu::new`].
     pub fn open(options: GpuOptions) -> Result<Self> {
-        Self::open_after(0, options)
+        block_on(Self::open_async(options))
+    }
+
+    /// As [`Gpu::open`], for a page: other tasks go on meanwhile.
+    ///
+    /// ```no_run
+    /// use drystone::backend::gpu::GpuOptions;
+    /// use drystone::{Gpu, Scene, Simulation, SolverConfig};
+    ///
+    /// # async fn page() -> drystone::Result<()> {
+    /// let gpu = Gpu::open_async(GpuOptions::default()).await?;
+    /// let scene = Scene::find("pile", &["n=1000".into()])?;
+    /// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu))?;
+    /// simulation.step_async(scene.dt).await?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As of [`Gpu::new`].
+    pub async fn open_async(options: GpuOptions) -> Result<Self> {
+        Self::open_after(0, options).await
     }
 
     /// Opens an adapter after so many devices were lost.
-    fn open_after(lost: usize, options: GpuOptions) -> Result<Self> {
+    async fn open_after(lost: usize, options: GpuOptions) -> Result<Self> {
         let Faults { shader, losses } = &options.faults;
-        let (adapter, summary) = adapter::find(options.adapter, &options.name)?;
+        let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
         let (exact, loss) = (options.exact, losses.get(lost).copied());
         if exact && !summary.exact {
             let name = &summary.name;
             return Err(Error::Adapter(format!("exact mode needs an adapter that takes SPIR-V; {name} does not")));
         }
-        let (device, queue) = adapter::open(&adapter, exact)?;
+        let (device, queue) = adapter::open(&adapter, exact).await?;
         let name = || summary.name.clone();
         Ok(Self {
             pipelines: Pipelines::new(device.clone(), exact, *shader),
@@ -203,7 +227,7 @@ impl Gpu {
 
     /// The dispatches `first`, then the passes, and the rows that they go over, ready for submission. With `together` the passes of a small
     /// world are one dispatch. Of a plan that would hold the device for long, all but the last part is submitted here.
-    fn encoded(
+    async fn encoded(
         &mut self,
         problem: &StepProblem,
         first: Vec<Dispatch>,
@@ -239,11 +263,13 @@ impl Gpu {
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             dispatch::encode(&mut encoder, part, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
             let rows = part.iter().map(|dispatch| dispatch.work).sum();
+            // A submission may not use a buffer that is not there.
+            self.buffers.settle().await?;
             if later.is_empty() {
                 return Ok((encoder, rows));
             }
             self.submissions.submit(encoder);
-            self.submissions.wait(rows)?;
+            self.submissions.wait(rows).await?;
             rest = later;
         }
     }
@@ -262,37 +288,43 @@ impl Gpu {
     }
 
     /// Runs the dispatches `first`, then the passes, and reads back all that they changed.
-    fn run_all(
+    async fn run_all(
         &mut self,
         problem: &mut StepProblem,
         first: Vec<Dispatch>,
         passes: &[Pass],
         together: bool,
     ) -> Result<()> {
-        let work = self.encoded(problem, first, passes, together)?;
-        let [mut impulses, mut totals] = [&mut problem.impulses, &mut problem.totals].map(std::mem::take);
-        let mut wanted = rows::moved(problem);
-        wanted.push((Binding::Impulses, bytemuck::cast_slice_mut(&mut impulses)));
-        wanted.push((Binding::Totals, bytemuck::cast_slice_mut(&mut totals)));
-        let finished = self.finish(work, &mut wanted);
-        (problem.impulses, problem.totals) = (impulses, totals);
-        finished
+        let work = self.encoded(problem, first, passes, together).await?;
+        self.finish(work, &mut rows::changed(problem)).await
     }
 
     /// Submits work on so many rows, waits, and reads the `wanted` rows back.
-    fn finish(
+    async fn finish(
         &mut self,
         (mut encoder, rows): (wgpu::CommandEncoder, usize),
         wanted: &mut [(Binding, &mut [u8])],
     ) -> Result<()> {
         let times = self.timer.as_ref().and_then(|timer| timer.resolve(&mut encoder));
-        let ticks = self.buffers.read_back(&mut self.submissions, (encoder, rows), wanted, times)?;
+        let ticks = self.buffers.read_back(&mut self.submissions, (encoder, rows), wanted, times).await?;
         self.times = self.timer.as_mut().map(|timer| timer.times(&ticks)).unwrap_or_default();
         let down = wanted.iter().map(|(_, rows)| rows.len() as u64).sum();
         let (submissions, longest_submission) = self.submissions.take_taken();
         self.traffic = Traffic { up: self.buffers.take_sent(), down, submissions, longest_submission, ..self.traffic };
         Ok(())
     }
+}
+
+/// Waits on this thread.
+///
+/// # Errors
+/// Those of the future; and in a page, which cannot wait.
+pub(crate) fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
+    if cfg!(target_family = "wasm") {
+        let instead = "the functions whose names end in _async do not wait";
+        return Err(Error::Adapter(format!("a page cannot wait for a device: {instead}")));
+    }
+    pollster::block_on(future)
 }
 
 impl Backend for Gpu {
@@ -305,37 +337,52 @@ impl Backend for Gpu {
     }
 
     fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
-        let (problem, passes) = step.into_parts();
-        self.rows = None;
-        self.send_all(problem, passes)?;
-        self.run_all(problem, Vec::new(), passes, false)
+        block_on(self.run_async(step))
+    }
+
+    fn run_async<'a>(&'a mut self, step: CheckedStep<'a>) -> Running<'a> {
+        Box::pin(async move {
+            let (problem, passes) = step.into_parts();
+            self.rows = None;
+            self.send_all(problem, passes)?;
+            self.run_all(problem, Vec::new(), passes, false).await
+        })
     }
 
     fn step(&mut self, step: CheckedStep, carry: &Carry) -> Result<()> {
-        let (problem, passes) = step.into_parts();
-        let before = self.rows.take().filter(|_| carry.on_device);
-        let first = match before {
-            Some(before) => {
-                self.check(problem, passes)?;
-                self.update_small_rows(problem)?;
-                resident::begin(&mut self.buffers, problem, carry, before, &mut self.separations)?
+        block_on(self.step_async(step, carry))
+    }
+
+    fn step_async<'a>(&'a mut self, step: CheckedStep<'a>, carry: &'a Carry) -> Running<'a> {
+        Box::pin(async move {
+            let (problem, passes) = step.into_parts();
+            let before = self.rows.take().filter(|_| carry.on_device);
+            let first = match before {
+                Some(before) => {
+                    self.check(problem, passes)?;
+                    self.update_small_rows(problem)?;
+                    resident::begin(&mut self.buffers, problem, carry, before, &mut self.separations).await?
+                }
+                None => {
+                    self.send_all(problem, passes)?;
+                    Vec::new()
+                }
+            };
+            self.run_all(problem, first, passes, true).await?;
+            self.count_bytes(problem, passes);
+            for (binding, bytes) in rows::changed(problem) {
+                // The host compares no impulses of contacts with those of the step before.
+                if !matches!(binding, Binding::Impulses | Binding::Totals) {
+                    self.buffers.note(binding, bytes);
+                }
             }
-            None => {
-                self.send_all(problem, passes)?;
-                Vec::new()
-            }
-        };
-        self.run_all(problem, first, passes, true)?;
-        self.count_bytes(problem, passes);
-        for (binding, bytes) in rows::moved(problem) {
-            self.buffers.note(binding, bytes);
-        }
-        // The next step begins with begin_bodies.
-        self.states.clear();
-        self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
-        self.buffers.note(Binding::Bodies, bytemuck::cast_slice(&self.states));
-        self.rows = Some(ResidentRows::of(problem));
-        Ok(())
+            // The next step begins with begin_bodies.
+            self.states.clear();
+            self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
+            self.buffers.note(Binding::Bodies, bytemuck::cast_slice(&self.states));
+            self.rows = Some(ResidentRows::of(problem));
+            Ok(())
+        })
     }
 
     fn keeps_rows(&self) -> bool {
@@ -343,20 +390,27 @@ impl Backend for Gpu {
     }
 
     fn successor(&mut self) -> Option<Box<dyn Backend>> {
-        if !self.options.goes_on {
-            return None;
-        }
-        let lost = self.lost + 1;
-        let opened = if lost < MOST_DEVICES { Self::open_after(lost, self.options.clone()).ok() } else { None };
-        Some(match opened {
-            Some(mut gpu) => {
-                gpu.rows_a_thread = self.rows_a_thread;
-                if self.timer.is_some() {
-                    gpu.timer = Timer::new(&gpu.device, &gpu.queue);
-                }
-                Box::new(gpu)
+        block_on(async { Ok(self.successor_async().await) }).unwrap_or_default()
+    }
+
+    fn successor_async(&mut self) -> Running<'_, Option<Box<dyn Backend>>> {
+        Box::pin(async {
+            if !self.options.goes_on {
+                return None;
             }
-            None => Box::new(Cpu::new()),
+            let lost = self.lost + 1;
+            let opened =
+                if lost < MOST_DEVICES { Self::open_after(lost, self.options.clone()).await.ok() } else { None };
+            Some(match opened {
+                Some(mut gpu) => {
+                    gpu.rows_a_thread = self.rows_a_thread;
+                    if self.timer.is_some() {
+                        gpu.timer = Timer::new(&gpu.device, &gpu.queue);
+                    }
+                    Box::new(gpu) as Box<dyn Backend>
+                }
+                None => Box::new(Cpu::new()),
+            })
         })
     }
 
@@ -365,7 +419,7 @@ impl Backend for Gpu {
     }
 
     fn time_kernels(&mut self) -> Result<Option<f64>> {
-        let bandwidth = timer::copy_bandwidth(&self.device, &mut self.submissions)?;
+        let bandwidth = block_on(timer::copy_bandwidth(&self.device, &mut self.submissions))?;
         self.timer = Timer::new(&self.device, &self.queue);
         Ok(self.timer.as_ref().map(|_| bandwidth))
     }

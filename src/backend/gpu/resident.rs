@@ -98,7 +98,7 @@ impl WrittenContact {
 
 /// Sends what changed since the step before, and returns the programs that bring its rows to those of `problem`. `separations` is
 /// memory that every step uses again.
-pub(super) fn begin(
+pub(super) async fn begin(
     buffers: &mut Buffers,
     problem: &StepProblem,
     carry: &Carry,
@@ -122,7 +122,7 @@ pub(super) fn begin(
         return Ok(programs);
     }
     for ((binding, rows), kept) in rows::of_contacts(problem).into_iter().zip(before.sizes) {
-        buffers.grow(binding, kept, rows.len())?;
+        buffers.grow(binding, kept, rows.len()).await?;
     }
     if !carry.written.is_empty() {
         send_written(buffers, problem, carry)?;

@@ -64,12 +64,14 @@ pub(super) fn of_contacts(problem: &StepProblem) -> [(Binding, &[u8]); 4] {
 }
 
 /// Rows that the host reads back after every step.
-pub(super) fn moved(problem: &mut StepProblem) -> Vec<(Binding, &mut [u8])> {
-    vec![
+pub(super) fn changed(problem: &mut StepProblem) -> [(Binding, &mut [u8]); 6] {
+    [
         (Binding::Bodies, bytemuck::cast_slice_mut(&mut problem.bodies)),
         (Binding::JointImpulses, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
         (Binding::Convergence, bytemuck::bytes_of_mut(&mut problem.convergence)),
         (Binding::Momentum, bytemuck::bytes_of_mut(&mut problem.momentum)),
+        (Binding::Impulses, bytemuck::cast_slice_mut(&mut problem.impulses)),
+        (Binding::Totals, bytemuck::cast_slice_mut(&mut problem.totals)),
     ]
 }
 

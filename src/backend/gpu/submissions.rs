@@ -1,16 +1,18 @@
 //! Submissions: how much work each holds, how long the device takes, and what becomes of errors.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::options::Loss;
 use crate::error::{Error, Result};
+use crate::stats::Stopwatch;
 
 /// Rows of the first submission of a device whose speed is unknown: at most 100 MB, a tenth of a second at 1 GB/s.
 const FIRST_ROWS: usize = 1 << 18;
 /// A dispatch costs as much as the sweep over so many rows.
 pub(super) const ROWS_OF_A_DISPATCH: usize = 256;
 /// A device that takes longer for a submission counts as lost. The work of a submission takes a tenth of a second.
+#[cfg(not(target_family = "wasm"))]
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
 /// What a device reported outside a call.
@@ -28,7 +30,7 @@ pub(super) struct Submissions {
     reports: Arc<Mutex<Reports>>,
     loss: Option<Loss>,
     count: u32,
-    begun: Instant,
+    begun: Stopwatch,
     /// Longest that a submission is meant to hold the device.
     target: Duration,
     /// Rows a second of the last submission.
@@ -57,7 +59,7 @@ impl Submissions {
             };
             locked(&losses).lost.get_or_insert(reason);
         });
-        let begun = Instant::now();
+        let begun = Stopwatch::start();
         let taken = (0, Duration::ZERO);
         Self { device, queue, adapter, reports, loss, count: 0, begun, target, speed: None, taken }
     }
@@ -69,19 +71,30 @@ impl Submissions {
 
     /// Hands work to the device.
     pub fn submit(&mut self, encoder: wgpu::CommandEncoder) {
-        self.begun = Instant::now();
+        self.begun = Stopwatch::start();
         self.queue.submit([encoder.finish()]);
         self.count += 1;
         self.lose(true);
     }
 
-    /// Waits for the device, which was given work on so many `rows`.
+    /// Waits for the device, which was given work on so many `rows`. A page goes on with other tasks meanwhile; elsewhere this thread waits.
     ///
     /// # Errors
     /// The device is lost, or it reported an error.
-    pub fn wait(&mut self, rows: usize) -> Result<()> {
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
-        let waited = self.device.poll(wait);
+    pub async fn wait(&mut self, rows: usize) -> Result<()> {
+        #[cfg(target_family = "wasm")]
+        let waited = {
+            let (done, is_done) = futures_channel::oneshot::channel();
+            self.queue.on_submitted_work_done(move || {
+                let _ = done.send(());
+            });
+            is_done.await
+        };
+        #[cfg(not(target_family = "wasm"))]
+        let waited = {
+            let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
+            self.device.poll(wait)
+        };
         let time = self.begun.elapsed();
         if rows > 0 {
             self.speed = Some(rows as f64 / time.as_secs_f64().max(1e-6));

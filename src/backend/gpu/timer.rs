@@ -102,7 +102,7 @@ impl Timer {
 ///
 /// # Errors
 /// The device is lost.
-pub(super) fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submissions) -> Result<f64> {
+pub(super) async fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submissions) -> Result<f64> {
     // Larger than caches are, where the adapter has such buffers.
     let size = device.limits().max_storage_buffer_binding_size.min(256 << 20);
     let buffer = || {
@@ -114,16 +114,16 @@ pub(super) fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submission
         })
     };
     let (from, to) = (buffer(), buffer());
-    let mut seconds = |copies: u32| -> Result<f64> {
+    let mut seconds = async |copies: u32| -> Result<f64> {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         (0..copies).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
         let start = Stopwatch::start();
         submissions.submit(encoder);
-        submissions.wait(0)?;
+        submissions.wait(0).await?;
         Ok(start.elapsed().as_secs_f64())
     };
     // The first copy touches the memory. The difference leaves out what a submission costs.
-    seconds(1)?;
-    let (few, many) = (seconds(2)?, seconds(10)?);
+    seconds(1).await?;
+    let (few, many) = (seconds(2).await?, seconds(10).await?);
     Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))
 }

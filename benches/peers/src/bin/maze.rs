@@ -12,8 +12,8 @@ use drystone::backend::{BackendChoice, choose};
 use drystone::stats::median;
 use drystone::{Error, Result, SolverConfig};
 use drystone_cli::files;
-use drystone_cli::maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
 use drystone_cli::report::rounds::interleave;
+use drystone_maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
 use drystone_peers::rapier_game;
 use plotters::prelude::*;
 

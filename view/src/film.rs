@@ -1,0 +1,103 @@
+//! A run or a recorded motion as frames, and pictures of the frames from one camera.
+
+use glam::{Quat, Vec3};
+
+use crate::bounds::Bounds;
+use crate::camera::Camera;
+use crate::canvas::{Canvas, Picture};
+use crate::colors::ColorBy;
+use crate::overlay::ropes;
+use crate::poses::poses;
+use crate::renderer::Shot;
+use drystone::{Result, Scene, Simulation, World};
+
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Time since the start (s).
+    pub time: f64,
+    pub poses: Vec<(Vec3, Quat)>,
+    pub values: Vec<f32>,
+    /// The world at that time, in a scene whose bodies come and go.
+    world: Option<World>,
+}
+
+/// Angle of the camera around the scene, and elevation above the horizon (rad).
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    pub yaw: f32,
+    pub pitch: f32,
+}
+
+#[derive(Clone, Debug)]
+pub struct Film {
+    scene: Scene,
+    color: ColorBy,
+    frames: Vec<Frame>,
+}
+
+impl Film {
+    pub fn new(scene: Scene, color: ColorBy) -> Self {
+        Self { scene, color, frames: Vec::new() }
+    }
+
+    pub fn add(&mut self, time: f64, simulation: &mut Simulation) {
+        let values = self.color.values(simulation);
+        let comes_and_goes = !(self.scene.spawners.is_empty() && self.scene.leaving.is_empty());
+        let world = comes_and_goes.then(|| simulation.world.clone());
+        self.frames.push(Frame { time, poses: poses(&simulation.world), values, world });
+    }
+
+    /// Adds a world without contacts and sleep.
+    pub fn add_world(&mut self, time: f64, world: &World) {
+        self.frames.push(Frame {
+            time,
+            poses: poses(world),
+            values: self.color.values_of(world, &[], &[]),
+            world: None,
+        });
+    }
+
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// The film with `count` of its frames, evenly spaced, with the last one.
+    pub fn thinned(mut self, count: usize) -> Self {
+        self.frames = evenly(self.frames.len(), count).map(|i| self.frames[i].clone()).collect();
+        self
+    }
+
+    pub fn bounds(&self) -> Bounds {
+        let of = |frame: &Frame| Bounds::at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
+        self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(of(frame)))
+    }
+
+    /// Draws the frames in order from one camera, on a canvas for the film's world.
+    pub fn draw(&self, canvas: &mut Canvas, look: &Look, mut show: impl FnMut(&Picture) -> Result<()>) -> Result<()> {
+        let world = &self.scene.world;
+        let bounds = self.bounds();
+        let up = -world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+        let camera = Camera::framing(&bounds, up, look.yaw, look.pitch, canvas.aspect());
+        let scale = self
+            .frames
+            .iter()
+            .map(|f| self.color.scale(f.world.as_ref().unwrap_or(world), &f.values))
+            .fold(0.0, f32::max);
+        let container = self.scene.container.map(|(low, high)| Bounds { low, high });
+        for frame in &self.frames {
+            let world = frame.world.as_ref().unwrap_or(world);
+            canvas.follow(world);
+            let colors = self.color.paint(world, &frame.values, scale);
+            let ropes = ropes(world, &frame.poses);
+            let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };
+            show(&canvas.draw(&shot)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` of the numbers below `all`, evenly spaced, with the last one.
+pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
+    let count = count.min(all);
+    (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
+}

@@ -1,0 +1,132 @@
+//! Picture, keys and pointer of a live scene.
+
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+
+use crate::bounds::Bounds;
+use crate::camera::Camera;
+use crate::colors::Rgba;
+use crate::live::{Grabbed, Live};
+use crate::overlay::{LineEnd, Overlay, lines};
+use crate::show::{Key, Pointer, Show};
+use drystone::{Joint, Result, World};
+
+/// Longest time of the steps before a picture, unless drawing takes longer.
+const PATIENCE: Duration = Duration::from_millis(30);
+
+impl Show for Live {
+    fn title(&self) -> String {
+        self.scene.name.clone()
+    }
+
+    fn world(&self) -> &World {
+        &self.simulation.world
+    }
+
+    fn bounds(&self) -> Bounds {
+        // The bounds follow the bodies, unless one of them is far away.
+        let now = self.bounds.join(Bounds::of(self.world()));
+        if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
+    }
+
+    fn container(&self) -> Option<Bounds> {
+        self.scene.container.map(|(low, high)| Bounds { low, high })
+    }
+
+    fn camera(&self, aspect: f32) -> Camera {
+        let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+        Camera::framing(&self.bounds, up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
+    }
+
+    fn colors(&mut self) -> Vec<Rgba> {
+        let values = self.color.values(&mut self.simulation);
+        let world = &self.simulation.world;
+        // The scale changes slowly, so that colors do not flicker.
+        let scale = self.color.scale(world, &values);
+        self.light_end += 0.05 * (scale - self.light_end);
+        self.color.paint(world, &values, self.light_end.max(0.5 * scale))
+    }
+
+    fn lines(&mut self) -> Vec<LineEnd> {
+        let size = 0.02 * self.bounds.radius();
+        let overlay = Overlay { joints: self.overlay.joints || self.grabbed.is_some(), ..self.overlay };
+        lines(&mut self.simulation, overlay, size)
+    }
+
+    fn advance(&mut self, seconds: f32) -> Result<()> {
+        let began = Instant::now();
+        let before = self.time();
+        let drawing = Duration::from_secs_f32(seconds).saturating_sub(self.stepping);
+        if !self.paused {
+            self.owed += seconds * self.speed;
+            while self.owed >= self.scene.dt && began.elapsed() < PATIENCE.max(drawing) {
+                self.step()?;
+                self.owed -= self.scene.dt;
+            }
+            // A simulation that is too slow for real time does not accumulate steps.
+            self.owed = self.owed.min(2.0 * self.scene.dt);
+        }
+        self.stepping = began.elapsed();
+        self.pictures += (2.0 * seconds).min(1.0) * (1.0 / seconds.max(1e-4) - self.pictures);
+        let reached = (self.time() - before) / seconds.max(1e-4);
+        self.reached += (2.0 * seconds).min(1.0) * (reached - self.reached);
+        Ok(())
+    }
+
+    fn point(&mut self, pointer: &Pointer) {
+        self.pointer = Some(*pointer);
+    }
+
+    fn key(&mut self, key: Key, down: bool) -> Result<()> {
+        if !down {
+            return Ok(());
+        }
+        match key {
+            Key::Character(' ') => self.paused = !self.paused,
+            Key::Character('n') => {
+                self.paused = true;
+                self.step()?;
+            }
+            Key::Character('r') => self.restart()?,
+            Key::Character('b') => self.throw(),
+            Key::Character('x') | Key::Delete => self.delete(),
+            Key::Character('s') => self.keep(),
+            Key::Character('l') => self.go_back(),
+            Key::Left => self.seek(-1.0)?,
+            Key::Right => self.seek(1.0)?,
+            Key::Character('c') => self.color = self.color.next(),
+            Key::Character('1') => self.overlay.contacts = !self.overlay.contacts,
+            Key::Character('2') => self.overlay.joints = !self.overlay.joints,
+            Key::Character('3') => self.overlay.boxes = !self.overlay.boxes,
+            Key::Character('+' | '=') => self.speed = (self.speed * 2.0).min(16.0),
+            Key::Character('-') => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn grab(&mut self, pointer: &Pointer) -> bool {
+        let Pointer { origin, direction, .. } = *pointer;
+        let Some((distance, body)) = self.body_at(*pointer) else { return false };
+        let world = &mut self.simulation.world;
+        let target = origin + distance * direction;
+        let pulled = &world.bodies[body];
+        let anchor = pulled.rotation.inverse() * (target - pulled.position);
+        let joint = world.insert_joint(Joint::to_world(body, anchor, target));
+        self.grabbed = Some(Grabbed { body, anchor, distance, target, joint });
+        true
+    }
+
+    fn drag(&mut self, pointer: &Pointer) {
+        if let Some(grabbed) = &mut self.grabbed {
+            grabbed.target = pointer.origin + grabbed.distance * pointer.direction;
+        }
+    }
+
+    fn release(&mut self) {
+        if let Some(grabbed) = self.grabbed.take() {
+            self.simulation.world.remove_joint(grabbed.joint);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Scenes and settings as the page names them.
+
+use drystone::preset::Preset;
+use drystone::scenes::CATALOGUE;
+use drystone::stages::suggest::shorten;
+use drystone::{Error, Result, Scene, SolverConfig};
+use serde_json::{Map, Value};
+
+/// Most bodies of a scene of the page: about 4 kB each, of 4 GiB that WebAssembly has at most.
+pub const MOST_BODIES: u64 = 200_000;
+
+/// A scene of the catalogue; `parameters` are `name=value`.
+pub fn scene(name: &str, parameters: &[String]) -> Result<Scene> {
+    if let Some(entry) = CATALOGUE.iter().find(|entry| entry.name == name) {
+        let bodies = entry.body_count(parameters)?;
+        if bodies > MOST_BODIES {
+            return Err(Error::TooLarge(format!(
+                "{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser"
+            )));
+        }
+    }
+    Scene::find(name, parameters)
+}
+
+/// The settings of a JSON object: each by its name, over those of its `preset`.
+pub fn config(text: &str) -> Result<SolverConfig> {
+    let parsed = serde_json::from_str::<Map<String, Value>>(text);
+    let mut changes = parsed.map_err(|e| Error::input(format!("settings: {e}")))?;
+    let preset = match changes.remove("preset") {
+        Some(Value::String(name)) => name.parse::<Preset>().map_err(|e| Error::input(format!("preset: {e}")))?,
+        Some(other) => return Err(Error::input(format!("preset: {other} is no name"))),
+        None => Preset::default(),
+    };
+    let mut all = serde_json::to_value(preset.config()).map_err(Error::input)?;
+    for (name, value) in changes {
+        let (table, key) = match name.split_once('.') {
+            Some((table, key)) => (all.get_mut(table), key),
+            None => (Some(&mut all), name.as_str()),
+        };
+        let table = table.and_then(Value::as_object_mut);
+        table.ok_or_else(|| Error::input(format!("{name}: there is no such setting")))?.insert(key.to_owned(), value);
+    }
+    let config: SolverConfig =
+        serde_json::from_value(all).map_err(|e| Error::input(shorten(&e.to_string(), "the page lists all")))?;
+    config.check()?;
+    Ok(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        let message = config(text).expect_err("bad settings").to_string();
+        assert!(!message.contains('\n'), "{message}");
+        message
+    }
+
+    #[test]
+    fn settings_change_those_of_their_preset() {
+        let changed = config(r#"{"preset": "accurate", "relax": 2, "preload_rate": 2, "rules.manifold_passes": 3}"#);
+        let changed = changed.expect("settings");
+        assert_eq!((changed.substeps, changed.relax, changed.preload_rate), (32, 2, 2.0));
+        assert_eq!(changed.rules.manifold_passes, 3);
+        assert_eq!(config("{}").expect("none"), SolverConfig::default());
+    }
+
+    #[test]
+    fn bad_settings_are_refused_in_one_line() {
+        assert_eq!(refusal(r#"{"substeps": 0}"#), "substeps = 0: must be 1 to 4096");
+        for (text, named) in [
+            (r#"{"substep": 1}"#, "substep"),
+            (r#"{"preset": "best"}"#, "best"),
+            (r#"{"friction": "glue"}"#, "glue"),
+            (r#"{"rules.nothing": 1}"#, "nothing"),
+            (r#"{"substeps": "many"}"#, "many"),
+            (r#"{"substeps.x": 1}"#, "substeps"),
+            ("[]", "settings"),
+        ] {
+            assert!(refusal(text).contains(named), "{text}: {}", refusal(text));
+        }
+    }
+
+    #[test]
+    fn more_bodies_than_a_browser_holds_are_refused() {
+        assert!(scene("tower", &["n=3".into()]).is_ok());
+        let message = scene("pile", &["n=4000000".into()]).expect_err("too many").to_string();
+        assert_eq!(message, "pile: 4000000 bodies: must be at most 200000 in a browser");
+    }
+}

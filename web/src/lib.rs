@@ -1,0 +1,89 @@
+//! The page of drystone: what its JavaScript calls.
+
+mod choice;
+mod describe;
+mod maze;
+#[cfg(target_family = "wasm")]
+mod picture;
+mod show;
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use drystone::scenes::Spawners;
+use drystone::{Cpu, Result, Simulation, SolverConfig};
+use wasm_bindgen::prelude::*;
+
+/// A number that nothing else of the page has.
+fn next_number() -> u32 {
+    static LAST: AtomicU32 = AtomicU32::new(0);
+    LAST.fetch_add(1, Ordering::Relaxed) + 1
+}
+
+/// Lets a panic leave its message on the console of the browser; WebAssembly stops there.
+#[cfg(target_family = "wasm")]
+#[wasm_bindgen(start)]
+pub fn start() {
+    #[wasm_bindgen]
+    extern "C" {
+        #[wasm_bindgen(js_namespace = console)]
+        fn error(line: &str);
+    }
+    std::panic::set_hook(Box::new(|info| error(&info.to_string())));
+}
+
+/// An exception of JavaScript with the line of an error.
+fn thrown<T>(result: Result<T>) -> std::result::Result<T, JsError> {
+    result.map_err(|error| JsError::new(&error.to_string()))
+}
+
+/// The scenes of the catalogue as JSON.
+#[wasm_bindgen]
+pub fn catalogue() -> String {
+    describe::catalogue().to_string()
+}
+
+/// The presets and settings as JSON.
+#[wasm_bindgen]
+pub fn settings() -> String {
+    describe::settings().to_string()
+}
+
+/// The hash of all poses and velocities after some steps of a scene on the CPU, as `drystone run SCENE --json` prints it.
+#[wasm_bindgen]
+pub fn hash_after(scene: &str, parameters: Vec<String>, steps: u32) -> std::result::Result<String, JsError> {
+    thrown(hash_of(scene, &parameters, steps))
+}
+
+fn hash_of(scene: &str, parameters: &[String], steps: u32) -> Result<String> {
+    let scene = choice::scene(scene, parameters)?;
+    let mut spawners = Spawners::new(&scene);
+    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()))?;
+    for _ in 0..steps {
+        spawners.before_step(&mut simulation.world, scene.dt);
+        simulation.step(scene.dt)?;
+    }
+    Ok(format!("{:016x}", simulation.hash()))
+}
+
+/// A pile of boxes that is stepped to measure a device.
+#[wasm_bindgen]
+pub struct Pile {
+    simulation: Simulation,
+    dt: f32,
+}
+
+#[wasm_bindgen]
+impl Pile {
+    /// A pile of `boxes`.
+    #[wasm_bindgen(constructor)]
+    pub fn new(boxes: u32) -> std::result::Result<Pile, JsError> {
+        let scene = thrown(choice::scene("pile", &[format!("n={boxes}")]))?;
+        let simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()));
+        Ok(Self { simulation: thrown(simulation)?, dt: scene.dt })
+    }
+
+    /// Makes so many steps.
+    pub fn steps(&mut self, count: u32) -> std::result::Result<(), JsError> {
+        thrown((0..count).try_for_each(|_| self.simulation.step(self.dt).map(drop)))
+    }
+}
