@@ -1,4 +1,7 @@
 // A headless Chromium, and pages in it whose console is heard.
+/// WebGPU by SwiftShader. A canvas of WebGPU loses its device where the compositor is not on Vulkan too.
+export const WEBGPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
+
 /// What Chromium itself says where it has no adapter for WebGPU and a page asks for one.
 const NO_ADAPTER = /^No available adapters\.$|^Failed to create WebGPU Context Provider$/;
 
@@ -14,7 +17,7 @@ export class Browser {
     if (!this.running.has(webgpu)) {
       const { chromium } = await import("playwright-core");
       const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-      const args = ["--no-sandbox", ...(webgpu ? ["--enable-unsafe-webgpu"] : [])];
+      const args = ["--no-sandbox", ...(webgpu ? WEBGPU : ["--enable-unsafe-swiftshader"])];
       this.running.set(webgpu, await chromium.launch({ executablePath, args }));
     }
     return this.running.get(webgpu);

@@ -4,6 +4,8 @@ import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
+import { WEBGPU } from "./browser.mjs";
+
 export class Tabs {
   waiting = new Map();
   text = "";
@@ -11,7 +13,7 @@ export class Tabs {
   static async launch() {
     const tabs = new Tabs();
     tabs.folder = await mkdtemp(join(tmpdir(), "drystone-tabs-"));
-    const parameters = ["--headless", "--no-sandbox", "--enable-unsafe-webgpu", "--no-first-run", "--remote-debugging-pipe"];
+    const parameters = ["--headless", "--no-sandbox", ...WEBGPU, "--no-first-run", "--remote-debugging-pipe"];
     tabs.child = spawn(process.env.CHROMIUM ?? "/usr/bin/chromium", [...parameters, `--user-data-dir=${tabs.folder}`], {
       stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"],
     });
