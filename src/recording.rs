@@ -527,16 +527,51 @@ impl Replay {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn seek(&mut self, simulation: &mut Simulation, step: u32) -> Result<()> {
+        let step = self.near(simulation, step)?;
+        while self.step < step {
+            self.step(simulation)?;
+        }
+        Ok(())
+    }
+
+    /// As [`Self::seek`], for a page.
+    ///
+    /// ```
+    /// use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
+    ///
+    /// let mut world = World::new();
+    /// world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
+    /// recorder.step(&mut simulation, 0.01)?;
+    /// let after_one = simulation.hash();
+    /// recorder.step(&mut simulation, 0.01)?;
+    /// let mut replay = Replay::read(&recorder.finish(&mut simulation)?)?;
+    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// pollster::block_on(replay.seek_async(&mut again, 1))?;
+    /// assert_eq!((again.hash(), replay.step_number()), (after_one, 1));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Simulation::step_async`].
+    pub async fn seek_async(&mut self, simulation: &mut Simulation, step: u32) -> Result<()> {
+        let step = self.near(simulation, step)?;
+        while self.step < step {
+            self.step_async(simulation).await?;
+        }
+        Ok(())
+    }
+
+    /// Goes to the nearest state that the recording kept before a step, unless it is nearer by itself; gives the step, the last one at most.
+    fn near(&mut self, simulation: &mut Simulation, step: u32) -> Result<u32> {
         let step = step.min(self.len());
         let nearest = self.states.iter().rposition(|state| state.step <= step && !state.is_jump);
         let nearest = nearest.expect("a recording begins with a state");
         if step < self.step || self.states[nearest].step > self.step {
             self.load(simulation, nearest)?;
         }
-        while self.step < step {
-            self.step(simulation)?;
-        }
-        Ok(())
+        Ok(step)
     }
 
     /// Goes to a kept state.

@@ -29,9 +29,9 @@ const VIEW: &[&[&str]] = &[
     &["mesh", "overlay", "pipeline"],
     &["renderer"],
     &["canvas"],
-    &["film", "show"],
-    &["labyrinth", "live"],
-    &["live_show"],
+    &["show"],
+    &["labyrinth", "live", "sight"],
+    &["film", "live_show"],
 ];
 
 /// The modules of the command, above all others.

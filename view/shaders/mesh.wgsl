@@ -27,8 +27,8 @@ struct Fragment {
     @location(0) world: vec3f,
     @location(1) normal: vec3f,
     @location(2) local: vec3f,
-    @location(3) @interpolate(flat) color: vec4f,
-    @location(4) @interpolate(flat) pattern: u32,
+    @location(3) @interpolate(flat, either) color: vec4f,
+    @location(4) @interpolate(flat, either) pattern: u32,
 }
 
 fn turned(q: vec4f, v: vec3f) -> vec3f {

@@ -13,10 +13,11 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
+/// A texture that pictures are drawn to and read back from. A browser reads none back.
 pub struct Canvas {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    renderer: Renderer,
+    pub renderer: Renderer,
     size: (u32, u32),
     texture: wgpu::Texture,
     read_back: wgpu::Buffer,
@@ -25,8 +26,20 @@ pub struct Canvas {
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Canvas {
-    pub fn new(world: &World, (width, height): (u32, u32)) -> Result<Self> {
+    /// A canvas of width and height `size` (pixels) for the bodies of `world`, on the best adapter.
+    ///
+    /// # Errors
+    /// There is no adapter, or it cannot draw pictures of this size.
+    pub fn new(world: &World, size: (u32, u32)) -> Result<Self> {
         let (device, queue, _) = open_device(AdapterChoice::Best)?;
+        Self::on(device, queue, world, size)
+    }
+
+    /// The same on an open device.
+    ///
+    /// # Errors
+    /// It cannot draw pictures of this size.
+    pub fn on(device: wgpu::Device, queue: wgpu::Queue, world: &World, (width, height): (u32, u32)) -> Result<Self> {
         let most = device.limits().max_texture_dimension_2d;
         if width == 0 || height == 0 || width > most || height > most {
             return Err(Error::input(format!("a picture of {width}x{height}: each side must be 1 to {most} pixels")));
@@ -45,11 +58,6 @@ impl Canvas {
 
     pub fn aspect(&self) -> f32 {
         self.size.0 as f32 / self.size.1 as f32
-    }
-
-    /// Takes over bodies that came or went since the last picture.
-    pub fn follow(&mut self, world: &World) {
-        self.renderer.follow(world);
     }
 
     pub fn draw(&mut self, shot: &Shot) -> Result<Picture> {

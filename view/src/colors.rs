@@ -63,7 +63,7 @@ impl FromStr for ColorBy {
 /// A color as sRGB with an unused fourth byte.
 pub type Rgba = [u8; 4];
 
-const FIXED: Rgba = [176, 178, 182, 255];
+pub(crate) const FIXED: Rgba = [176, 178, 182, 255];
 const KINEMATIC: Rgba = [150, 160, 178, 255];
 const NOTHING: Rgba = [222, 222, 218, 255];
 const ASLEEP: Rgba = [74, 92, 128, 255];

@@ -6,13 +6,15 @@ use crate::bounds::Bounds;
 use crate::camera::Camera;
 use crate::canvas::{Canvas, Picture};
 use crate::colors::ColorBy;
+use crate::labyrinth;
 use crate::overlay::ropes;
 use crate::poses::poses;
 use crate::renderer::Shot;
 use drystone::{Result, Scene, Simulation, World};
+use drystone_maze::Map;
 
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct Moment {
     /// Time since the start (s).
     pub time: f64,
     pub poses: Vec<(Vec3, Quat)>,
@@ -32,7 +34,7 @@ pub struct Look {
 pub struct Film {
     scene: Scene,
     color: ColorBy,
-    frames: Vec<Frame>,
+    frames: Vec<Moment>,
 }
 
 impl Film {
@@ -44,12 +46,12 @@ impl Film {
         let values = self.color.values(simulation);
         let comes_and_goes = !(self.scene.spawners.is_empty() && self.scene.leaving.is_empty());
         let world = comes_and_goes.then(|| simulation.world.clone());
-        self.frames.push(Frame { time, poses: poses(&simulation.world), values, world });
+        self.frames.push(Moment { time, poses: poses(&simulation.world), values, world });
     }
 
     /// Adds a world without contacts and sleep.
     pub fn add_world(&mut self, time: f64, world: &World) {
-        self.frames.push(Frame {
+        self.frames.push(Moment {
             time,
             poses: poses(world),
             values: self.color.values_of(world, &[], &[]),
@@ -57,7 +59,7 @@ impl Film {
         });
     }
 
-    pub fn frames(&self) -> &[Frame] {
+    pub fn frames(&self) -> &[Moment] {
         &self.frames
     }
 
@@ -68,7 +70,7 @@ impl Film {
     }
 
     pub fn bounds(&self) -> Bounds {
-        let of = |frame: &Frame| Bounds::at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
+        let of = |frame: &Moment| Bounds::at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
         self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(of(frame)))
     }
 
@@ -86,7 +88,7 @@ impl Film {
         let container = self.scene.container.map(|(low, high)| Bounds { low, high });
         for frame in &self.frames {
             let world = frame.world.as_ref().unwrap_or(world);
-            canvas.follow(world);
+            canvas.renderer.follow(world);
             let colors = self.color.paint(world, &frame.values, scale);
             let ropes = ropes(world, &frame.poses);
             let shot = Shot { poses: &frame.poses, colors: &colors, camera: &camera, bounds, container, lines: &ropes };
@@ -100,4 +102,20 @@ impl Film {
 pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(all);
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)
+}
+
+/// Draws a game of the maze at some poses of its bodies.
+pub fn draw_game(
+    canvas: &mut Canvas,
+    map: &Map,
+    world: &World,
+    frames: &[Vec<(Vec3, Quat)>],
+    mut show: impl FnMut(&Picture) -> Result<()>,
+) -> Result<()> {
+    let (colors, camera, bounds) =
+        (labyrinth::colors(world), labyrinth::camera_of(map, canvas.aspect()), labyrinth::bounds_of(map));
+    frames.iter().try_for_each(|poses| {
+        let shot = Shot { poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
+        show(&canvas.draw(&shot)?)
+    })
 }

@@ -1,13 +1,11 @@
 //! The maze game: arrow keys or the pointer tilt the board, R restarts the game.
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
-use crate::canvas::{Canvas, Picture};
 use crate::colors::Rgba;
-use crate::renderer::Shot;
-use crate::show::{Key, Pointer, Show};
+use crate::show::{Key, Passing, Pointer, Show};
 use drystone::backend::{BackendChoice, choose};
 use drystone::{Result, SolverConfig, World};
 use drystone_maze::{BALL, BOARD, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
@@ -19,34 +17,20 @@ const BALL_COLOR: Rgba = [206, 210, 218, 255];
 /// Largest number of steps before a picture: a tenth of a second.
 const MOST_STEPS: f32 = 12.0;
 
-fn colors(world: &World) -> Vec<Rgba> {
+pub(crate) fn colors(world: &World) -> Vec<Rgba> {
     let mut colors = vec![WALL_COLOR; world.bodies.len()];
     (colors[BOARD], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
     colors
 }
 
 /// The bounds of the board with its rim at any tilt.
-fn bounds_of(map: &Map) -> Bounds {
+pub(crate) fn bounds_of(map: &Map) -> Bounds {
     let half = 0.5 * CELL * Vec3::new(map.columns as f32 + 3.0, 1.0, map.rows as f32 + 3.0);
     Bounds { low: -half, high: half }
 }
 
-fn camera_for(map: &Map, aspect: f32) -> Camera {
+pub(crate) fn camera_of(map: &Map, aspect: f32) -> Camera {
     Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
-}
-
-pub fn draw_game(
-    canvas: &mut Canvas,
-    map: &Map,
-    world: &World,
-    frames: &[Vec<(Vec3, Quat)>],
-    mut show: impl FnMut(&Picture) -> Result<()>,
-) -> Result<()> {
-    let (colors, camera, bounds) = (colors(world), camera_for(map, canvas.aspect()), bounds_of(map));
-    frames.iter().try_for_each(|poses| {
-        let shot = Shot { poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
-        show(&canvas.draw(&shot)?)
-    })
 }
 
 /// The maze game as it is played.
@@ -62,6 +46,8 @@ pub struct Labyrinth {
     /// Whether the board was tilted; the clock waits for it.
     pub begun: bool,
     owed: f32,
+    /// Whether the next advance begins a new game.
+    again: bool,
     /// Shortest time of a game that was won (s).
     pub best: Option<f32>,
 }
@@ -70,7 +56,7 @@ impl Labyrinth {
     pub fn new(map: Map, config: SolverConfig, backend: BackendChoice) -> Result<Self> {
         let game = Game::new(map.clone(), config.clone(), choose(backend, 1, false)?.0)?;
         let held = [false; 4];
-        Ok(Self { game, map, config, backend, held, held_at: None, begun: false, owed: 0.0, best: None })
+        Ok(Self { game, map, config, backend, held, held_at: None, begun: false, owed: 0.0, again: false, best: None })
     }
 
     fn restart(&mut self) -> Result<()> {
@@ -86,6 +72,26 @@ impl Labyrinth {
             Some(at) => [at.x, -at.y].map(|x| (1.5 * x).clamp(-1.0, 1.0) * TILT_LIMIT),
             None => [arrow(0, 1), arrow(2, 3)].map(|x| x * TILT_LIMIT),
         }
+    }
+
+    /// Lets the time pass, as [`Show::advance`], and waits for the steps.
+    pub fn pass(&mut self, seconds: f32) -> Result<()> {
+        if self.again {
+            self.restart()?;
+        }
+        let wanted = self.wanted();
+        self.begun |= wanted != [0.0; 2];
+        let dt = self.game.dt();
+        self.owed = (self.owed + seconds).min(MOST_STEPS * dt);
+        while self.begun && self.owed >= dt {
+            self.game.step(wanted)?;
+            self.owed -= dt;
+        }
+        if self.game.outcome == Some(Outcome::Goal) {
+            let time = self.game.time();
+            self.best = Some(self.best.map_or(time, |best| best.min(time)));
+        }
+        Ok(())
     }
 }
 
@@ -103,35 +109,23 @@ impl Show for Labyrinth {
     }
 
     fn camera(&self, aspect: f32) -> Camera {
-        camera_for(&self.map, aspect)
+        camera_of(&self.map, aspect)
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
         colors(self.world())
     }
 
-    fn advance(&mut self, seconds: f32) -> Result<()> {
-        let wanted = self.wanted();
-        self.begun |= wanted != [0.0; 2];
-        let dt = self.game.dt();
-        self.owed = (self.owed + seconds).min(MOST_STEPS * dt);
-        while self.begun && self.owed >= dt {
-            self.game.step(wanted)?;
-            self.owed -= dt;
-        }
-        if self.game.outcome == Some(Outcome::Goal) {
-            let time = self.game.time();
-            self.best = Some(self.best.map_or(time, |best| best.min(time)));
-        }
-        Ok(())
+    fn advance(&mut self, seconds: f32) -> Passing<'_> {
+        Box::pin(std::future::ready(self.pass(seconds)))
     }
 
-    fn key(&mut self, key: Key, down: bool) -> Result<()> {
+    fn key(&mut self, key: Key, down: bool) {
         let arrows = [Key::Left, Key::Right, Key::Up, Key::Down];
         if let Some(arrow) = arrows.iter().position(|a| *a == key) {
             self.held[arrow] = down;
         }
-        if key == Key::Character('r') && down { self.restart() } else { Ok(()) }
+        self.again |= key == Key::Character('r') && down;
     }
 
     fn grab(&mut self, pointer: &Pointer) -> bool {
@@ -160,15 +154,16 @@ mod tests {
     #[test]
     fn the_clock_waits_for_the_first_tilt_and_arrows_roll_the_ball() {
         let mut game = labyrinth();
-        game.advance(0.5).expect("time");
+        game.pass(0.5).expect("time");
         assert_eq!(game.game.time(), 0.0);
         let start = game.game.ball();
-        game.key(Key::Right, true).expect("a key");
-        (0..30).for_each(|_| game.advance(1.0 / 60.0).expect("time"));
+        game.key(Key::Right, true);
+        (0..30).for_each(|_| game.pass(1.0 / 60.0).expect("time"));
         assert!(game.game.ball().x > start.x + 0.03, "{} m", game.game.ball().x - start.x);
-        game.key(Key::Right, false).expect("a key");
+        game.key(Key::Right, false);
         assert_eq!(game.wanted(), [0.0, 0.0]);
-        game.key(Key::Character('r'), true).expect("a key");
+        game.key(Key::Character('r'), true);
+        game.pass(0.0).expect("time");
         assert_eq!((game.game.time(), game.game.ball()), (0.0, start));
     }
 

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use glam::Vec3;
+use web_time::Instant;
 
 use crate::bounds::Bounds;
 use crate::colors::ColorBy;
@@ -12,11 +13,14 @@ use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
 use drystone::scenes::Spawners;
 use drystone::{
-    Body, BodyKind, JointHandle, Reference, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig, StepStats,
+    Backend, Body, BodyKind, JointHandle, Reference, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig,
+    StepStats,
 };
 
 /// Rate at which a pulled body approaches the pointer (1/s): soft at any stiffness of joints.
 const PULL: f32 = 10.0;
+/// Longest time of the steps before a picture, unless drawing takes longer.
+const PATIENCE: Duration = Duration::from_millis(30);
 /// Speed of a thrown cube over the radius of the scene (1/s).
 const THROW: f32 = 2.0;
 
@@ -45,6 +49,8 @@ pub struct Live {
     pub stage_ms: [f64; 5],
     /// Why the last change of settings or backend was refused, in one line.
     pub refused: Option<String>,
+    /// What the next advance begins with.
+    pub(crate) orders: Vec<Order>,
     pub(crate) owed: f32,
     /// Time of the steps before the last picture.
     pub(crate) stepping: Duration,
@@ -69,6 +75,17 @@ pub(crate) struct Grabbed {
     pub(crate) joint: JointHandle,
 }
 
+/// What a key or a button asks for, and the next advance carries out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// One step, in a pause.
+    Step,
+    /// The state at the start.
+    Restart,
+    /// So many seconds forth or back in a recording.
+    Seek(f64),
+}
+
 /// The scene of a recording, whose simulation has begun.
 pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
     let mut scene = Scene::new(replay.title(), simulation.world.clone(), replay.len());
@@ -83,24 +100,41 @@ pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
 pub(crate) type Kept = (Snapshot, Spawners, u32);
 
 impl Live {
-    /// A recording that runs again.
-    pub fn of_recording(mut replay: Replay, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
-        let simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
-        let scene = scene_of(&replay, &simulation);
-        let mut live = Self::new(scene, simulation.config().clone(), choice, exact, color)?;
-        live.simulation = simulation;
-        live.set_backend(choice);
-        live.replay = Some(replay);
-        Ok(live)
-    }
-
+    /// A scene on the backend that was asked for; `exact` asks a GPU for the reference's bits.
+    ///
+    /// # Errors
+    /// Those of [`choose`], bad settings, or a scene that does not fit in memory.
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
-        Ok(Self {
+        Ok(Self { choice, exact, ..Self::of(scene, simulation, color) })
+    }
+
+    /// A scene on `backend`, which a page opens by itself.
+    ///
+    /// # Errors
+    /// Bad settings, or a scene that does not fit in memory.
+    pub fn with(scene: Scene, config: SolverConfig, backend: Box<dyn Backend>, color: ColorBy) -> Result<Self> {
+        let simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        Ok(Self::of(scene, simulation, color))
+    }
+
+    /// A recording that runs again.
+    ///
+    /// # Errors
+    /// Those of [`choose`], or a damaged recording.
+    pub fn of_recording(mut replay: Replay, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
+        let mut simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
+        let scene = scene_of(&replay, &simulation);
+        simulation.set_backend(choose(choice, scene.world.dynamic_count(), exact)?.0);
+        Ok(Self { choice, exact, replay: Some(replay), ..Self::of(scene, simulation, color) })
+    }
+
+    fn of(scene: Scene, simulation: Simulation, color: ColorBy) -> Self {
+        Self {
             bounds: Bounds::of(&scene.world),
-            exact,
-            choice,
+            exact: false,
+            choice: BackendChoice::default(),
             simulation,
             spawners: Spawners::new(&scene),
             color,
@@ -113,6 +147,7 @@ impl Live {
             stats: StepStats::default(),
             stage_ms: [0.0; 5],
             refused: None,
+            orders: Vec::new(),
             owed: 0.0,
             stepping: Duration::ZERO,
             grabbed: None,
@@ -121,7 +156,7 @@ impl Live {
             pointer: None,
             light_end: 0.0,
             scene,
-        })
+        }
     }
 
     /// The scene as it began.
@@ -133,7 +168,9 @@ impl Live {
     pub fn scene_now(&self) -> Scene {
         let (spawners, leaving) = self.spawners.remaining(self.scene.dt);
         let mut world = self.simulation.world.clone();
-        self.grabbed.iter().for_each(|grabbed| drop(world.remove_joint(grabbed.joint)));
+        if let Some(grabbed) = &self.grabbed {
+            world.remove_joint(grabbed.joint);
+        }
         Scene { world, spawners, leaving, ..self.scene.clone() }
     }
 
@@ -147,12 +184,28 @@ impl Live {
         self.steps as f32 * self.scene.dt
     }
 
-    pub fn restart(&mut self) -> Result<()> {
-        if self.replay.is_some() {
-            return self.seek(-f64::INFINITY);
+    /// Notes what the next advance begins with.
+    pub fn order(&mut self, order: Order) {
+        self.paused |= order == Order::Step;
+        self.orders.push(order);
+    }
+
+    /// Carries out what was noted.
+    async fn obey(&mut self) -> Result<()> {
+        for order in std::mem::take(&mut self.orders) {
+            match order {
+                Order::Step => self.step_async().await?,
+                Order::Restart if self.replay.is_none() => self.restart()?,
+                Order::Restart => self.seek(f64::NEG_INFINITY).await?,
+                Order::Seek(seconds) => self.seek(seconds).await?,
+            }
         }
+        Ok(())
+    }
+
+    fn restart(&mut self) -> Result<()> {
         let config = self.simulation.config().clone();
-        let (backend, _) = choose(self.choice, self.scene.world.dynamic_count(), self.exact)?;
+        let backend = self.simulation.set_backend(Box::new(Reference::<f32>::new()));
         self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
         self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
@@ -174,10 +227,10 @@ impl Live {
     }
 
     /// Goes so many seconds forth or back in a recording.
-    pub fn seek(&mut self, seconds: f64) -> Result<()> {
+    async fn seek(&mut self, seconds: f64) -> Result<()> {
         if let Some(replay) = &mut self.replay {
             let step = (f64::from(self.steps) + seconds / f64::from(self.scene.dt)).round().max(0.0);
-            replay.seek(&mut self.simulation, step as u32)?;
+            replay.seek_async(&mut self.simulation, step as u32).await?;
             (self.steps, self.owed) = (replay.step_number(), 0.0);
         }
         Ok(())
@@ -215,33 +268,46 @@ impl Live {
         }
     }
 
-    pub fn set_config(&mut self, config: SolverConfig) {
-        self.refused = self.simulation.set_config(config).err().map(|e| e.to_string());
-    }
-
-    pub fn set_backend(&mut self, choice: BackendChoice) {
-        match choose(choice, self.scene.world.dynamic_count(), self.exact) {
-            Ok((backend, _)) => {
-                self.simulation.set_backend(backend);
-                (self.choice, self.refused) = (choice, None);
-            }
-            Err(e) => self.refused = Some(e.to_string()),
-        }
-    }
-
-    pub fn step(&mut self) -> Result<()> {
-        let stats = match &mut self.replay {
-            Some(replay) => replay.step(&mut self.simulation)?,
-            None => {
-                self.before_step();
-                Some(self.simulation.step(self.scene.dt)?)
-            }
-        };
-        self.note(stats);
+    /// Goes on with another backend, without its warm memory of the last step.
+    ///
+    /// # Errors
+    /// Those of [`choose`].
+    pub fn set_backend(&mut self, choice: BackendChoice) -> Result<()> {
+        let (backend, _) = choose(choice, self.scene.world.dynamic_count(), self.exact)?;
+        self.simulation.set_backend(backend);
+        self.choice = choice;
         Ok(())
     }
 
-    /// As [`Self::step`], for a page, which cannot wait for a device.
+    /// Lets the time pass at the speed that was asked for, with as many steps as the time allows between two pictures.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub async fn advance_async(&mut self, seconds: f32) -> Result<()> {
+        let began = Instant::now();
+        self.obey().await?;
+        let before = self.time();
+        let drawing = Duration::from_secs_f32(seconds).saturating_sub(self.stepping);
+        if !self.paused {
+            self.owed += seconds * self.speed;
+            while self.owed >= self.scene.dt && began.elapsed() < PATIENCE.max(drawing) {
+                self.step_async().await?;
+                self.owed -= self.scene.dt;
+            }
+            // A simulation that is too slow for real time does not accumulate steps.
+            self.owed = self.owed.min(2.0 * self.scene.dt);
+        }
+        self.stepping = began.elapsed();
+        self.pictures += (2.0 * seconds).min(1.0) * (1.0 / seconds.max(1e-4) - self.pictures);
+        let reached = (self.time() - before) / seconds.max(1e-4);
+        self.reached += (2.0 * seconds).min(1.0) * (reached - self.reached);
+        Ok(())
+    }
+
+    /// Makes one step. A page awaits it; elsewhere it ends before the first wait.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
     pub async fn step_async(&mut self) -> Result<()> {
         let stats = match &mut self.replay {
             Some(replay) => replay.step_async(&mut self.simulation).await?,
@@ -302,24 +368,49 @@ mod tests {
         Live::new(scene, SolverConfig::default(), BackendChoice::Reference, false, ColorBy::Batch).expect("a scene")
     }
 
+    fn advance(live: &mut Live, seconds: f32) {
+        pollster::block_on(live.advance(seconds)).expect("time");
+    }
+
+    fn step(live: &mut Live) {
+        pollster::block_on(live.step_async()).expect("a step");
+    }
+
+    /// A key, and the time in which it is obeyed.
     fn press(live: &mut Live, key: &str) {
-        live.key(Key::named(key).expect("a key"), true).expect("a key");
+        live.key(Key::named(key).expect("a key"), true);
+        advance(live, 0.0);
     }
 
     #[test]
     fn time_passes_at_the_requested_speed_and_stops_in_a_pause() {
         let mut live = live("tower");
-        (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
+        (0..6).for_each(|_| advance(&mut live, 1.0 / 60.0 + 1e-6));
         assert_eq!(live.steps, 6);
         press(&mut live, "-");
-        (0..6).for_each(|_| live.advance(1.0 / 60.0 + 1e-6).expect("time"));
+        (0..6).for_each(|_| advance(&mut live, 1.0 / 60.0 + 1e-6));
         assert_eq!(live.steps, 9);
         press(&mut live, " ");
-        live.advance(0.1).expect("time");
+        advance(&mut live, 0.1);
         press(&mut live, "n");
         assert_eq!(live.steps, 10);
         press(&mut live, "r");
         assert_eq!((live.steps, live.world().bodies[1].position.y), (0, 0.5));
+    }
+
+    #[test]
+    fn a_key_makes_no_step_before_time_passes() {
+        let mut live = live("tower");
+        live.key(Key::Character('n'), true);
+        live.key(Key::Character('n'), true);
+        assert_eq!((live.steps, live.paused), (0, true));
+        advance(&mut live, 0.1);
+        assert_eq!(live.steps, 2);
+        advance(&mut live, 0.1);
+        assert_eq!(live.steps, 2);
+        live.order(Order::Restart);
+        advance(&mut live, 0.0);
+        assert_eq!((live.steps, live.simulation.backend().name()), (0, "reference"));
     }
 
     #[test]
@@ -336,11 +427,11 @@ mod tests {
         assert!(live.grab(&pointer(place.truncate())));
         let before = live.world().bodies[top].position;
         live.drag(&pointer(place.truncate() + Vec2::new(0.0, 0.3)));
-        (0..40).for_each(|_| live.step().expect("a step"));
+        (0..40).for_each(|_| step(&mut live));
         assert!(live.world().bodies[top].position.y > before.y + 0.5, "it is lifted");
         assert!(live.world().joints.len() == 1 && !live.lines().is_empty());
         live.release();
-        (0..60).for_each(|_| live.step().expect("a step"));
+        (0..60).for_each(|_| step(&mut live));
         assert!(live.world().joints.is_empty() && live.world().bodies[top].position.y < before.y + 0.5, "it falls");
     }
 
@@ -357,14 +448,14 @@ mod tests {
             Pointer { at, origin, direction }
         };
         assert!(live.grab(&above(&live, top)));
-        live.step().expect("a step");
+        step(&mut live);
         press(&mut live, " ");
         live.release();
         assert!(live.grab(&above(&live, top - 3)));
         let grabbed = live.grabbed.as_ref().expect("a body").body;
         assert_eq!(grabbed, top - 3);
         for _ in 0..30 {
-            live.step().expect("a step");
+            step(&mut live);
             let world = live.world();
             assert!(world.joint_gap() < 0.05, "{} m", world.joint_gap());
             assert!((world.bodies[top].position.x.abs()).max(world.bodies[top].position.z.abs()) < 0.05);
@@ -374,25 +465,25 @@ mod tests {
     #[test]
     fn settings_and_backend_change_during_a_run_and_bad_settings_are_refused() {
         let mut live = live("tower");
-        live.step().expect("a step");
-        live.set_config(SolverConfig::default().with(|c| c.substeps = 3));
-        live.set_backend(BackendChoice::Cpu);
-        live.step().expect("a step");
+        step(&mut live);
+        live.simulation.set_config(SolverConfig::default().with(|c| c.substeps = 3)).expect("settings");
+        live.set_backend(BackendChoice::Cpu).expect("a backend");
+        step(&mut live);
         assert_eq!((live.simulation.config().substeps, live.simulation.backend().name()), (3, "cpu"));
-        live.set_config(SolverConfig::default().with(|c| c.substeps = 0));
-        assert!(live.refused.as_ref().is_some_and(|e| e.contains("substeps")));
+        let refused = live.simulation.set_config(SolverConfig::default().with(|c| c.substeps = 0)).expect_err("bad");
+        assert!(refused.to_string().contains("substeps"));
         assert_eq!(live.simulation.config().substeps, 3);
     }
 
     #[test]
     fn a_kept_state_comes_back_with_its_bodies() {
         let mut live = live("tower");
-        (0..5).for_each(|_| live.step().expect("a step"));
+        (0..5).for_each(|_| step(&mut live));
         let (hash, bodies) = (live.simulation.hash(), live.world().bodies.count());
         press(&mut live, "s");
         let top = live.world().bodies.handle(bodies - 1).expect("a cube");
         live.simulation.world.remove(top);
-        (0..5).for_each(|_| live.step().expect("a step"));
+        (0..5).for_each(|_| step(&mut live));
         press(&mut live, "l");
         assert_eq!((live.steps, live.simulation.hash(), live.world().bodies.count()), (5, hash, bodies));
     }
@@ -416,12 +507,12 @@ mod tests {
         let Bounds { low, high } = live.container().expect("bodies");
         let is_inside = |at: Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
         assert!(live.world().dynamic().all(|body| is_inside(body.position)));
-        (0..70).for_each(|_| live.step().expect("a step"));
+        (0..70).for_each(|_| step(&mut live));
         press(&mut live, "ArrowLeft");
         assert_eq!((live.steps, live.simulation.hash()), (10, hashes[9]));
         press(&mut live, "ArrowRight");
         assert_eq!((live.steps, live.simulation.hash()), (70, hashes[69]));
-        (0..30).for_each(|_| live.step().expect("a step"));
+        (0..30).for_each(|_| step(&mut live));
         assert_eq!((live.steps, live.paused, live.simulation.hash()), (90, true, hashes[89]));
     }
 }

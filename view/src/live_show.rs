@@ -1,19 +1,14 @@
 //! Picture, keys and pointer of a live scene.
 
-use std::time::{Duration, Instant};
-
 use glam::Vec3;
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
 use crate::colors::Rgba;
-use crate::live::{Grabbed, Live};
+use crate::live::{Grabbed, Live, Order};
 use crate::overlay::{LineEnd, Overlay, lines};
-use crate::show::{Key, Pointer, Show};
-use drystone::{Joint, Result, World};
-
-/// Longest time of the steps before a picture, unless drawing takes longer.
-const PATIENCE: Duration = Duration::from_millis(30);
+use crate::show::{Key, Passing, Pointer, Show};
+use drystone::{Joint, World};
 
 impl Show for Live {
     fn title(&self) -> String {
@@ -36,7 +31,7 @@ impl Show for Live {
 
     fn camera(&self, aspect: f32) -> Camera {
         let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
-        Camera::framing(&self.bounds, up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
+        Camera::framing(&self.bounds(), up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
@@ -54,47 +49,28 @@ impl Show for Live {
         lines(&mut self.simulation, overlay, size)
     }
 
-    fn advance(&mut self, seconds: f32) -> Result<()> {
-        let began = Instant::now();
-        let before = self.time();
-        let drawing = Duration::from_secs_f32(seconds).saturating_sub(self.stepping);
-        if !self.paused {
-            self.owed += seconds * self.speed;
-            while self.owed >= self.scene.dt && began.elapsed() < PATIENCE.max(drawing) {
-                self.step()?;
-                self.owed -= self.scene.dt;
-            }
-            // A simulation that is too slow for real time does not accumulate steps.
-            self.owed = self.owed.min(2.0 * self.scene.dt);
-        }
-        self.stepping = began.elapsed();
-        self.pictures += (2.0 * seconds).min(1.0) * (1.0 / seconds.max(1e-4) - self.pictures);
-        let reached = (self.time() - before) / seconds.max(1e-4);
-        self.reached += (2.0 * seconds).min(1.0) * (reached - self.reached);
-        Ok(())
+    fn advance(&mut self, seconds: f32) -> Passing<'_> {
+        Box::pin(self.advance_async(seconds))
     }
 
     fn point(&mut self, pointer: &Pointer) {
         self.pointer = Some(*pointer);
     }
 
-    fn key(&mut self, key: Key, down: bool) -> Result<()> {
+    fn key(&mut self, key: Key, down: bool) {
         if !down {
-            return Ok(());
+            return;
         }
         match key {
             Key::Character(' ') => self.paused = !self.paused,
-            Key::Character('n') => {
-                self.paused = true;
-                self.step()?;
-            }
-            Key::Character('r') => self.restart()?,
+            Key::Character('n') => self.order(Order::Step),
+            Key::Character('r') => self.order(Order::Restart),
             Key::Character('b') => self.throw(),
             Key::Character('x') | Key::Delete => self.delete(),
             Key::Character('s') => self.keep(),
             Key::Character('l') => self.go_back(),
-            Key::Left => self.seek(-1.0)?,
-            Key::Right => self.seek(1.0)?,
+            Key::Left => self.order(Order::Seek(-1.0)),
+            Key::Right => self.order(Order::Seek(1.0)),
             Key::Character('c') => self.color = self.color.next(),
             Key::Character('1') => self.overlay.contacts = !self.overlay.contacts,
             Key::Character('2') => self.overlay.joints = !self.overlay.joints,
@@ -103,7 +79,6 @@ impl Show for Live {
             Key::Character('-') => self.speed = (self.speed / 2.0).max(1.0 / 64.0),
             _ => {}
         }
-        Ok(())
     }
 
     fn grab(&mut self, pointer: &Pointer) -> bool {

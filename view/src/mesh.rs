@@ -40,6 +40,14 @@ const SENSOR_COLOR: [u8; 4] = [40, 110, 220, 255];
 /// Cosine of the largest angle between faces of a smooth surface, 35 degrees.
 const SMOOTH: f32 = 0.82;
 
+/// What half-spaces look like: squares around `middle` of half side `reach` (m).
+pub struct Ground {
+    pub middle: Vec3,
+    pub reach: f32,
+    /// The color of half-spaces that are fixed.
+    pub color: [u8; 4],
+}
+
 struct Part {
     body: usize,
     position: Vec3,
@@ -48,6 +56,8 @@ struct Part {
     pattern: u32,
     /// Outward normal of a half-space.
     plane: Option<Vec3>,
+    /// Whether it is a half-space of a fixed body.
+    is_ground: bool,
     /// A collider of a body that is not dynamic; it can hide dynamic bodies.
     screen: Option<Collider>,
 }
@@ -85,7 +95,8 @@ impl Meshes {
                 };
                 let screen = (body.kind != BodyKind::Dynamic && plane.is_none()).then(|| collider.clone());
                 let (position, rotation) = (collider.position, collider.rotation);
-                let part = Part { body: i, position, rotation, scale, pattern, plane, screen };
+                let is_ground = body.kind == BodyKind::Fixed && plane.is_some();
+                let part = Part { body: i, position, rotation, scale, pattern, plane, is_ground, screen };
                 // Bodies of one shape often follow each other: the search begins at the end.
                 match known.iter().rposition(|k| k.is_same(shape)) {
                     Some(group) => meshes.groups[group].parts.push(part),
@@ -111,13 +122,12 @@ impl Meshes {
         })
     }
 
-    /// An instance for each collider, in the order of [`Meshes::draws`]. A half-space is a square of half side `reach` around `middle`.
-    /// Colliders of bodies that are not dynamic vanish if their bounds are `hidden`.
+    /// An instance for each collider, in the order of [`Meshes::draws`]. Colliders of bodies that are not dynamic vanish if their bounds are `hidden`.
     pub fn instances(
         &self,
         poses: &Poses,
         colors: &[[u8; 4]],
-        (middle, reach): (Vec3, f32),
+        ground: &Ground,
         hidden: impl Fn(&Bounds) -> bool,
     ) -> Vec<Instance> {
         let instance = |part: &Part| {
@@ -127,8 +137,8 @@ impl Meshes {
             let mut scale = part.scale;
             if let Some(normal) = part.plane {
                 let normal = turn * normal;
-                center = middle - normal * normal.dot(middle - center);
-                scale = Vec3::splat(reach);
+                center = ground.middle - normal * normal.dot(ground.middle - center);
+                scale = Vec3::splat(ground.reach);
             }
             if let Some(collider) = &part.screen {
                 let (low, high) = collider.bounds(position, rotation);
@@ -136,7 +146,11 @@ impl Meshes {
             }
             Instance {
                 position: center.to_array(),
-                color: if part.pattern == SENSOR { SENSOR_COLOR } else { colors[part.body] },
+                color: match part.pattern {
+                    SENSOR => SENSOR_COLOR,
+                    _ if part.is_ground => ground.color,
+                    _ => colors[part.body],
+                },
                 rotation: turn.to_array(),
                 scale: scale.to_array(),
                 pattern: part.pattern,

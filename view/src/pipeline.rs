@@ -1,5 +1,6 @@
 //! Textures, bindings and pipelines of the renderer.
 
+/// How finely pictures are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quality {
     /// Samples per pixel, 1 or 4.
@@ -14,6 +15,11 @@ impl Quality {
     pub const FINE: Self = Self { samples: 4, shadow_size: 2048, shadow_reach: 1 };
     /// For windows on a software adapter.
     pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
+
+    /// What the adapter draws in time.
+    pub fn of(adapter: &wgpu::Adapter) -> Self {
+        if adapter.get_info().device_type == wgpu::DeviceType::Cpu { Self::FAST } else { Self::FINE }
+    }
 }
 
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;

@@ -8,15 +8,34 @@ use wgpu::util::DeviceExt;
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
-use crate::colors::Rgba;
-use crate::mesh::{Instance, Meshes, Vertex};
+use crate::colors::{FIXED, Rgba};
+use crate::mesh::{Ground, Instance, Meshes, Vertex};
 use crate::overlay::LineEnd;
 use crate::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, pipeline, texture};
 use crate::poses::Poses;
 use drystone::{BodyHandle, World};
 
-/// The background of a new renderer.
-const BACKGROUND: [f32; 3] = [0.93, 0.94, 0.96];
+/// The colors of what is no body that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shades {
+    /// Behind all bodies; the ground fades into it (sRGB, 0 to 1).
+    pub background: [f32; 3],
+    /// The ground: half-spaces that are fixed.
+    pub ground: Rgba,
+}
+
+impl Shades {
+    /// Dark bodies before a light background.
+    pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED };
+    /// Light bodies before a dark background.
+    pub const DARK: Self = Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255] };
+
+    /// A background of the caller with the ground of the light or the dark shades.
+    pub fn before(background: [f32; 3]) -> Self {
+        let is_dark = background.iter().sum::<f32>() < 1.5;
+        Self { background, ..if is_dark { Self::DARK } else { Self::LIGHT } }
+    }
+}
 
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
@@ -41,7 +60,9 @@ struct View {
     background: [f32; 4],
 }
 
+/// Draws the bodies of a world.
 pub struct Renderer {
+    pub shades: Shades,
     device: wgpu::Device,
     queue: wgpu::Queue,
     meshes: Meshes,
@@ -57,8 +78,6 @@ pub struct Renderer {
     lines: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
     quality: Quality,
-    /// The color behind the bodies, into which the ground fades (sRGB, 0 to 1).
-    pub background: [f32; 3],
     /// Textures of the size of the picture: depth, and color with several samples.
     targets: Option<Targets>,
 }
@@ -137,6 +156,7 @@ impl Renderer {
             bodies: make(&main_layout, &mesh, "transform", Some("shade"), &rows, TriangleList, Less),
             // Contacts lie inside bodies; lines are drawn on top.
             lines: make(&shadow_layout, &line, "end_of_line", Some("paint_line"), &ends, LineList, Always),
+            shades: Shades::LIGHT,
             device: device.clone(),
             queue: queue.clone(),
             meshes,
@@ -148,7 +168,6 @@ impl Renderer {
             main_group,
             format,
             quality,
-            background: BACKGROUND,
             targets: None,
         }
     }
@@ -160,7 +179,7 @@ impl Renderer {
         }
     }
 
-    /// Takes over the bodies of another world.
+    /// Takes over the bodies of another world, or of one in which shapes changed.
     pub fn replace(&mut self, world: &World) {
         self.meshes = Meshes::new(world);
         self.drawn = world.bodies.handles().collect();
@@ -173,8 +192,9 @@ impl Renderer {
         let eye = shot.camera.eye();
         let container = shot.container.filter(|c| c.low.is_finite() && c.high.is_finite());
         let hidden = |b: &Bounds| container.is_some_and(|c| stands_before(b, &c, eye));
-        let ground = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
-        let instances = self.meshes.instances(shot.poses, shot.colors, ground, hidden);
+        let (middle, reach) = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
+        let ground = Ground { middle, reach, color: self.shades.ground };
+        let instances = self.meshes.instances(shot.poses, shot.colors, &ground, hidden);
         let buffer = |bytes: &[u8]| {
             let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
             let usage = wgpu::BufferUsages::VERTEX;
@@ -205,7 +225,7 @@ impl Renderer {
             });
             draw_bodies(&mut pass, &self.shadow, &self.shadow_group);
         }
-        let [r, g, b] = self.background.map(f64::from);
+        let [r, g, b] = self.shades.background.map(f64::from);
         let attachment = wgpu::RenderPassColorAttachment {
             view: color.as_ref().unwrap_or(target),
             depth_slice: None,
@@ -250,7 +270,7 @@ impl Renderer {
             light: light.extend(2.0 * radius / self.quality.shadow_size as f32).to_array(),
             // The side of the squares on the ground is a power of ten (m).
             up: camera.up.extend(10.0_f32.powf((radius.log10() - 0.5).round())).to_array(),
-            background: Vec3::from_array(self.background).extend(1.0).to_array(),
+            background: Vec3::from_array(self.shades.background).extend(1.0).to_array(),
         };
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
     }

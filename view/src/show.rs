@@ -1,5 +1,7 @@
 //! A world that runs and is looked at: what a window or a page asks of it.
 
+use std::pin::Pin;
+
 use drystone::{Result, World};
 use glam::{Vec2, Vec3};
 
@@ -17,6 +19,14 @@ pub struct Pointer {
     pub origin: Vec3,
     /// Unit vector from the eye to the point under the pointer.
     pub direction: Vec3,
+}
+
+impl Pointer {
+    /// A pointer at a place of the picture that `camera` takes, -1 to 1, in a picture of width `aspect` times its height.
+    pub fn through(camera: &Camera, at: Vec2, aspect: f32) -> Self {
+        let (origin, direction) = camera.ray(at, aspect);
+        Self { at, origin, direction }
+    }
 }
 
 /// A key that a show can understand.
@@ -48,7 +58,10 @@ impl Key {
     }
 }
 
-/// A world that runs, and how it is looked at.
+/// Time that passes in a show. A page awaits it, since a page cannot wait for a device; other programs block on it.
+pub type Passing<'a> = Pin<Box<dyn Future<Output = Result<()>> + 'a>>;
+
+/// A world that runs, and how it is looked at. Nothing but [`Show::advance`] makes a step.
 pub trait Show {
     fn title(&self) -> String;
     /// The world. Bodies may come and go; the shapes of a body must not change.
@@ -65,10 +78,12 @@ pub trait Show {
     fn lines(&mut self) -> Vec<LineEnd> {
         Vec::new()
     }
-    fn advance(&mut self, seconds: f32) -> Result<()>;
+    /// Carries out what keys asked for, and lets the time pass.
+    fn advance(&mut self, seconds: f32) -> Passing<'_>;
     /// Notes where the pointer is, before a key.
     fn point(&mut self, _pointer: &Pointer) {}
-    fn key(&mut self, key: Key, down: bool) -> Result<()>;
+    /// Notes a key; the next [`Show::advance`] makes the steps that it asks for.
+    fn key(&mut self, key: Key, down: bool);
     /// Handles the press of a button or a finger; returns whether drags go here instead of to the camera.
     fn grab(&mut self, pointer: &Pointer) -> bool;
     fn drag(&mut self, pointer: &Pointer);

@@ -10,7 +10,7 @@ use std::path::Path;
 use compared::{PERCENT, difference, read_png};
 use drystone::glam::Vec3;
 use drystone::{Scene, Simulation, SolverConfig};
-use drystone_view::{Canvas, ColorBy, Film, Look, Picture};
+use drystone_view::{Bounds, Camera, Canvas, ColorBy, Film, Look, Picture, Shades, Shot, poses, wgpu};
 
 tests! {
     any_gpu {
@@ -19,6 +19,9 @@ tests! {
         the_same_scene_gives_the_same_picture_to_the_last_bit,
         the_colors_of_bodies_show_the_chosen_quantity,
         a_body_casts_a_shadow_on_the_ground,
+        dark_shades_change_the_ground_and_what_is_behind_it_and_no_body,
+        the_limits_of_webgl2_give_the_same_picture,
+        a_renderer_takes_over_another_world,
     }
 }
 
@@ -96,4 +99,63 @@ fn a_body_casts_a_shadow_on_the_ground() {
     far_up.world.bodies.last_mut().expect("a ball").position.y = 1e3;
     let (near, far) = (shaded(&ball), shaded(&far_up));
     assert!(near > 100 && far == 0, "{near} pixels are in shadow, {far} below a ball that is far up");
+}
+
+/// A picture of `scene` as it begins, drawn on `canvas`.
+fn drawn_on(canvas: &mut Canvas, scene: &Scene) -> Picture {
+    let world = &scene.world;
+    let (poses, bounds) = (poses(world), Bounds::of(world));
+    let camera = Camera::framing(&bounds, Vec3::Y, LOOK.yaw, LOOK.pitch, canvas.aspect());
+    let colors = ColorBy::Material.paint(world, &vec![0.0; world.bodies.len()], 1.0);
+    let shot = Shot { poses: &poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
+    canvas.draw(&shot).expect("a picture")
+}
+
+fn canvas(scene: &Scene) -> Canvas {
+    Canvas::new(&scene.world, SIZE).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn dark_shades_change_the_ground_and_what_is_behind_it_and_no_body() {
+    let scene = scene("sphere-plane", &["height=1"]);
+    let mut canvas = canvas(&scene);
+    let light = drawn_on(&mut canvas, &scene);
+    canvas.renderer.shades = Shades::DARK;
+    let dark = drawn_on(&mut canvas, &scene);
+    let pairs = || light.rgba.chunks_exact(4).zip(dark.rgba.chunks_exact(4));
+    let same = pairs().filter(|(a, b)| a == b).count();
+    let darker = pairs().filter(|(a, b)| (0..3).all(|k| b[k] < a[k])).count();
+    // The ball stays as it is; pixels that mix it with the ground are darker too.
+    let all = pairs().count();
+    assert!(same > 1000 && darker > 20_000 && same + darker == all, "{same} same, {darker} darker of {all}");
+    let is_background = |p: &[u8]| (0..3).all(|k| (f32::from(p[k]) / 255.0 - Shades::DARK.background[k]).abs() < 0.01);
+    assert!(is_background(&dark.rgba[..4]), "{:?}", &dark.rgba[..4]);
+}
+
+/// A browser without WebGPU gives no more than these.
+fn the_limits_of_webgl2_give_the_same_picture() {
+    let scene = scene("drop", &[]);
+    let (device, queue) = pollster::block_on(async {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let adapters = instance.enumerate_adapters(wgpu::Backends::PRIMARY).await;
+        let adapter = adapters.into_iter().next().expect("an adapter");
+        let required_limits = wgpu::Limits::downlevel_webgl2_defaults();
+        let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+        adapter.request_device(&descriptor).await.expect("a device")
+    });
+    assert_eq!(device.limits().max_storage_buffers_per_shader_stage, 0);
+    let mut limited = Canvas::on(device, queue, &scene.world, SIZE).unwrap_or_else(|e| panic!("{e}"));
+    let percent = difference(&drawn_on(&mut limited, &scene), &drawn_on(&mut canvas(&scene), &scene));
+    assert!(percent <= PERCENT, "{percent} % of the pixels differ");
+}
+
+/// The handles of its bodies may be those of the world before.
+fn a_renderer_takes_over_another_world() {
+    let (ball, cube) = (scene("sphere-plane", &["height=1"]), scene("stack", &["n=1"]));
+    assert!(ball.world.bodies.handles().eq(cube.world.bodies.handles()));
+    let mut canvas = canvas(&ball);
+    let before = drawn_on(&mut canvas, &ball);
+    canvas.renderer.replace(&cube.world);
+    let after = drawn_on(&mut canvas, &cube);
+    assert_eq!(after, drawn_on(&mut self::canvas(&cube), &cube));
+    assert!(difference(&before, &after) > PERCENT);
 }

@@ -37,9 +37,13 @@ tilts.listens = () => game !== null;
 
 // Calls of the solver may wait for a device and must not overlap: each begins when the one before has ended.
 let line = Promise.resolve();
+let isBusy = false;
 function enqueue(call) {
-  const result = line.then(call);
-  line = result.catch(() => {});
+  const result = line.then(() => {
+    isBusy = true;
+    return call();
+  });
+  line = result.catch(() => {}).finally(() => (isBusy = false));
   return result;
 }
 
@@ -143,6 +147,7 @@ async function frame(now) {
   await besides();
   whole();
   draw();
+  tell(now);
   if (seconds > 0) rates.pictures += 0.1 * (1 / seconds - rates.pictures);
 }
 
@@ -196,7 +201,12 @@ function draw() {
   });
 }
 
+/// Numbers of what runs. While a step waits for a device they are those of the step before.
 function state() {
+  return isBusy && latest ? latest : counted();
+}
+
+function counted() {
   const common = {
     picture: pictures[0]?.api() ?? "none",
     paused,
@@ -205,26 +215,26 @@ function state() {
     message: element("message").textContent,
     maze: game ? JSON.parse(game.numbers()) : null,
   };
-  if (shows.length === 0) return common;
-  const told = JSON.parse(shows[0].numbers());
-  const others = shows.slice(1).map((show) => JSON.parse(show.numbers()));
-  return {
-    ...told,
+  const told = shows.map((show) => JSON.parse(show.numbers()));
+  latest = shows.length === 0 ? common : {
+    ...told[0],
     scene: file ? file.name : chosen.scene,
     parameters: { ...chosen.parameters },
     settings: { ...chosen.settings },
     first_difference: difference,
-    beside: others[0] ?? null,
+    beside: told[1] ?? null,
     ...common,
   };
+  return latest;
 }
 
+let latest = null;
 let shown = { at: 0, steps: -1 };
 function tell(now) {
   if (now - shown.at < 100 || document.hidden) return;
-  if (game) maze.show(JSON.parse(game.numbers()));
+  const told = counted();
+  if (game) maze.show(told.maze);
   if (shows.length > 0) {
-    const told = state();
     numbers.show(told, told.steps !== shown.steps);
     shown.steps = told.steps;
   }
@@ -233,7 +243,7 @@ function tell(now) {
 
 function tick(now) {
   enqueue(() => frame(now))
-    .then(() => tell(now), (error) => {
+    .catch((error) => {
       pause(true);
       refuse(error);
     })
@@ -313,7 +323,7 @@ function parameters() {
     element("parameters"),
     (entry?.parameters ?? []).map((p) => {
       const value = Number(chosen.parameters[p.name] ?? p.default);
-      const about = { prefix: "parameter", name: p.name, summary: `${sentence(p.summary)} From ${numbers.short(p.least)} to ${numbers.short(p.most)}.` };
+      const about = { prefix: "parameter", name: p.name, summary: `${sentence(p.summary)} From ${numbers.plain(p.least)} to ${numbers.plain(p.most)}.` };
       return fields.field({ ...about, value, slider: fields.slider(p), isChanged: value !== p.default }, changed(p.name));
     }),
   );
@@ -326,7 +336,8 @@ function parameters() {
   }
 }
 
-const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}.`;
+/// A line of the library as a sentence; a name of one letter stays.
+const sentence = (text) => `${/^\w\b/.test(text) && text[0] !== "a" ? text[0] : text[0].toUpperCase()}${text.slice(1)}.`;
 
 /// Measures the device and opens a pile of the size that it bears.
 async function measured() {
@@ -358,7 +369,8 @@ function solver() {
     });
   };
   const isMain = (setting) => MAIN.includes(setting.name);
-  fields.replace(element("main-settings"), described.settings.filter(isMain).map(make));
+  const main = MAIN.map((name) => described.settings.find((setting) => setting.name === name)).filter(Boolean);
+  fields.replace(element("main-settings"), main.map(make));
   fields.replace(element("all-settings"), described.settings.filter((setting) => !isMain(setting)).map(make));
   element("defaults").disabled = Object.keys(chosen.settings).every((name) => name === "preset");
 }
@@ -555,7 +567,7 @@ async function begin() {
     await frame(performance.now());
   });
   element("loading").hidden = true;
-  element("tools").hidden = false;
+  element("tools").hidden = element("whole").hidden = false;
   if (note) say(note, true);
   requestAnimationFrame(tick);
 }

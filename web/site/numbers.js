@@ -14,6 +14,9 @@ export function short(x) {
   return String(Number(x.toPrecision(3)));
 }
 
+/// All digits of a number.
+export const plain = (x) => x.toLocaleString("en", { maximumSignificantDigits: 16 });
+
 /// Fills a list of terms; the elements stay, so that a screen reader does not lose its place.
 export function list(parent, rows) {
   while (parent.children.length > 2 * rows.length) parent.lastElementChild.remove();
@@ -61,7 +64,7 @@ class Curve {
     const logs = values.map((value) => Math.log10(Math.max(value, least)));
     const high = Math.max(Math.ceil(Math.max(...logs, Math.log10(least) + 2)), Math.log10(least) + 2);
     const low = Math.max(high - 5, Math.log10(least));
-    const [left, top, bottom] = [44, 6, height - 6];
+    const [left, top, bottom] = [50, 6, height - 6];
     const y = (log) => bottom - ((bottom - top) * (Math.max(log, low) - low)) / (high - low);
     context.font = "11px system-ui, sans-serif";
     context.textAlign = "right";
@@ -73,7 +76,7 @@ class Curve {
       context.lineTo(width, y(power));
       context.stroke();
       context.fillStyle = style.getPropertyValue("--quiet");
-      if ((high - power) % 2 === 0 || high - low < 4) context.fillText(short(10 ** power), left - 5, y(power));
+      if ((high - power) % 2 === 0 || high - low < 4) context.fillText(plain(Number(`1e${power}`)), left - 5, y(power));
     }
     context.strokeStyle = style.getPropertyValue("--accent");
     context.lineWidth = 1.8;

@@ -2,7 +2,7 @@
 
 use drystone::preset::Preset;
 use drystone::scenes::CATALOGUE;
-use drystone::stages::suggest::shorten;
+use drystone::stages::suggest::{hint, shorten};
 use drystone::{Error, Result, Scene, SolverConfig};
 use serde_json::{Map, Value};
 
@@ -11,15 +11,20 @@ pub const MOST_BODIES: u64 = 200_000;
 
 /// A scene of the catalogue; `parameters` are `name=value`.
 pub fn scene(name: &str, parameters: &[String]) -> Result<Scene> {
-    if let Some(entry) = CATALOGUE.iter().find(|entry| entry.name == name) {
-        let bodies = entry.body_count(parameters)?;
-        if bodies > MOST_BODIES {
-            return Err(Error::TooLarge(format!(
-                "{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser"
-            )));
-        }
+    let entry = CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        let known = CATALOGUE.iter().map(|entry| entry.name);
+        Error::input(format!("{name:?} is no scene of the catalogue{}", hint(name, known, "the gallery shows all")))
+    })?;
+    check_size(name, entry.body_count(parameters)?)?;
+    entry.build(parameters)
+}
+
+/// Refuses more bodies than the memory of a page bears.
+pub fn check_size(name: &str, bodies: u64) -> Result<()> {
+    if bodies <= MOST_BODIES {
+        return Ok(());
     }
-    Scene::find(name, parameters)
+    Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser")))
 }
 
 /// The settings of a JSON object: each by its name, over those of its `preset`.
@@ -84,6 +89,8 @@ mod tests {
     #[test]
     fn more_bodies_than_a_browser_holds_are_refused() {
         assert!(scene("tower", &["n=3".into()]).is_ok());
+        let message = scene("towr", &[]).expect_err("a slip").to_string();
+        assert_eq!(message, "\"towr\" is no scene of the catalogue; did you mean \"tower\"? the gallery shows all");
         let message = scene("pile", &["n=4000000".into()]).expect_err("too many").to_string();
         assert_eq!(message, "pile: 4000000 bodies: must be at most 200000 in a browser");
     }

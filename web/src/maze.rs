@@ -15,6 +15,7 @@ use crate::{next_number, thrown};
 pub struct Maze {
     pub(crate) labyrinth: Labyrinth,
     pub(crate) camera: Camera,
+    #[cfg_attr(not(target_family = "wasm"), expect(dead_code, reason = "only browsers draw"))]
     pub(crate) number: u32,
     board: String,
 }
@@ -48,7 +49,7 @@ impl Maze {
         } else {
             self.labyrinth.drag(&Pointer { at, origin: Vec3::ZERO, direction: Vec3::NEG_Z });
         }
-        thrown(self.labyrinth.advance(seconds))
+        thrown(self.labyrinth.pass(seconds))
     }
 
     /// Time, tilt and outcome as JSON.

@@ -11,7 +11,7 @@ use glam::Vec2;
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::*;
 
-use crate::choice::{self, MOST_BODIES};
+use crate::choice;
 use crate::{next_number, thrown};
 
 /// Steps from each whole state of a recording to the next, and bytes after which a recording ends.
@@ -23,6 +23,7 @@ const LONGEST: usize = 128 << 20;
 pub struct Show {
     pub(crate) live: Live,
     pub(crate) camera: Camera,
+    #[cfg_attr(not(target_family = "wasm"), expect(dead_code, reason = "only browsers draw"))]
     pub(crate) number: u32,
     /// What records the run; none where a recording runs again, or where the run became too long.
     recorder: Option<Recorder<Vec<u8>>>,
@@ -55,12 +56,7 @@ impl Show {
         let text = std::str::from_utf8(bytes).map_err(unfit)?;
         let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
         let scene = SceneFile::parse(text).and_then(|file| file.into_scene(stem)).map_err(|e| e.within(name))?;
-        let bodies = scene.world.dynamic_count() as u64;
-        if bodies > MOST_BODIES {
-            return Err(Error::TooLarge(format!(
-                "{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser"
-            )));
-        }
+        choice::check_size(name, scene.world.dynamic_count() as u64)?;
         Self::new(Live::new(scene, choice::config(settings)?, BackendChoice::Cpu, false, ColorBy::default())?)
     }
 
@@ -77,9 +73,7 @@ impl Show {
     }
 
     fn pointer(&self, x: f32, y: f32, aspect: f32) -> Pointer {
-        let at = Vec2::new(x, y);
-        let (origin, direction) = self.camera.ray(at, aspect);
-        Pointer { at, origin, direction }
+        Pointer::through(&self.camera, Vec2::new(x, y), aspect)
     }
 
     fn count(&mut self) -> Value {

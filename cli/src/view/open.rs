@@ -11,9 +11,8 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 use super::panel::Panel;
-use drystone::backend::gpu::open_for_surface;
 use drystone::{Error, Result};
-use drystone_view::{Camera, Key, Pointer, Quality, Renderer, Shot, poses};
+use drystone_view::{Camera, Key, Next, Pointer, Sight};
 
 pub(super) fn no_display() -> Error {
     let without =
@@ -31,11 +30,7 @@ enum Drag {
 
 pub(super) struct Open {
     pub(super) window: Arc<Window>,
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-    surface: wgpu::Surface<'static>,
-    surface_config: wgpu::SurfaceConfiguration,
-    renderer: Renderer,
+    sight: Sight,
     pub(super) camera: Camera,
     pub(super) ui: egui_winit::State,
     ui_renderer: egui_wgpu::Renderer,
@@ -54,32 +49,17 @@ impl Open {
         let window = Arc::new(events.create_window(attributes).map_err(|_| no_display())?);
         let size = window.inner_size();
         let display = Box::new(events.owned_display_handle());
-        let (surface, adapter, device, queue) = open_for_surface(display, window.clone())?;
-        let mut surface_config = surface
-            .get_default_config(&adapter, size.width.max(1), size.height.max(1))
-            .ok_or_else(|| Error::Adapter("the adapter cannot draw on this display".into()))?;
-        // The shaders and egui encode sRGB themselves.
-        let formats = surface.get_capabilities(&adapter).formats;
-        surface_config.format = formats.into_iter().find(|f| !f.is_srgb()).unwrap_or(surface_config.format);
-        surface.configure(&device, &surface_config);
-
-        let hardware = adapter.get_info().device_type != wgpu::DeviceType::Cpu;
-        let quality = if hardware { Quality::FINE } else { Quality::FAST };
-        let renderer = Renderer::new(&device, &queue, surface_config.format, quality, show.world());
+        let sight = Sight::on_window(display, window.clone(), (size.width, size.height))?;
         let context = egui::Context::default();
         let scale = window.scale_factor() as f32;
-        let most = device.limits().max_texture_dimension_2d as usize;
+        let most = sight.device().limits().max_texture_dimension_2d as usize;
         let ui = egui_winit::State::new(context, ViewportId::ROOT, events, Some(scale), None, Some(most));
         let ui_renderer =
-            egui_wgpu::Renderer::new(&device, surface_config.format, egui_wgpu::RendererOptions::default());
+            egui_wgpu::Renderer::new(sight.device(), sight.format(), egui_wgpu::RendererOptions::default());
         Ok(Self {
-            camera: show.camera(size.width.max(1) as f32 / size.height.max(1) as f32),
+            camera: show.camera(sight.aspect()),
             window,
-            device,
-            queue,
-            surface,
-            surface_config,
-            renderer,
+            sight,
             ui,
             ui_renderer,
             panel: true,
@@ -90,29 +70,19 @@ impl Open {
         })
     }
 
-    fn aspect(&self) -> f32 {
-        self.surface_config.width as f32 / self.surface_config.height as f32
-    }
-
     /// Returns whether the window still exists.
     pub(super) fn resize(&mut self, width: u32, height: u32) -> bool {
-        if width == 0 || height == 0 {
-            return true;
-        }
-        (self.surface_config.width, self.surface_config.height) = (width, height);
-        self.configure()
+        width == 0 || height == 0 || self.sight.resize((width, height))
     }
 
-    /// Resizes the surface; returns whether the window still exists, since another program may close it.
-    fn configure(&self) -> bool {
-        let refused = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        self.surface.configure(&self.device, &self.surface_config);
-        pollster::block_on(refused.pop()).is_none()
+    fn size(&self) -> Vec2 {
+        let (width, height) = self.sight.size();
+        Vec2::new(width as f32, height as f32)
     }
 
     /// Sets the camera of `show` for the part of the window beside the panel.
     fn frame_scene(&mut self, show: &dyn Panel) {
-        let (width, height) = (self.surface_config.width as f32, self.surface_config.height as f32);
+        let [width, height] = self.size().to_array();
         // The panel counts for at most half of the window.
         let panel = if self.panel { self.panel_width.min(0.5 * width) } else { 0.0 };
         self.camera = show.camera((width - panel) / height);
@@ -129,11 +99,8 @@ impl Open {
     }
 
     fn pointer(&self) -> Pointer {
-        let size = Vec2::new(self.surface_config.width as f32, self.surface_config.height as f32);
-        let at = Vec2::new(self.mouse.x as f32, self.mouse.y as f32) / size * 2.0 - 1.0;
-        let at = at * Vec2::new(1.0, -1.0);
-        let (origin, direction) = self.camera.ray(at, self.aspect());
-        Pointer { at, origin, direction }
+        let at = Vec2::new(self.mouse.x as f32, self.mouse.y as f32) / self.size() * 2.0 - 1.0;
+        Pointer::through(&self.camera, at * Vec2::new(1.0, -1.0), self.sight.aspect())
     }
 
     pub(super) fn button(&mut self, button: MouseButton, down: bool, show: &mut dyn Panel) {
@@ -150,7 +117,7 @@ impl Open {
 
     pub(super) fn moved(&mut self, to: PhysicalPosition<f64>, show: &mut dyn Panel) {
         let by = Vec2::new((to.x - self.mouse.x) as f32, (to.y - self.mouse.y) as f32);
-        let by = by / self.surface_config.height as f32;
+        let by = by / self.size().y;
         self.mouse = to;
         match self.drag {
             Drag::Body => show.drag(&self.pointer()),
@@ -163,37 +130,22 @@ impl Open {
     /// Advances the time and draws; returns whether the window still exists.
     pub(super) fn frame(&mut self, show: &mut dyn Panel) -> Result<bool> {
         let now = Instant::now();
-        show.advance((now - self.last).as_secs_f32())?;
+        pollster::block_on(show.advance((now - self.last).as_secs_f32()))?;
         self.last = now;
         if self.drag == Drag::Body {
             // The camera and the body can move while the mouse does not.
             show.drag(&self.pointer());
         }
 
-        use wgpu::CurrentSurfaceTexture::{Lost, Outdated, Suboptimal, Success};
-        let target = match self.surface.get_current_texture() {
-            Success(target) | Suboptimal(target) => target,
-            Outdated | Lost => return Ok(self.configure()),
-            // The window is hidden or late; the next frame may succeed.
-            _ => return Ok(true),
+        let frame = match self.sight.next() {
+            Next::Frame(frame) => frame,
+            Next::Later => return Ok(true),
+            Next::Gone => return Ok(false),
         };
-        let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (colors, lines) = (show.colors(), show.lines());
-        let poses = poses(show.world());
-        let shot = Shot {
-            poses: &poses,
-            colors: &colors,
-            camera: &self.camera,
-            bounds: show.bounds(),
-            container: show.container(),
-            lines: &lines,
-        };
-        let size = (self.surface_config.width, self.surface_config.height);
-        self.renderer.follow(show.world());
-        self.renderer.draw(&view, size, &shot);
-        self.draw_panel(&view, show);
+        self.sight.paint(&frame, show, &self.camera);
+        self.draw_panel(&frame.view, show);
         self.window.pre_present_notify();
-        self.queue.present(target);
+        self.sight.present(frame);
         Ok(true)
     }
 
@@ -219,14 +171,15 @@ impl Open {
         self.ui.handle_platform_output(&self.window, output.platform_output);
         let triangles = context.tessellate(output.shapes, output.pixels_per_point);
         let screen = egui_wgpu::ScreenDescriptor {
-            size_in_pixels: [self.surface_config.width, self.surface_config.height],
+            size_in_pixels: self.sight.size().into(),
             pixels_per_point: output.pixels_per_point,
         };
+        let (device, queue) = (self.sight.device(), self.sight.queue());
         for (id, deltas) in &output.textures_delta.set {
-            deltas.iter().for_each(|d| self.ui_renderer.update_texture(&self.device, &self.queue, *id, d));
+            deltas.iter().for_each(|d| self.ui_renderer.update_texture(device, queue, *id, d));
         }
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.ui_renderer.update_buffers(&self.device, &self.queue, &mut encoder, &triangles, &screen);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.ui_renderer.update_buffers(device, queue, &mut encoder, &triangles, &screen);
         {
             let attachment = wgpu::RenderPassColorAttachment {
                 view,
@@ -241,7 +194,7 @@ impl Open {
             });
             self.ui_renderer.render(&mut pass.forget_lifetime(), &triangles, &screen);
         }
-        self.queue.submit([encoder.finish()]);
+        queue.submit([encoder.finish()]);
         for id in &output.textures_delta.free {
             self.ui_renderer.free_texture(id);
         }

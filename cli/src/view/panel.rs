@@ -3,7 +3,7 @@
 use drystone::backend::BackendChoice;
 use drystone::config::Friction;
 use drystone_maze::{BOARDS, Outcome};
-use drystone_view::{ColorBy, Labyrinth, Live, Show};
+use drystone_view::{ColorBy, Labyrinth, Live, Order, Show};
 
 /// A show with a panel.
 pub trait Panel: Show {
@@ -90,18 +90,15 @@ fn numbers(live: &mut Live, ui: &mut egui::Ui) {
 }
 
 fn controls(live: &mut Live, ui: &mut egui::Ui) {
-    let mut restart = false;
     ui.horizontal(|ui| {
         ui.toggle_value(&mut live.paused, "pause");
         if ui.button("step").clicked() {
-            live.paused = true;
-            live.refused = live.step().err().map(|e| e.to_string());
+            live.order(Order::Step);
         }
-        restart = ui.button("restart").clicked();
+        if ui.button("restart").clicked() {
+            live.order(Order::Restart);
+        }
     });
-    if restart {
-        live.refused = live.restart().err().map(|e| e.to_string());
-    }
     ui.add(egui::Slider::new(&mut live.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
     let mut color = live.color;
     choice(ui, "color", &ColorBy::ALL, &mut color);
@@ -127,12 +124,12 @@ fn settings(live: &mut Live, ui: &mut egui::Ui) {
         }
     });
     if config != before {
-        live.set_config(config);
+        live.refused = live.simulation.set_config(config).err().map(|e| e.to_string());
     }
     let mut backend = live.choice;
     choice(ui, "backend", &BackendChoice::ALL, &mut backend);
     if backend != live.choice {
-        live.set_backend(backend);
+        live.refused = live.set_backend(backend).err().map(|e| e.to_string());
     }
     if let Some(refused) = &live.refused {
         ui.colored_label(egui::Color32::from_rgb(200, 40, 40), refused);

@@ -54,8 +54,7 @@ impl ApplicationHandler for App {
                 }
                 if let Some(key) = key_of(&logical_key).filter(|_| !repeat) {
                     open.key(key, down, &mut *self.show);
-                    let result = self.show.key(key, down);
-                    self.end(events, result);
+                    self.show.key(key, down);
                 }
             }
             WindowEvent::MouseInput { state, button, .. } if !taken || state == ElementState::Released => {
