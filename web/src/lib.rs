@@ -3,6 +3,7 @@
 mod choice;
 mod describe;
 mod maze;
+mod measure;
 #[cfg(target_family = "wasm")]
 mod picture;
 mod show;

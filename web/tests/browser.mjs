@@ -2,8 +2,8 @@
 /// WebGPU by SwiftShader. A canvas of WebGPU loses its device where the compositor is not on Vulkan too.
 export const WEBGPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=swiftshader"];
 
-/// What Chromium itself says where it has no adapter for WebGPU and a page asks for one.
-const NO_ADAPTER = /^No available adapters\.$|^Failed to create WebGPU Context Provider$/;
+/// What Chromium itself says where it has no adapter for WebGPU and a page asks for one, and where software draws a canvas of WebGL.
+const OF_CHROMIUM = /^No available adapters\.$|^Failed to create WebGPU Context Provider$|GL Driver Message .*Performance.*ReadPixels/;
 
 export class Browser {
   running = new Map();
@@ -30,7 +30,7 @@ export class Browser {
     const page = await profile.newPage();
     const [said, elsewhere] = [[], []];
     page.on("console", (message) => {
-      if (webgpu || !NO_ADAPTER.test(message.text())) said.push(`${message.type()}: ${message.text()}`);
+      if (webgpu || !OF_CHROMIUM.test(message.text())) said.push(`${message.type()}: ${message.text()}`);
     });
     page.on("pageerror", (error) => said.push(`error: ${error.message}`));
     page.on("requestfailed", (request) => said.push(`failed: ${request.url()}`));

@@ -32,6 +32,5 @@ export async function run({ open, check }) {
     const { message } = await state(bad);
     const runs = await until(bad, ({ steps }) => steps > 0, 10_000);
     check.holds(`${hash} is refused in one line, and the page runs`, runs && message.includes(named) && !message.includes("\n"), message);
-    await bad.context().close();
   }
 }
