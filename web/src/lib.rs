@@ -4,6 +4,7 @@ mod choice;
 mod conform;
 mod describe;
 mod maze;
+mod measure;
 #[cfg(target_family = "wasm")]
 mod picture;
 mod show;

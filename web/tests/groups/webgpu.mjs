@@ -1,0 +1,48 @@
+import { state, until } from "../browser.mjs";
+
+export const name = "webgpu";
+export const mistakes = [
+  {
+    fails: "wall: WebGPU computes what the CPU does",
+    // Normal impulses of every contact are one percent too large.
+    script: `
+      const right = GPUDevice.prototype.createShaderModule;
+      GPUDevice.prototype.createShaderModule = function (given) {
+        const code = given.code.replace("impulses[k] = impulse;", "impulse.normal *= 1.01; impulses[k] = impulse;");
+        return right.call(this, { ...given, code });
+      };`,
+    only: ["wall"],
+  },
+];
+
+/// Largest difference after a step of what both backends began alike, relative to 1 plus its size: PLAIN_STEP of src/conform.
+const LIMIT = 1e-5;
+const SCENES = { wall: { rows: 4, columns: 4 }, pile: { n: 30 }, drop: {}, chain: {}, car: {}, ragdoll: {} };
+const STEPS = 40;
+
+export async function run({ open, check, only = Object.keys(SCENES) }) {
+  const page = await open({ hash: "#scene=stack" });
+  await page.evaluate(() => window.drystone.backend("both"));
+  for (const scene of only) {
+    await page.evaluate(([scene, given]) => window.drystone.open(scene, given), [scene, SCENES[scene]]);
+    await page.evaluate(() => window.drystone.pause(true));
+    await page.evaluate(async (steps) => {
+      while (window.drystone.state().steps < steps) await window.drystone.step();
+    }, STEPS);
+    const { steps, message, beside, first_difference: first } = await state(page);
+    const [a, b] = (first?.values ?? [0, 0]).map((value) => [value].flat().map(Number));
+    const [apart, size] = first ? [Math.max(...[a].flat().map((x, k) => Math.abs(x - [b].flat()[k]))), Math.max(...[a].flat().map(Math.abs))] : [0, 0];
+    const told = first ? `first difference ${apart.toExponential(1)} after step ${first.step} in ${first.quantity}` : "the same bits";
+    const ran = beside !== null && beside.steps === steps && message === "";
+    check.holds(`${scene}: WebGPU computes what the CPU does`, ran && apart <= LIMIT * (1 + size), `${steps} steps, ${told}; ${message}`);
+  }
+  if (only.length === 1) return;
+  await page.evaluate(() => window.drystone.open("pile", { n: 30 }));
+  await page.evaluate(() => window.drystone.backend("webgpu"));
+  check.holds("a scene runs on WebGPU alone", await until(page, ({ steps }) => steps > 10));
+  await page.evaluate(() => window.drystone.pause(true));
+  // The last line counts the verdicts.
+  const lines = await page.evaluate(() => window.drystone.conform());
+  check.equal("conform fails no check", lines.slice(0, -1).filter((line) => line.startsWith("failed")), []);
+  check.holds("conform checks kernels and scenes", /^(?!.*\b[1-3]?\d passed).* 0 failed/.test(lines.at(-1)), lines.at(-1));
+}
