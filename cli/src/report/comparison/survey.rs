@@ -118,6 +118,7 @@ impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
         let block = make()?;
         self.rows.extend_from_slice(&block);
         files::write(&self.path, &files::csv(&self.rows)?)?;
+        files::note_resumed(&self.path);
         Ok(block)
     }
 
