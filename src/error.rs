@@ -41,6 +41,9 @@ pub enum Error {
     /// The problem is larger than the adapter's buffers or than its memory.
     #[error("{0}")]
     TooLarge(String),
+    /// A computation came to an end that should not be: a mistake of this library or of parry.
+    #[error("{}", one_line(.0))]
+    Panicked(String),
 }
 
 impl Error {
@@ -63,9 +66,10 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// Exit code of the command line: 2 for the caller's input, 3 for the machine.
+    /// Exit code of the command line: 1 for a mistake of the program, 2 for the caller's input, 3 for the machine.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Panicked(_) => 1,
             Self::Input(_) | Self::File { .. } => 2,
             Self::Adapter(_) | Self::Lost(_) | Self::TooLarge(_) => 3,
         }

@@ -58,6 +58,7 @@ mod math;
 mod memory;
 pub mod metrics;
 mod names;
+mod panics;
 mod plan;
 pub mod preset;
 mod problem;

@@ -1,5 +1,7 @@
 //! Stepping a world: detect, color, prepare, plan, run, store.
 
+#[cfg(test)]
+mod bad_shape;
 mod by_body;
 mod contacts;
 mod events;
@@ -15,6 +17,7 @@ use crate::config::{SolverConfig, check_step_length};
 use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::metrics::Penetration;
+use crate::panics::{self, Panic};
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::StepProblem;
 use crate::problem::carry::Carry;
@@ -137,7 +140,8 @@ impl Simulation {
     ///
     /// # Errors
     /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); a body that came or changed, a
-    /// joint or a mass is not fit to be simulated; the backend cannot run the step. The world is then as it was.
+    /// joint or a mass is not fit to be simulated; the backend cannot run the step; a contact cannot be computed ([`Error::Panicked`]). The world
+    /// is then as it was. After a contact that cannot be computed all bodies are awake, and contacts begin without impulses.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
         if self.begin_step(dt, &mut stats)? {
@@ -297,15 +301,36 @@ impl Simulation {
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.on_device = false;
         }
-        self.stages.follow(&self.world, &self.config, dt, &changes);
-        if self.stages.is_everything_still(&self.world, stats) {
-            return Ok(false);
-        }
-        if self.stages.find(&self.world, &self.config, dt, stats) {
-            self.on_device = false;
-        }
-        self.stages.prepare(&self.world, &self.config, dt, self.on_device, stats);
-        Ok(true)
+        let Self { world, config, stages, on_device, .. } = self;
+        let assembled = panics::caught(|| {
+            stages.follow(world, config, dt, &changes);
+            if stages.is_everything_still(world, stats) {
+                return false;
+            }
+            if stages.find(world, config, dt, stats) {
+                *on_device = false;
+            }
+            stages.prepare(world, config, dt, *on_device, stats);
+            true
+        });
+        assembled.map_err(|panic| {
+            self.begin_anew();
+            self.panicked(panic)
+        })
+    }
+
+    /// Gives up the state between steps, which a panic left half done: the next step finds all contacts anew.
+    fn begin_anew(&mut self) {
+        let listen = self.stages.events.listen;
+        self.stages = Stages::new(&World::new(), &self.config);
+        self.stages.events.listen(listen);
+        self.on_device = false;
+    }
+
+    fn panicked(&self, Panic { bodies, text }: Panic) -> Error {
+        let name = |body: u32| self.world.name_of(body as usize);
+        let what = bodies.map_or("the contacts".into(), |[a, b]| format!("the contact of {} and {}", name(a), name(b)));
+        Error::Panicked(format!("{what} cannot be computed: {text}"))
     }
 
     /// Runs and stores what is assembled.
@@ -378,12 +403,15 @@ impl Simulation {
     pub fn next_problem(&mut self, dt: f32) -> Result<(StepProblem, StepPlan)> {
         check_step_length(dt)?;
         let changes = self.changes(dt)?;
-        let mut next = self.stages.clone();
-        next.follow(&self.world, &self.config, dt, &changes);
-        next.is_everything_still(&self.world, &mut StepStats::default());
-        next.find(&self.world, &self.config, dt, &mut StepStats::default());
-        next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
-        Ok((next.problem, next.plan))
+        let assembled = panics::caught(|| {
+            let mut next = self.stages.clone();
+            next.follow(&self.world, &self.config, dt, &changes);
+            next.is_everything_still(&self.world, &mut StepStats::default());
+            next.find(&self.world, &self.config, dt, &mut StepStats::default());
+            next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
+            (next.problem, next.plan)
+        });
+        assembled.map_err(|panic| self.panicked(panic))
     }
 
     /// The bodies as they are now, for questions: rays, shapes that move, points, boxes. In the tree of the last step, so that this costs

@@ -5,7 +5,7 @@ use std::process::Command;
 
 /// What only the command needs.
 const OF_THE_COMMAND: [&str; 9] =
-    ["clap", "plotters", "comfy-table", "indicatif", "csv", "toml", "humantime", "cpu-time", "ctrlc"];
+    ["clap", "plotters", "comfy-table", "indicatif", "csv", "toml", "humantime", "cpu-time", "signal-hook"];
 
 /// The names and versions of all crates that are built into the library with these features, the library included.
 fn crates(features: &[&str]) -> BTreeSet<String> {

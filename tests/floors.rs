@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules of the library on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
-    &["math", "lanes", "random", "error", "memory", "names", "saved", "stats", "suggest"],
+    &["math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph", "scenes", "load"],
     &["effort", "queries"],

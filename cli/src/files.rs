@@ -1,14 +1,31 @@
-//! Files that appear under their names only when they are complete.
+//! Files that appear under their names only when they are complete, and what is said of them when the command ends early.
 
 use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use drystone::{Error, Result};
 
-/// Hidden paths of all open drafts.
-static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// What the command has done to files so far.
+struct Book {
+    /// Drafts that are open.
+    drafts: Vec<Entry>,
+    /// Files that are complete, and rows that stay.
+    kept: Vec<PathBuf>,
+    /// Rows from which the same command goes on.
+    resumed: Vec<PathBuf>,
+    /// Files whose drafts were discarded.
+    discarded: Vec<PathBuf>,
+}
+
+struct Entry {
+    hidden: PathBuf,
+    path: PathBuf,
+}
+
+static BOOK: Mutex<Book> =
+    Mutex::new(Book { drafts: Vec::new(), kept: Vec::new(), resumed: Vec::new(), discarded: Vec::new() });
 
 /// A file or folder under a hidden name beside the final one. `keep` renames it; a draft that is dropped is removed.
 pub struct Draft {
@@ -29,9 +46,16 @@ impl Draft {
         }
         let target = if there.is_ok() { path.canonicalize().map_err(Error::file(path))? } else { path.into() };
         let nameless = || Error::file(path)(ErrorKind::InvalidFilename.into());
-        let name = target.file_name().ok_or_else(nameless)?.to_string_lossy().into_owned();
+        let name = target.file_name().ok_or_else(nameless)?.to_owned();
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let target = folder.canonicalize().unwrap_or(folder.into()).join(&name);
+        let name = name.to_string_lossy();
         let hidden = target.with_file_name(format!(".{}.{name}", std::process::id()));
-        drafts().push(hidden.clone());
+        let mut book = book();
+        if book.drafts.iter().any(|draft| draft.hidden == hidden) {
+            return Err(Error::input(format!("{}: two outputs have this name", path.display())));
+        }
+        book.drafts.push(Entry { hidden: hidden.clone(), path: path.into() });
         Ok(Self { path: path.into(), target, hidden: Some(hidden) })
     }
 
@@ -40,32 +64,93 @@ impl Draft {
     }
 
     pub fn create(&self) -> Result<File> {
+        // A command that is being stopped creates no file behind the back of `stop`.
+        let _book = book();
         let made = if self.target.is_dir() { Err(ErrorKind::IsADirectory.into()) } else { File::create(self.place()) };
         made.map_err(Error::file(&self.path))
     }
 
-    /// Renames the draft; an existing file of that name is replaced.
+    /// Renames the draft; an existing file of that name is replaced. Some file systems report a full disk not before the contents are
+    /// synchronized.
     pub fn keep(mut self) -> Result<()> {
         let Some(hidden) = &self.hidden else { return Ok(()) };
-        std::fs::rename(hidden, &self.target).map_err(Error::file(&self.path))?;
-        self.forget();
-        Ok(())
-    }
-
-    fn forget(&mut self) {
-        if let Some(hidden) = self.hidden.take() {
-            drafts().retain(|draft| *draft != hidden);
+        if hidden.is_file() {
+            let file = File::options().write(true).open(hidden);
+            file.and_then(|file| file.sync_all()).map_err(Error::file(&self.path))?;
         }
+        let mut book = book();
+        std::fs::rename(hidden, &self.target).map_err(Error::file(&self.path))?;
+        book.drafts.retain(|draft| draft.hidden != *hidden);
+        note(&mut book.kept, &self.path);
+        drop(book);
+        self.hidden = None;
+        Ok(())
     }
 }
 
 impl Drop for Draft {
     fn drop(&mut self) {
         if let Some(hidden) = &self.hidden {
+            let mut book = book();
             discard(hidden);
+            book.drafts.retain(|draft| draft.hidden != *hidden);
+            note(&mut book.discarded, &self.path);
         }
-        self.forget();
     }
+}
+
+/// Notes a file that is whole at any time, because rows are added to it one by one.
+pub fn note_rows(path: &Path) {
+    note(&mut book().kept, path);
+}
+
+/// Notes that the same command goes on from the rows of a file.
+pub fn note_resumed(path: &Path) {
+    note(&mut book().resumed, path);
+}
+
+/// Ends the process with a line that says what is left: no draft, and no file created from now on.
+pub fn stop(say: impl FnOnce(&str), code: i32) -> ! {
+    let mut book = book();
+    for Entry { hidden, path } in std::mem::take(&mut book.drafts) {
+        // Another thread may still add files to a folder.
+        (0..100).take_while(|_| hidden.exists()).for_each(|_| discard(&hidden));
+        note(&mut book.discarded, &path);
+    }
+    say(&left_of(&book));
+    std::process::exit(code)
+}
+
+/// What is left of all outputs: `; kept a.csv; b.csv is as it was; c.csv was not written`, or nothing without outputs.
+pub fn left() -> String {
+    left_of(&book())
+}
+
+fn left_of(book: &Book) -> String {
+    let list = |paths: &[&PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+    let lost = book.discarded.iter().filter(|path| !book.kept.contains(path));
+    let (old, none): (Vec<_>, Vec<_>) = lost.partition(|path| path.exists());
+    let kept: Vec<_> = book.kept.iter().collect();
+    let resumed: Vec<_> = book.resumed.iter().filter(|path| path.exists()).collect();
+    let is = |paths: &[&PathBuf]| if paths.len() == 1 { "is" } else { "are" };
+    let was = |paths: &[&PathBuf]| if paths.len() == 1 { "was" } else { "were" };
+    let parts = [
+        (!kept.is_empty()).then(|| format!("kept {}", list(&kept))),
+        (!resumed.is_empty()).then(|| format!("the same command goes on from {}", list(&resumed))),
+        (!old.is_empty()).then(|| format!("{} {} as before", list(&old), is(&old))),
+        (!none.is_empty()).then(|| format!("{} {} not written", list(&none), was(&none))),
+    ];
+    parts.into_iter().flatten().map(|part| format!("; {part}")).collect()
+}
+
+fn note(paths: &mut Vec<PathBuf>, path: &Path) {
+    if !paths.iter().any(|known| known == path) {
+        paths.push(path.into());
+    }
+}
+
+fn book() -> MutexGuard<'static, Book> {
+    BOOK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 pub fn csv(rows: &[impl serde::Serialize]) -> Result<Vec<u8>> {
@@ -83,14 +168,6 @@ pub fn rows<R: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<R>> {
         let path = path.display();
         Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
     })
-}
-
-pub fn discard_drafts() {
-    drafts().drain(..).for_each(|draft| discard(&draft));
-}
-
-fn drafts() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
-    DRAFTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn discard(draft: &Path) {

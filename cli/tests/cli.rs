@@ -459,30 +459,6 @@ fn an_existing_file_is_replaced_with_a_note() {
     assert_eq!(folder.files(), ["motion.csv", "two.contacts"]);
 }
 
-/// A run that ends by a signal leaves the old file and no other.
-#[cfg(unix)]
-#[test]
-fn a_run_that_is_interrupted_leaves_no_half_of_a_file() {
-    let folder = Folder::new().with("motion.csv", "of before\n");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
-    command.args("run pile -p n=64 --steps 1000000 --no-sleep --out motion.csv".split(' '));
-    command.current_dir(folder.path()).env("DRYSTONE_ADAPTER", "none").stderr(Stdio::null());
-    let mut child = command.spawn().expect("the command starts");
-    let written = || {
-        let entries = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("an entry"));
-        entries.map(|e| e.metadata().map_or(0, |m| m.len())).sum::<u64>()
-    };
-    while written() < 100_000 {
-        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill").success());
-    assert_eq!(child.wait().expect("it ends").code(), Some(130));
-    assert_eq!(folder.files(), ["motion.csv"]);
-    assert_eq!(std::fs::read_to_string(folder.path().join("motion.csv")).expect("the file"), "of before\n");
-}
-
 #[cfg(target_os = "linux")]
 #[test]
 fn a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built() {
@@ -521,20 +497,6 @@ fn numbers_that_cannot_be_used_are_an_error() {
     let report: Value = serde_json::from_str(&text(&output.stdout)).expect("a report all the same");
     assert_eq!((&report["non_finite"], output.status.code()), (&1.into(), Some(2)));
     assert!(text(&output.stderr).lines().any(|l| l.starts_with("drystone: ") && l.contains("comet")));
-}
-
-#[test]
-fn the_reader_of_a_pipe_may_stop_reading() {
-    for arguments in
-        ["scenes", "scenes --schema", "run drop --steps 1", "compare drop --steps 1 --backends reference,cpu"]
-    {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
-        command.args(arguments.split(' ')).env("DRYSTONE_ADAPTER", "none");
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
-        drop(child.stdout.take());
-        let output = child.wait_with_output().expect("it ends");
-        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
-    }
 }
 
 /// A closed standard error, as after `2>&1 | head -0`, does not stop the command.

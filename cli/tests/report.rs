@@ -12,7 +12,7 @@ use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
 use drystone_cli::report::comparison::{
     Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all,
 };
-use drystone_cli::report::performance;
+use drystone_cli::report::{Shard, performance};
 
 /// Drystone with 1, 2 and 4 substeps.
 fn three(scene: &Scene, _: Extent) -> Result<Vec<Box<dyn Contender>>> {
@@ -30,7 +30,14 @@ fn scenes() -> Vec<Scene> {
 }
 
 fn survey<'a>(team: &'a Team<'a>, out: &Path) -> Survey<'a> {
-    Survey { scenes: scenes(), teams: vec![team], extent: Extent::Full, problems: Vec::new(), out: out.to_owned() }
+    Survey {
+        scenes: scenes(),
+        teams: vec![team],
+        extent: Extent::Full,
+        problems: Vec::new(),
+        out: out.to_owned(),
+        shard: Shard::WHOLE,
+    }
 }
 
 fn origin(build: &str) -> Origin {

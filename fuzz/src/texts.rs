@@ -9,6 +9,7 @@ use drystone::residuals::Residuals;
 use drystone::scenes::{CATALOGUE, SceneFile};
 use drystone::solver::{Order, Solver};
 use drystone::{ContactProblem, Cpu, Scene, Simulation, SolverConfig};
+use drystone_cli::report::Shard;
 use drystone_cli::report::bench::{self, Bench};
 use drystone_cli::report::comparison::{self, Extent, Origin, Report, Survey};
 use drystone_maze::{Map, Script};
@@ -183,6 +184,7 @@ pub fn row_files() -> Vec<Vec<u8>> {
         extent: Extent::Quick,
         problems: Vec::new(),
         out: folder.path().into(),
+        shard: Shard::WHOLE,
     };
     survey.run(&Origin::here(None), &mut |_, _, _| ()).expect("a report");
     vec![std::fs::read(folder.path().join("scenes.csv")).expect("rows")]

@@ -10,6 +10,7 @@ use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
 use crate::lanes::{InstructionSet, WIDTH, Wide};
+use crate::panics::blaming;
 
 /// What an update reads.
 pub(super) struct Narrow<'a> {
@@ -92,7 +93,8 @@ impl Narrow<'_> {
                         cuboid_pairs.push(CuboidPair { bodies: track.bodies, cuboids: places, prediction, number });
                         update = None;
                     } else {
-                        update = Some(pair.compute(self.sides(pair), prediction, pair_scratch));
+                        let bodies = [pair.body_a, pair.body_b];
+                        update = Some(blaming(bodies, || pair.compute(self.sides(pair), prediction, pair_scratch)));
                     }
                 }
                 events.push(Event { place: place as u32, changes, update });

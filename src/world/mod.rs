@@ -281,6 +281,11 @@ impl World {
         self.bodies.get(i).map_or(Ok(()), |body| check_one(i, body, Body::check))
     }
 
+    /// How messages name a body; by its number alone if there is none.
+    pub(crate) fn name_of(&self, i: usize) -> String {
+        self.bodies.get(i).map_or_else(|| format!("body {i}"), |body| name_of(i, body))
+    }
+
     fn check_bodies(&self, check: fn(&Body) -> Result<()>) -> Result<()> {
         self.bodies.iter().enumerate().try_for_each(|(i, body)| check_one(i, body, check))
     }
@@ -344,5 +349,10 @@ impl World {
 
 /// Refuses a body for which `check` does, in a line that names it.
 fn check_one(i: usize, body: &Body, check: fn(&Body) -> Result<()>) -> Result<()> {
-    check(body).map_err(|e| e.within(format_args!("body {i} {:?}", body.name)))
+    check(body).map_err(|e| e.within(name_of(i, body)))
+}
+
+/// How messages name a body.
+fn name_of(i: usize, body: &Body) -> String {
+    format!("body {i} {:?}", body.name)
 }

@@ -191,6 +191,7 @@ fn table(rows: &[StagesRow], changes: Option<&[Change]>) -> Table {
         cells.extend(changes.map(|changes| match changes[i] {
             Change::New => "new".into(),
             Change::OtherScene => "another scene".into(),
+            Change::OtherMachine => "another machine".into(),
             Change::Same(ratio) => format!("{ratio:.2}"),
             Change::Slower(ratio) => format!("{ratio:.2} SLOWER"),
             Change::Faster(ratio) => format!("{ratio:.2} faster"),

@@ -72,7 +72,6 @@ impl ConformArgs {
                 printed = print(line(check));
             }
         })?;
-        printed?;
         if let Some(path) = &self.junit {
             replacing(path, || files::write(path, junit::text(&found).as_bytes()))?;
         }
@@ -80,6 +79,7 @@ impl ConformArgs {
             let text = serde_json::to_string_pretty(&as_json(&found)).expect("a report serializes");
             replacing(path, || files::write(path, text.as_bytes()))?;
         }
+        printed?;
         let [passed, failed, skipped] = Verdict::ALL.map(|verdict| found.count(verdict));
         say(format_args!("{}: {passed} passed, {failed} failed, {skipped} skipped", found.adapter));
         Ok(failed == 0)

@@ -9,7 +9,8 @@ use super::output::{print, print_json};
 use super::progress::Progress;
 use super::words;
 use crate::hard::{Case, Check, Limit, Setup, passes};
-use crate::report::hard_cases;
+use crate::report::hard_rows::HardRows;
+use crate::report::{Shard, hard_cases};
 use crate::settings;
 use drystone::Result;
 use drystone::backend::BackendKind;
@@ -38,8 +39,17 @@ pub struct HardArgs {
     /// Write the page of all cases into this directory.
     ///
     /// The page has every preset on the CPU, and `balanced` on every backend.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json", "out", "shard", "merge"])]
     page: Option<PathBuf>,
+    /// Write the checks as CSV, those of a case as soon as it ran. A stopped run goes on after the cases in FILE.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Run part I of N of the cases.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    shard: Option<Shard>,
+    /// Take the checks from files of --out that shards wrote, with the same arguments, on machines of any kind, and run nothing.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -69,9 +79,15 @@ impl HardArgs {
         self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
         config.check()?;
         let setup = Setup { config, open: &|| self.backend.open(false) };
+        let mut rows = HardRows::open(self.out.as_deref(), &setup, &self.backend.to_string())?;
+        let shard = self.shard.unwrap_or(Shard::WHOLE);
+        let merged = if self.merge.is_empty() { None } else { Some(rows.merge(&cases, &self.merge)?) };
         let mut all = Vec::new();
-        for case in cases {
-            let checks = case.run(&setup)?;
+        for (k, case) in cases.into_iter().enumerate().filter(|(k, _)| shard.has(*k)) {
+            let checks = match &merged {
+                Some(merged) => merged[k].clone(),
+                None => rows.run(case, &setup)?,
+            };
             if !self.json {
                 print(format_args!("{}  {}", case.name, case.summary))?;
                 checks.iter().try_for_each(|c| print(line(c)))?;

@@ -18,17 +18,18 @@ mod run;
 mod scene;
 mod soak;
 mod solve;
+mod stop;
 #[cfg(feature = "view")]
 mod view;
 mod words;
 
 pub use report::SurveyArgs;
 
+use std::process::ExitCode;
+
 use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use self::output::say;
-use crate::files;
 use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::nearest;
 
@@ -132,42 +133,36 @@ fn arguments() -> Cli {
     })
 }
 
-/// Runs the command line. Exit codes: 0, 1 where a check of `conform` failed, 2 for bad input, 3 for a missing adapter or too little memory, 130 after Ctrl-C.
-pub fn main() -> std::process::ExitCode {
+/// Runs the command line. Exit codes: 0; 1 where a check of `conform` failed, or after a mistake in the program; 2 for bad input and files that
+/// cannot be written; 3 for a missing adapter or too little memory; 128 and the number of the signal that stopped the command: 130 for Ctrl-C,
+/// 141 where nobody reads standard output any more.
+pub fn main() -> ExitCode {
     let cli = arguments();
-    // Ctrl-C removes unfinished files. The call fails only if a handler is set already.
-    let _ = ctrlc::set_handler(|| {
-        files::discard_drafts();
-        std::process::exit(130);
-    });
-    let result = match cli.command {
-        Command::Run(args) => args.run(),
-        Command::Compare(args) => args.run(),
-        Command::Conform(args) => match args.run() {
-            Ok(true) => Ok(()),
-            Ok(false) => return 1.into(),
-            Err(error) => Err(error),
-        },
-        Command::Solve(args) => args.run(),
-        Command::View(args) => args.run(),
-        #[cfg(feature = "fclib")]
-        Command::Export(args) => args.run(),
-        Command::Hard(args) => args.run(),
-        Command::Soak(args) => args.run(),
-        Command::Play(args) => args.run(),
-        Command::Replay(args) => args.run(),
-        Command::Render(args) => args.run(),
-        Command::Bench(args) => args.run(),
-        Command::Report(args) => args.run(),
-        Command::Scenes(args) => args.run(),
-        Command::Settings(args) => args.run(),
-        Command::Adapters(args) => args.run(),
-    };
-    match result {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(e) => {
-            say(format_args!("drystone: {e}"));
-            e.exit_code().into()
-        }
+    stop::guarded(|| cli.command.run())
+}
+
+impl Command {
+    /// Whether all checks passed; commands that check nothing pass.
+    fn run(&self) -> drystone::Result<bool> {
+        match self {
+            Self::Conform(args) => return args.run(),
+            Self::Run(args) => args.run(),
+            Self::Compare(args) => args.run(),
+            Self::Solve(args) => args.run(),
+            Self::View(args) => args.run(),
+            #[cfg(feature = "fclib")]
+            Self::Export(args) => args.run(),
+            Self::Hard(args) => args.run(),
+            Self::Soak(args) => args.run(),
+            Self::Play(args) => args.run(),
+            Self::Replay(args) => args.run(),
+            Self::Render(args) => args.run(),
+            Self::Bench(args) => args.run(),
+            Self::Report(args) => args.run(),
+            Self::Scenes(args) => args.run(),
+            Self::Settings(args) => args.run(),
+            Self::Adapters(args) => args.run(),
+        }?;
+        Ok(true)
     }
 }

@@ -1,7 +1,7 @@
 //! Output of the commands.
 
 use std::fmt::Display;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::Path;
 
 use comfy_table::{Table, presets};
@@ -23,17 +23,27 @@ pub(super) fn replacing<T>(path: &Path, write: impl FnOnce() -> Result<T>) -> Re
     Ok(written)
 }
 
-/// Prints a line to standard output. A closed pipe is no error.
+const STANDARD_OUTPUT: &str = "standard output";
+
+/// Prints a line to standard output.
 pub(super) fn print(text: impl Display) -> Result<()> {
-    match writeln!(std::io::stdout(), "{text}") {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::file("standard output")(e)),
-        _ => Ok(()),
-    }
+    writeln!(std::io::stdout(), "{text}").map_err(Error::file(STANDARD_OUTPUT))
+}
+
+/// Whether the reader of standard output went away, as `head` does.
+pub(super) fn is_closed_pipe(error: &Error) -> bool {
+    matches!(error, Error::File { path, source } if path == Path::new(STANDARD_OUTPUT) && source.kind() == ErrorKind::BrokenPipe)
 }
 
 /// Prints a line to standard error; unlike `eprintln!` without panicking if nothing reads it.
 pub(super) fn say(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Prints the last line of a command that ends early, in place of a bar that may stand there.
+pub(super) fn say_last(text: impl Display) {
+    let clear = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
+    say(format_args!("{clear}drystone: {text}"));
 }
 
 pub(super) fn print_json(value: &impl serde::Serialize) -> Result<()> {

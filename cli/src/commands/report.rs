@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::output::print;
+use super::output::{print, say};
 use super::progress::{PERCENT, Progress};
 use crate::files;
 use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
-use crate::report::{RUNS, Solvers, convergence, performance, problems, rules, solvers};
+use crate::report::{RUNS, Shard, Solvers, convergence, performance, problems, rules, solvers};
 use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
 
@@ -77,8 +77,16 @@ pub struct SurveyArgs {
     /// Threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
+    /// Run part I of N, and leave its rows in DIR/shard-I-of-N for --merge.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Make the report of the rows in these folders of shards, or files of rows, which machines of any kind measured.
+    ///
+    /// Needs the arguments of the shards.
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
     /// Draw the existing rows without running scenes.
-    #[arg(long, conflicts_with_all = ["quick", "brief", "steps", "scene", "problems", "threads"])]
+    #[arg(long, conflicts_with_all = ["quick", "brief", "steps", "scene", "problems", "threads", "shard", "merge"])]
     draw: bool,
 }
 
@@ -130,7 +138,14 @@ impl SurveyArgs {
 
     pub fn run(&self, others: &[&Team]) -> Result<()> {
         let report = if self.draw { Report::read(&self.out)? } else { self.measure(others)? };
-        print(report.write(&self.out)?.display())
+        match self.shard {
+            Some(shard) => print(self.folder_of(shard).display()),
+            None => print(report.write(&self.out)?.display()),
+        }
+    }
+
+    fn folder_of(&self, shard: Shard) -> PathBuf {
+        self.out.join(format!("shard-{shard}"))
     }
 
     fn measure(&self, others: &[&Team]) -> Result<Report> {
@@ -150,9 +165,14 @@ impl SurveyArgs {
         let problems = if some { problems(self.problems.as_deref())? } else { Vec::new() };
         let own: &Team = &drystone;
         let teams = std::iter::once(own).chain(others.iter().copied()).collect();
+        let out = self.shard.map_or_else(|| self.out.clone(), |shard| self.folder_of(shard));
+        let shard = self.shard.unwrap_or(Shard::WHOLE);
+        let survey = Survey { scenes, teams, extent, problems, out, shard };
+        if !self.merge.is_empty() {
+            return survey.merge(&self.merge, self.threads(), &mut |line| say(line));
+        }
         let adapter = adapters().into_iter().next().map(|a| a.to_string());
         let bar = Progress::new(PERCENT, 1, false);
-        let survey = Survey { scenes, teams, extent, problems, out: self.out.clone() };
         let report = survey.run(&Origin::here(adapter), &mut |what, done, total| {
             bar.set_message(what);
             bar.set(done, total);

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -76,6 +76,14 @@ fn check_save((step, file): &(u32, PathBuf), scene: &Scene) -> Result<()> {
     }
 }
 
+/// An error of the recorder, which does not know the name of its file.
+fn of_recording(path: &Path, error: Error) -> Error {
+    match error {
+        Error::File { source, .. } => Error::file(path)(source),
+        other => other,
+    }
+}
+
 impl RunArgs {
     fn recorder(&self, title: &str, draft: &Draft, simulation: &mut Simulation) -> Result<Recorder<BufWriter<File>>> {
         let intervals = RecordingIntervals { hash: self.hash_every, state: self.state_every };
@@ -99,8 +107,12 @@ impl RunArgs {
         let mut spawners = Spawners::new(&scene);
         let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
         let draft = self.record.as_deref().map(Draft::of).transpose()?;
-        let mut recorder =
-            draft.as_ref().map(|draft| self.recorder(&scene.name, draft, &mut simulation)).transpose()?;
+        let recorder = draft.as_ref().map(|draft| self.recorder(&scene.name, draft, &mut simulation)).transpose();
+        let named = |error: Error| match &self.record {
+            Some(path) => of_recording(path, error),
+            None => error,
+        };
+        let mut recorder = recorder.map_err(named)?;
         let bar = Progress::steps(scene.steps, self.scene.json);
         for step in 0..=scene.steps {
             if step > 0 {
@@ -114,7 +126,7 @@ impl RunArgs {
                         stats
                     }
                     None => match &mut recorder {
-                        Some(recorder) => recorder.step(&mut simulation, scene.dt)?,
+                        Some(recorder) => recorder.step(&mut simulation, scene.dt).map_err(named)?,
                         None => simulation.step(scene.dt)?,
                     },
                 };
@@ -134,7 +146,7 @@ impl RunArgs {
             replacing(path, || trajectory.finish())?;
         }
         if let (Some(recorder), Some(draft), Some(path)) = (recorder, draft, &self.record) {
-            recorder.finish(&mut simulation).map_err(|e| e.within(path.display()))?;
+            recorder.finish(&mut simulation).map_err(named)?;
             replacing(path, || draft.keep())?;
         }
         if let Some(path) = &self.out_scene {

@@ -1,6 +1,7 @@
 //! `drystone soak`.
 
 use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,7 +10,7 @@ use super::hard::line;
 use super::output::{print, replacing};
 use super::progress::Progress;
 use super::scene::set_threads;
-use crate::files;
+use crate::files::{self, Draft};
 use crate::hard::passes;
 use crate::soak::{NAMES, ROWS, Row, Soaked, WORLDS, judge};
 use drystone::backend::BackendChoice;
@@ -33,21 +34,39 @@ pub struct SoakArgs {
     list: bool,
 }
 
-/// Rows that are written one by one.
+/// Rows that are written one by one: the file has whole rows at any time.
 struct Rows {
     path: PathBuf,
-    writer: csv::Writer<File>,
+    /// None before the first row: until then, an older file stays.
+    file: Option<File>,
+    /// Bytes of all whole rows.
+    length: u64,
 }
 
 impl Rows {
-    fn create(path: &Path) -> Result<Self> {
-        let file = replacing(path, || File::create(path).map_err(Error::file(path)))?;
-        Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file) })
+    /// Refuses a path that cannot be written.
+    fn check(path: &Path) -> Result<Self> {
+        Draft::of(path)?.create()?;
+        Ok(Self { path: path.into(), file: None, length: 0 })
     }
 
     fn write(&mut self, row: &Row) -> Result<()> {
-        self.writer.serialize(row).map_err(|e| Error::file(&self.path)(e.into()))?;
-        self.writer.flush().map_err(Error::file(&self.path))
+        let mut text = csv::WriterBuilder::new().has_headers(self.file.is_none()).from_writer(Vec::new());
+        text.serialize(row).map_err(|e| Error::file(&self.path)(e.into()))?;
+        let text = text.into_inner().map_err(|e| Error::file(&self.path)(e.into_error()))?;
+        let open = || replacing(&self.path, || File::create(&self.path).map_err(Error::file(&self.path)));
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(open()?),
+        };
+        files::note_rows(&self.path);
+        if let Err(error) = file.write_all(&text) {
+            // Half a row is no row. A device has no length that could be set.
+            let _ = file.set_len(self.length);
+            return Err(Error::file(&self.path)(error));
+        }
+        self.length += text.len() as u64;
+        Ok(())
     }
 }
 
@@ -86,7 +105,7 @@ impl SoakArgs {
             if self.scene.is_empty() { NAMES.into() } else { self.scene.iter().map(String::as_str).collect() };
         // A name that does not exist is refused before anything runs.
         names.iter().try_for_each(|name| Soaked::new(name).map(drop))?;
-        let mut out = self.out.as_deref().map(Rows::create).transpose()?;
+        let mut out = self.out.as_deref().map(Rows::check).transpose()?;
         let bar = Progress::new("row", u64::from(ROWS) * names.len() as u64, false);
         let mut all = Vec::new();
         for name in names {

@@ -9,6 +9,8 @@ pub enum Change {
     New,
     /// The scene has other contents; the times cannot be compared.
     OtherScene,
+    /// Another machine measured the earlier bench; the times cannot be compared.
+    OtherMachine,
     /// Ratio of the new time to the earlier one; within the spread of both.
     Same(f64),
     /// The lower quartile is above the earlier upper one.
@@ -32,6 +34,7 @@ pub fn compare_with(now: &Bench, then: &Bench) -> Vec<Change> {
         let ratio = row.ms / old.ms;
         match () {
             () if old.hash != row.hash => Change::OtherScene,
+            () if !now.machine.is(&then.machine) => Change::OtherMachine,
             () if row.ms_low > old.ms_high => Change::Slower(ratio),
             () if row.ms_high < old.ms_low => Change::Faster(ratio),
             () => Change::Same(ratio),
@@ -74,6 +77,12 @@ mod tests {
         then.rows[0].hash = "0".repeat(16);
         then.rows[1].threads = 7;
         assert_eq!(compare_with(&now, &then), [Change::OtherScene, Change::New]);
+        // Another build of the same machine is what a baseline is for.
+        let mut then = now.clone();
+        then.machine.build = "0.0.1 release".into();
+        assert_eq!(compare_with(&now, &then), [Change::Same(1.0); 2]);
+        then.machine.processor = "another".into();
+        assert_eq!(compare_with(&now, &then), [Change::OtherMachine; 2]);
     }
 
     #[test]

@@ -33,6 +33,12 @@ impl Machine {
         }
     }
 
+    /// Whether times of both can be compared.
+    pub fn is(&self, other: &Self) -> bool {
+        let of = |machine: &Self| (machine.processor.clone(), machine.cores, machine.system.clone());
+        of(self) == of(other)
+    }
+
     pub fn line(&self) -> String {
         let Self { processor, cores, memory, system, build } = self;
         format!("{processor}, {cores} cores, {memory} MiB, {system}; drystone {build}")

@@ -17,6 +17,7 @@ mod windows;
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
 pub use measure::{blocks, measure};
 pub use origin::Origin;
+pub(super) use origin::fnv;
 pub use points::{drystone, scene, scenes, substeps};
 pub use row::{Row, WindowRow};
 pub use solves::SolveRow;

@@ -8,7 +8,7 @@ use fnv::FnvHasher;
 
 use crate::report::bench::Machine;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// Hash of the program file, 16 hexadecimal digits.
     pub build: String,
@@ -30,13 +30,13 @@ impl Origin {
     }
 
     /// The time as text that sorts.
-    pub(super) fn now() -> String {
+    pub(in crate::report) fn now() -> String {
         humantime::format_rfc3339_micros(SystemTime::now()).to_string()
     }
 }
 
 /// 64-bit FNV-1a hash, as 16 hexadecimal digits.
-pub(super) fn fnv(bytes: &[u8]) -> String {
+pub(in crate::report) fn fnv(bytes: &[u8]) -> String {
     let mut hasher = FnvHasher::default();
     hasher.write(bytes);
     format!("{:016x}", hasher.finish())

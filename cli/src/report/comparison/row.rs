@@ -70,13 +70,39 @@ impl Row {
     }
 
     pub fn time_ratio(&self, other: &Self) -> Result<f64> {
-        for (what, own, others) in [("run", &self.run, &other.run), ("scene hash", &self.hash, &other.hash)] {
+        for (what, own, others) in [
+            ("run", &self.run, &other.run),
+            ("scene hash", &self.hash, &other.hash),
+            ("machine", &self.machine, &other.machine),
+        ] {
             if own != others {
                 let names = [self, other].map(|row| format!("{} on {}", row.setting().label(), row.scene));
                 return Err(Error::input(format!("no ratio of {} to {}: {what} {own}, {others}", names[0], names[1])));
             }
         }
         Ok(self.ratio / other.ratio)
+    }
+
+    /// The errors that have the same numbers on every machine.
+    fn errors(&self) -> [(&'static str, f64); 7] {
+        [
+            ("deepest overlap", self.penetration_max),
+            ("95 % overlap", self.penetration_p95),
+            ("mean overlap", self.penetration_mean),
+            ("speed", self.speed_rms),
+            ("drift", self.drift),
+            ("gap of joints", self.joint_gap.unwrap_or(0.0)),
+            ("energy gained", self.energy_gained),
+        ]
+    }
+
+    /// How an error differs from that of the first row with the same setting, of the same scene; nothing if it does not.
+    pub(super) fn differs_from(&self, rows: &[Self]) -> Option<String> {
+        let first = rows.iter().find(|row| row.setting() == self.setting())?;
+        let mut pairs = self.errors().into_iter().zip(first.errors());
+        let ((what, own), (_, other)) = pairs.find(|((_, own), (_, other))| own.to_bits() != other.to_bits())?;
+        let (scene, setting) = (&self.scene, self.setting().label());
+        Some(format!("{scene}, {setting}: {what} {own:e} on {}, and {other:e} on {}", self.machine, first.machine))
     }
 
     /// Whether all bodies of a scene that stands are in place, and all numbers are finite.

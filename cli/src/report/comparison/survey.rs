@@ -14,6 +14,7 @@ use super::row::Row;
 use super::solves::{self, SolveRow, solves};
 use crate::files;
 use crate::report::scene_hash::content_hash;
+use crate::report::shard::{Measured, Shard, gathered, missing};
 use drystone::{ContactProblem, Error, Result, Scene};
 
 // Files of rows in the folder of a report.
@@ -28,6 +29,8 @@ pub struct Survey<'a> {
     pub problems: Vec<ContactProblem>,
     /// Folder of all files; made if needed.
     pub out: PathBuf,
+    /// The part that is run, of the scenes and then the problems.
+    pub shard: Shard,
 }
 
 pub struct Report {
@@ -45,9 +48,10 @@ impl Survey<'_> {
         let mut table = Table::<Row>::open(self.out.join(SCENES))?;
         let weight = |scene: &Scene| (scene.world.dynamic_count() as u64 + 20) * u64::from(scene.steps);
         let problem_weight = |problem: &ContactProblem| problem.contacts.len() as u64 * 20;
-        let total = self.scenes.iter().map(weight).chain(self.problems.iter().map(problem_weight)).sum();
+        let (scenes, problems) = (self.own_scenes(), self.own_problems());
+        let total = scenes.clone().map(weight).chain(problems.clone().map(problem_weight)).sum();
         let (mut before, mut results) = (0, Vec::new());
-        for scene in &self.scenes {
+        for scene in scenes {
             let teams = self.teams.iter().map(|team| team(scene, self.extent)).collect::<Result<Vec<_>>>()?;
             let mut contenders: Vec<_> = teams.into_iter().flatten().collect();
             let settings: Vec<_> = contenders.iter().map(|c| c.setting()).collect();
@@ -65,13 +69,77 @@ impl Survey<'_> {
         }
         let mut table = Table::<SolveRow>::open(self.out.join(PROBLEMS))?;
         let mut all = Vec::new();
-        for problem in &self.problems {
+        for problem in problems {
             progress(&problem.name, before, total);
             let known = solved(table.rows(), &solves::hash(problem), origin);
             all.push(table.add_unless(known, || solves(problem, origin))?);
             before += problem_weight(problem);
         }
         Ok(Report { results, solves: all })
+    }
+
+    fn own_scenes(&self) -> impl Iterator<Item = &Scene> + Clone {
+        self.scenes.iter().enumerate().filter(|(k, _)| self.shard.has(*k)).map(|(_, scene)| scene)
+    }
+
+    fn own_problems(&self) -> impl Iterator<Item = &ContactProblem> + Clone {
+        let numbered = (self.scenes.len()..).zip(&self.problems);
+        numbered.filter(|(k, _)| self.shard.has(*k)).map(|(_, problem)| problem)
+    }
+
+    /// The report of rows that shards of this survey left in folders or files, on any machines; their rows go into the folder. Of a scene that
+    /// several runs measured the last run counts, and `different` gets a line for each error that another run has otherwise.
+    ///
+    /// # Errors
+    /// A scene or a problem has no rows with this number of threads; rows are of several programs; a file cannot be read or written.
+    pub fn merge(&self, sources: &[PathBuf], threads: usize, different: &mut dyn FnMut(String)) -> Result<Report> {
+        let (rows, solved) = (gathered::<Row>(sources, SCENES)?, gathered::<SolveRow>(sources, PROBLEMS)?);
+        let (mut results, mut solves, mut without) = (Vec::new(), Vec::new(), Vec::new());
+        for scene in &self.scenes {
+            let (hash, steps) = (content_hash(scene), super::measure::steps(scene));
+            let own = rows.iter().filter(|row| row.hash == hash && row.steps == steps && row.threads == threads);
+            let own: Vec<_> = own.cloned().collect();
+            own.iter().filter_map(|row| row.differs_from(&own)).for_each(&mut *different);
+            let run = own.iter().map(|row| (&row.run, &row.machine)).max();
+            let last: Vec<_> = own.iter().filter(|row| Some((&row.run, &row.machine)) == run).cloned().collect();
+            if last.is_empty() {
+                without.push(scene.name.as_str());
+            }
+            results.push(last);
+        }
+        for problem in &self.problems {
+            let hash = solves::hash(problem);
+            let own = || solved.iter().filter(|row| row.hash == hash);
+            let run = own().map(|row| (&row.run, &row.machine)).max();
+            let last: Vec<_> = own().filter(|row| Some((&row.run, &row.machine)) == run).cloned().collect();
+            if last.is_empty() {
+                without.push(problem.name.as_str());
+            }
+            solves.push(last);
+        }
+        missing(&without)?;
+        std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
+        files::write(&self.out.join(SCENES), &files::csv(&results.concat())?)?;
+        if !solves.is_empty() {
+            files::write(&self.out.join(PROBLEMS), &files::csv(&solves.concat())?)?;
+        }
+        Ok(Report { results, solves })
+    }
+}
+
+impl Measured for Row {
+    const FIRST: &'static str = "scene";
+
+    fn program(&self) -> [&str; 2] {
+        [&self.build, &self.commit]
+    }
+}
+
+impl Measured for SolveRow {
+    const FIRST: &'static str = "problem";
+
+    fn program(&self) -> [&str; 2] {
+        [&self.build, &self.commit]
     }
 }
 
@@ -118,6 +186,7 @@ impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
         let block = make()?;
         self.rows.extend_from_slice(&block);
         files::write(&self.path, &files::csv(&self.rows)?)?;
+        files::note_resumed(&self.path);
         Ok(block)
     }
 

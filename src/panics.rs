@@ -1,0 +1,35 @@
+//! A panic of a thread that detects contacts, as an error of the step.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// What a panic said.
+pub(crate) struct Panic {
+    /// The bodies whose contact was computed.
+    pub bodies: Option<[u32; 2]>,
+    pub text: String,
+}
+
+impl Panic {
+    fn of(payload: Box<dyn Any + Send>) -> Self {
+        payload.downcast::<Self>().map_or_else(|other| Self { bodies: None, text: text_of(&*other) }, |known| *known)
+    }
+}
+
+fn text_of(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message").to_owned()
+}
+
+/// Calls `compute`. A panic of it goes on with the bodies, up to [`caught`].
+pub(crate) fn blaming<T>(bodies: [u32; 2], compute: impl FnOnce() -> T) -> T {
+    catch_unwind(AssertUnwindSafe(compute)).unwrap_or_else(|payload| {
+        let panic = Panic { bodies: Some(bodies), ..Panic::of(payload) };
+        resume_unwind(Box::new(panic))
+    })
+}
+
+/// Calls `compute`, whose threads may panic. The caller makes anew what a panic leaves half done.
+pub(crate) fn caught<T>(compute: impl FnOnce() -> T) -> Result<T, Panic> {
+    catch_unwind(AssertUnwindSafe(compute)).map_err(Panic::of)
+}
