@@ -11,7 +11,7 @@ use crate::backend::cpu::Reference;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result, ensure, input};
 use crate::saved::{Reader, Saved, Writer};
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, hashes};
 use crate::stats::StepStats;
 use crate::world::{World, WorldChange};
 
@@ -54,7 +54,7 @@ impl Default for RecordingIntervals {
 ///     }
 ///     recorder.step(&mut simulation, 1.0 / 60.0)?;
 /// }
-/// let bytes = recorder.finish(&mut simulation)?;
+/// let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 40)?;
@@ -69,8 +69,8 @@ pub struct Recorder<W: Write> {
     world: World,
     config: SolverConfig,
     asleep: Vec<bool>,
-    /// How often the simulation had gone back to another state.
-    restored: u64,
+    /// The number of the state that the last step left: [`Simulation::state`].
+    state: u64,
     /// The shapes that the recording has.
     shapes: Writer,
     steps: u32,
@@ -88,7 +88,7 @@ const TITLE: u8 = 0;
 const STATE: u8 = 1;
 const STEP: u8 = 2;
 const END: u8 = 3;
-/// A state that the caller went back to before the next step.
+/// A state that the caller went to before the next step.
 const JUMP: u8 = 4;
 
 /// One step of a recording.
@@ -117,7 +117,7 @@ impl<W: Write> Recorder<W> {
             world: simulation.world.clone(),
             config: simulation.config().clone(),
             asleep: simulation.asleep().to_vec(),
-            restored: simulation.restored(),
+            state: simulation.state(),
             shapes: Writer::default(),
             steps: 0,
         };
@@ -128,12 +128,13 @@ impl<W: Write> Recorder<W> {
         Ok(recorder)
     }
 
-    /// Steps the simulation, and notes what the caller changed since the last step.
+    /// Steps the simulation, and notes what the caller changed since the last step. A simulation that the caller stepped, restored, loaded or
+    /// replaced since is noted as a whole.
     ///
     /// # Errors
     /// As [`Simulation::step`], and the recording then has nothing of it; or nothing more can be written.
     pub fn step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
-        if self.restored != simulation.restored() {
+        if self.state != simulation.state() {
             self.part(JUMP, &simulation.save())?;
             self.follow(simulation);
         }
@@ -143,7 +144,7 @@ impl<W: Write> Recorder<W> {
         let config = (*simulation.config() != self.config).then(|| simulation.config().clone());
         let stats = simulation.step(dt)?;
         self.steps += 1;
-        let hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
+        let hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(&simulation.world.bodies));
         let mut record = StepRecord { dt, change, config, woken, hash };
         self.shapes = Writer::behind(std::mem::take(&mut self.shapes));
         record.walk(&mut self.shapes)?;
@@ -156,12 +157,12 @@ impl<W: Write> Recorder<W> {
         Ok(stats)
     }
 
-    /// Ends the recording with the hash of the last state.
+    /// Ends the recording with the hash of what the last step left.
     ///
     /// # Errors
     /// Nothing more can be written.
-    pub fn finish(mut self, simulation: &mut Simulation) -> Result<W> {
-        let (hash, bodies) = hashes(simulation);
+    pub fn finish(mut self) -> Result<W> {
+        let (hash, bodies) = hashes(&self.world.bodies);
         self.part(END, &[&hash.to_le_bytes()[..], &bodies].concat())?;
         self.out.flush().map_err(Error::file("recording"))?;
         Ok(self.out)
@@ -172,7 +173,7 @@ impl<W: Write> Recorder<W> {
         self.config.clone_from(simulation.config());
         self.asleep.clear();
         self.asleep.extend_from_slice(simulation.asleep());
-        self.restored = simulation.restored();
+        self.state = simulation.state();
     }
 
     fn part(&mut self, kind: u8, bytes: &[u8]) -> Result<()> {
@@ -185,11 +186,6 @@ impl<W: Write> Recorder<W> {
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.out.write_all(bytes).map_err(Error::file("recording"))
     }
-}
-
-/// The hash of all bodies, and a byte for each: the lowest of its own hash.
-fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
-    (simulation.hash(), simulation.body_hashes().map(|hash| hash as u8).collect())
 }
 
 /// Where a replay first went another way than the recording.
@@ -206,7 +202,7 @@ fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
 /// #     recorder.step(&mut simulation, 0.01)?;
 /// #     hashes.push(simulation.hash());
 /// # }
-/// # let bytes = recorder.finish(&mut simulation)?;
+/// # let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 6)?;
@@ -254,7 +250,7 @@ struct KeptState {
 /// #     recorder.step(&mut simulation, 0.01)?;
 /// #     hashes.push(simulation.hash());
 /// # }
-/// # let bytes = recorder.finish(&mut simulation)?;
+/// # let bytes = recorder.finish()?;
 /// assert!(Replay::is_recording(&bytes));
 /// let mut replay = Replay::read(&bytes)?;
 /// assert_eq!((replay.title(), replay.len(), replay.is_empty(), replay.dt()), ("a fall", 10, false, Some(0.01)));
@@ -398,12 +394,12 @@ impl Replay {
         let stats = simulation.step(record.dt)?;
         self.step += 1;
         if let Some((hash, bodies)) = &record.hash {
-            if *hash == simulation.hash() {
+            let own = hashes(&simulation.world.bodies);
+            if *hash == own.0 {
                 self.agreed = self.agreed.max(self.step);
             } else if self.difference.is_none_or(|known| known.step > self.step) {
-                let own = simulation.world.bodies.handles().zip(simulation.body_hashes().zip(bodies));
-                let differ: Vec<usize> =
-                    own.filter(|(_, (a, b))| *a as u8 != **b).map(|(body, _)| body.index()).collect();
+                let own = simulation.world.bodies.handles().zip(own.1.iter().zip(bodies));
+                let differ: Vec<usize> = own.filter(|(_, (a, b))| a != b).map(|(body, _)| body.index()).collect();
                 let (step, agreed) = (self.step, self.agreed);
                 self.difference =
                     Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });

@@ -134,7 +134,7 @@ impl RunArgs {
             replacing(path, || trajectory.finish())?;
         }
         if let (Some(recorder), Some(draft), Some(path)) = (recorder, draft, &self.record) {
-            recorder.finish(&mut simulation).map_err(|e| e.within(path.display()))?;
+            recorder.finish().map_err(|e| e.within(path.display()))?;
             replacing(path, || draft.keep())?;
         }
         if let Some(path) = &self.out_scene {
