@@ -38,14 +38,14 @@ pub fn main() -> Result<()> {
     let mut rollback = Rollback::new(8);
     let mut again = 0;
     for now in 0..120 {
-        rollback.push(&mut late);
+        rollback.push(&late);
         step(&mut late, now, &[0])?;
         // What the second player did four steps ago is known now.
         let then = now.saturating_sub(LATE);
         if now >= LATE && push(1, then).is_some() {
             rollback.back(LATE + 1, &mut late)?;
             for i in then..=now {
-                rollback.push(&mut late);
+                rollback.push(&late);
                 step(&mut late, i, if i == then { &[0, 1] } else { &[0] })?;
                 again += 1;
             }

@@ -11,7 +11,7 @@ use crate::backend::cpu::Reference;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result, ensure, input};
 use crate::saved::{Reader, Saved, Writer};
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, hashes};
 use crate::stats::StepStats;
 use crate::world::{World, WorldChange};
 
@@ -54,7 +54,7 @@ impl Default for RecordingIntervals {
 ///     }
 ///     recorder.step(&mut simulation, 1.0 / 60.0)?;
 /// }
-/// let bytes = recorder.finish(&mut simulation)?;
+/// let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 40)?;
@@ -69,8 +69,8 @@ pub struct Recorder<W: Write> {
     world: World,
     config: SolverConfig,
     asleep: Vec<bool>,
-    /// How often the simulation had gone back to another state.
-    restored: u64,
+    /// The number of the state that the last step left: [`Simulation::state`].
+    state: u64,
     /// The shapes that the recording has.
     shapes: Writer,
     steps: u32,
@@ -88,7 +88,7 @@ const TITLE: u8 = 0;
 const STATE: u8 = 1;
 const STEP: u8 = 2;
 const END: u8 = 3;
-/// A state that the caller went back to before the next step.
+/// A state that the caller went to before the next step.
 const JUMP: u8 = 4;
 
 /// One step of a recording.
@@ -117,7 +117,7 @@ impl<W: Write> Recorder<W> {
             world: simulation.world.clone(),
             config: simulation.config().clone(),
             asleep: simulation.asleep().to_vec(),
-            restored: simulation.restored(),
+            state: simulation.state(),
             shapes: Writer::default(),
             steps: 0,
         };
@@ -128,7 +128,8 @@ impl<W: Write> Recorder<W> {
         Ok(recorder)
     }
 
-    /// Steps the simulation, and notes what the caller changed since the last step.
+    /// Steps the simulation, and notes what the caller changed since the last step. A simulation that the caller stepped, restored, loaded or
+    /// replaced since is noted as a whole.
     ///
     /// # Errors
     /// As [`Simulation::step`], and the recording then has nothing of it; or nothing more can be written.
@@ -151,7 +152,7 @@ impl<W: Write> Recorder<W> {
     /// for _ in 0..10 {
     ///     recorder.step_async(&mut simulation, 0.01).await?;
     /// }
-    /// let mut replay = Replay::read(&recorder.finish(&mut simulation)?)?;
+    /// let mut replay = Replay::read(&recorder.finish()?)?;
     /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
     /// while replay.step_async(&mut again).await?.is_some() {}
     /// assert!(again.hash() == simulation.hash() && replay.first_difference().is_none());
@@ -171,7 +172,7 @@ impl<W: Write> Recorder<W> {
 
     /// What the caller changed since the last step.
     fn begin_step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepRecord> {
-        if self.restored != simulation.restored() {
+        if self.state != simulation.state() {
             self.part(JUMP, &simulation.save())?;
             self.follow(simulation);
         }
@@ -185,7 +186,7 @@ impl<W: Write> Recorder<W> {
     /// Writes a step that was made.
     fn end_step(&mut self, mut record: StepRecord, simulation: &mut Simulation) -> Result<()> {
         self.steps += 1;
-        record.hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(simulation));
+        record.hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(&simulation.world.bodies));
         self.shapes = Writer::behind(std::mem::take(&mut self.shapes));
         record.walk(&mut self.shapes)?;
         let bytes = std::mem::take(&mut self.shapes.bytes);
@@ -197,12 +198,12 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    /// Ends the recording with the hash of the last state.
+    /// Ends the recording with the hash of what the last step left.
     ///
     /// # Errors
     /// Nothing more can be written.
-    pub fn finish(mut self, simulation: &mut Simulation) -> Result<W> {
-        write_end(&mut self.out, simulation)?;
+    pub fn finish(mut self) -> Result<W> {
+        write_end(&mut self.out, &self.world)?;
         self.out.flush().map_err(Error::file("recording"))?;
         Ok(self.out)
     }
@@ -212,7 +213,7 @@ impl<W: Write> Recorder<W> {
         self.config.clone_from(simulation.config());
         self.asleep.clear();
         self.asleep.extend_from_slice(simulation.asleep());
-        self.restored = simulation.restored();
+        self.state = simulation.state();
     }
 
     fn part(&mut self, kind: u8, bytes: &[u8]) -> Result<()> {
@@ -239,22 +240,22 @@ impl Recorder<Vec<u8>> {
     /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
     /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
-    /// let (half, hash) = (recorder.ended(&simulation)?, simulation.hash());
+    /// let (half, hash) = (recorder.ended()?, simulation.hash());
     /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
     /// assert!(recorder.so_far().len() > half.len());
     /// let mut replay = Replay::read(&half)?;
     /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
     /// replay.seek(&mut again, 9)?;
     /// assert_eq!((replay.len(), again.hash(), replay.first_difference()), (5, hash, None));
-    /// assert_eq!(Replay::read(&recorder.finish(&mut simulation)?)?.len(), 10);
+    /// assert_eq!(Replay::read(&recorder.finish()?)?.len(), 10);
     /// # Ok::<(), drystone::Error>(())
     /// ```
     ///
     /// # Errors
     /// As [`Recorder::finish`]; memory takes all that is written.
-    pub fn ended(&self, simulation: &Simulation) -> Result<Vec<u8>> {
+    pub fn ended(&self) -> Result<Vec<u8>> {
         let mut all = self.out.clone();
-        write_end(&mut all, simulation)?;
+        write_end(&mut all, &self.world)?;
         Ok(all)
     }
 }
@@ -269,14 +270,9 @@ fn write_part(out: &mut impl Write, kind: u8, bytes: &[u8]) -> Result<()> {
 }
 
 /// Ends a recording with the hash of the last state.
-fn write_end(out: &mut impl Write, simulation: &Simulation) -> Result<()> {
-    let (hash, bodies) = hashes(simulation);
+fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
+    let (hash, bodies) = hashes(&world.bodies);
     write_part(out, END, &[&hash.to_le_bytes()[..], &bodies].concat())
-}
-
-/// The hash of all bodies, and a byte for each: the lowest of its own hash.
-fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
-    (simulation.hash(), simulation.body_hashes().map(|hash| hash as u8).collect())
 }
 
 /// Where a replay first went another way than the recording.
@@ -293,7 +289,7 @@ fn hashes(simulation: &Simulation) -> (u64, Vec<u8>) {
 /// #     recorder.step(&mut simulation, 0.01)?;
 /// #     hashes.push(simulation.hash());
 /// # }
-/// # let bytes = recorder.finish(&mut simulation)?;
+/// # let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 6)?;
@@ -341,7 +337,7 @@ struct KeptState {
 /// #     recorder.step(&mut simulation, 0.01)?;
 /// #     hashes.push(simulation.hash());
 /// # }
-/// # let bytes = recorder.finish(&mut simulation)?;
+/// # let bytes = recorder.finish()?;
 /// assert!(Replay::is_recording(&bytes));
 /// let mut replay = Replay::read(&bytes)?;
 /// assert_eq!((replay.title(), replay.len(), replay.is_empty(), replay.dt()), ("a fall", 10, false, Some(0.01)));
@@ -509,12 +505,12 @@ impl Replay {
         let record = &self.steps[self.step as usize];
         self.step += 1;
         if let Some((hash, bodies)) = &record.hash {
-            if *hash == simulation.hash() {
+            let own = hashes(&simulation.world.bodies);
+            if *hash == own.0 {
                 self.agreed = self.agreed.max(self.step);
             } else if self.difference.is_none_or(|known| known.step > self.step) {
-                let own = simulation.world.bodies.handles().zip(simulation.body_hashes().zip(bodies));
-                let differ: Vec<usize> =
-                    own.filter(|(_, (a, b))| *a as u8 != **b).map(|(body, _)| body.index()).collect();
+                let own = simulation.world.bodies.handles().zip(own.1.iter().zip(bodies));
+                let differ: Vec<usize> = own.filter(|(_, (a, b))| a != b).map(|(body, _)| body.index()).collect();
                 let (step, agreed) = (self.step, self.agreed);
                 self.difference =
                     Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });
@@ -546,7 +542,7 @@ impl Replay {
     /// recorder.step(&mut simulation, 0.01)?;
     /// let after_one = simulation.hash();
     /// recorder.step(&mut simulation, 0.01)?;
-    /// let mut replay = Replay::read(&recorder.finish(&mut simulation)?)?;
+    /// let mut replay = Replay::read(&recorder.finish()?)?;
     /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
     /// pollster::block_on(replay.seek_async(&mut again, 1))?;
     /// assert_eq!((again.hash(), replay.step_number()), (after_one, 1));

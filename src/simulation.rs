@@ -11,6 +11,8 @@ mod rollback;
 mod saved;
 mod stages;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::backend::cpu::Reference;
 use crate::backend::{Backend, CheckedStep};
 use crate::config::{SolverConfig, check_step_length};
@@ -30,6 +32,7 @@ use stages::{Changes, Stages};
 
 pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
+pub(crate) use hash::hashes;
 pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
@@ -109,10 +112,16 @@ pub struct Simulation {
     on_device: bool,
     /// The step that is assembled and did not run, because the backend failed.
     unfinished: Option<Box<Unfinished>>,
-    /// How often the simulation went back to a snapshot.
-    restored: u64,
+    /// The number of the state that the last step, `load` or `restore` left. No other state of the process has it.
+    state: u64,
     /// Whether the future of a step is pending, or was dropped before its end.
     is_pending: bool,
+}
+
+/// A number that no state has yet.
+fn next_state() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 impl Simulation {
@@ -131,7 +140,7 @@ impl Simulation {
             backend,
             on_device: false,
             unfinished: None,
-            restored: 0,
+            state: next_state(),
             is_pending: false,
         })
     }
@@ -368,6 +377,7 @@ impl Simulation {
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
         timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
+        self.state = next_state();
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
@@ -445,9 +455,10 @@ impl Simulation {
         self.stages.sleep.asleep().get(body) == Some(&true)
     }
 
-    /// How often the simulation went back to a snapshot.
-    pub(crate) fn restored(&self) -> u64 {
-        self.restored
+    /// The number of the state that the last step, `load` or `restore` left: no other state of the process has it. Steps in which all sleep
+    /// leave the state as it was.
+    pub(crate) fn state(&self) -> u64 {
+        self.state
     }
 
     /// Whether each body sleeps; empty if none ever does.
@@ -473,7 +484,7 @@ impl Simulation {
     }
 
     /// The manifolds of the last step, with their impulses.
-    pub fn manifolds(&mut self) -> impl Iterator<Item = SolvedManifold> + Clone {
+    pub fn manifolds(&self) -> impl Iterator<Item = SolvedManifold> + Clone {
         let Stages { detector, contacts, problem, .. } = &self.stages;
         manifolds::of(detector, contacts, problem, self.stages.least_substeps())
     }
@@ -514,7 +525,7 @@ impl Simulation {
     }
 
     /// Overlap when the last step began, from the contacts that it went by.
-    pub fn solved_penetration(&mut self) -> Penetration {
+    pub fn solved_penetration(&self) -> Penetration {
         let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
         Penetration::of(self.manifolds().map(separations))
     }
@@ -553,7 +564,7 @@ impl Simulation {
     }
 
     /// The last step's problem, with the impulses that solved it.
-    pub fn problem(&mut self) -> &StepProblem {
+    pub fn problem(&self) -> &StepProblem {
         &self.stages.problem
     }
 

@@ -65,7 +65,9 @@ pub struct Sleep {
     slow_for: Vec<f32>,
     /// Radius around the origin of each body that holds its shapes (m).
     reach: Vec<f32>,
-    /// Bodies that sleep, and those that cannot be pushed, as they were left.
+    /// Bodies that sleep, and those that cannot be pushed, as they were left. The detector keeps poses of all bodies as well
+    /// ([`Detector::note_left`]): it needs those of bodies that are awake, and no velocities and forces. This list has what wakes a body, or
+    /// nothing that equals anything where a body is disturbed, and is empty where nothing sleeps.
     left: Vec<Snapshot>,
     islands: Islands,
     /// The next body of the island, around; of bodies that sleep.

@@ -285,6 +285,24 @@ fn every_ball_that_passes_a_turnstile_turns_its_cross_by_a_quarter_and_all_pass(
     }
 }
 
+/// More balls come than pass: those that wait stand one behind the other up to the spawner, which waits too.
+#[test]
+fn a_turnstile_with_more_balls_than_pass_does_not_jam() {
+    let (mut passed, mut came, mut deepest) = (Vec::new(), 0, 0.0_f64);
+    flow("turnstile", &["every=40", "n=1000"], 4000, |step, simulation, spawners| {
+        let mut balls = simulation.world.dynamic().filter(|b| b.name == "ball");
+        let in_channel = |b: &Body| (-12.0..3.5).contains(&b.position.x) && b.position.z.abs() < 0.2;
+        assert!(balls.all(|b| b.position.x > 3.5 || in_channel(b)), "step {step}: a ball left the channel");
+        deepest = deepest.max(simulation.solved_penetration().max);
+        came = spawners.came();
+        passed.push(spawners.left());
+    });
+    println!("{came} came, {:?} passed, {deepest} m deep", [999, 1999, 2999, 3999].map(|step| passed[step]));
+    assert!(came < 4000 / 40, "no ball waited");
+    assert!(deepest < 0.02, "{deepest} m deep");
+    assert!(passed[3999] > passed[2999] + 2, "{} balls passed, and {} in the end", passed[2999], passed[3999]);
+}
+
 #[test]
 fn sensors_count_every_ball_of_a_board_once_on_any_backend() {
     const BALLS: u32 = 30;

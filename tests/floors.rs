@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 const LIBRARY: &[&[&str]] = &[
     &["math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
     &["world", "config", "preset"],
-    &["collide", "graph", "scenes", "load"],
-    &["effort", "queries"],
+    &["collide", "graph"],
+    &["effort", "queries", "load", "scenes"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
     &["backend", "solver"],

@@ -64,7 +64,7 @@ fn recorded() -> (Vec<u8>, Simulation) {
         let dt = if step % 7 == 3 { 0.5 * DT } else { DT };
         recorder.step(&mut simulation, dt).expect("a step");
     }
-    (recorder.finish(&mut simulation).expect("memory"), simulation)
+    (recorder.finish().expect("memory"), simulation)
 }
 
 #[test]
@@ -89,6 +89,55 @@ fn a_replay_goes_the_same_way_on_any_backend_and_from_any_step() {
         }
         assert_eq!(replay.first_difference(), None);
     }
+}
+
+/// A recording of 30 steps, of which the caller does something else before the 11th; and the hash of its end.
+fn recorded_with(interrupt: impl Fn(&mut Simulation)) -> (Vec<u8>, u64) {
+    let config = SolverConfig::default().without_sleep();
+    let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+    let intervals = RecordingIntervals { hash: 1, ..INTERVALS };
+    let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
+    for step in 0..30 {
+        if step == 10 {
+            interrupt(&mut simulation);
+        }
+        recorder.step(&mut simulation, DT).expect("a step");
+    }
+    let hash = simulation.hash();
+    // Later changes belong to no step.
+    simulation.world.bodies[5].position.y += 1.0;
+    (recorder.finish().expect("memory"), hash)
+}
+
+/// What lasts from step to step is more than the world: the cubes of a simulation that begins anew have no impulses.
+#[test]
+fn a_simulation_that_another_one_replaced_is_recorded() {
+    let begun_anew = |s: &mut Simulation| {
+        *s = Simulation::new(s.world.clone(), s.config().clone(), reference()).expect("a world");
+    };
+    let loaded = |s: &mut Simulation| {
+        let mut other = Simulation::new(towers(), s.config().clone(), reference()).expect("a world");
+        (0..3).for_each(|_| drop(other.step(DT).expect("a step")));
+        *s = Simulation::load(&other.save(), reference()).expect("what was saved");
+    };
+    let stepped = |s: &mut Simulation| drop(s.step(DT).expect("a step"));
+    let recorded = [
+        ("nothing", recorded_with(|_| ())),
+        ("another", recorded_with(begun_anew)),
+        ("a saved one", recorded_with(loaded)),
+        ("a step", recorded_with(stepped)),
+    ];
+    let mut ends = Vec::new();
+    for (name, (bytes, end)) in recorded {
+        let mut replay = Replay::read(&bytes).expect("a recording");
+        let mut again = replay.begin(reference()).expect("a beginning");
+        while replay.step(&mut again).expect("a step").is_some() {}
+        assert_eq!((replay.first_difference(), again.hash()), (None, end), "{name}");
+        ends.push(end);
+    }
+    ends.sort_unstable();
+    ends.dedup();
+    assert_eq!(ends.len(), 4, "a way changes nothing");
 }
 
 /// Makes a mistake in its 33rd step.
@@ -126,7 +175,7 @@ fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
         let intervals = RecordingIntervals { hash, ..INTERVALS };
         let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
         (0..50).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
-        let bytes = recorder.finish(&mut simulation).expect("memory");
+        let bytes = recorder.finish().expect("memory");
         let mut replay = Replay::read(&bytes).expect("a recording");
         let mut again = replay.begin(Box::new(Broken(Reference::new(), 0))).expect("a beginning");
         while replay.step(&mut again).expect("a step").is_some() {}
@@ -140,7 +189,7 @@ fn what_is_no_whole_recording_is_refused_in_one_line() {
     let mut simulation = Simulation::new(towers(), SolverConfig::default(), reference()).expect("a world");
     let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
     (0..8).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
-    let bytes = recorder.finish(&mut simulation).expect("memory");
+    let bytes = recorder.finish().expect("memory");
     let refusal = |bytes: &[u8]| match Replay::read(bytes) {
         Ok(_) => panic!("it is refused"),
         Err(e) => e.to_string(),
@@ -165,6 +214,6 @@ fn a_world_that_the_caller_leaves_alone_takes_few_bytes_a_step() {
     let mut recorder = Recorder::new(Vec::new(), "pile", &mut simulation, rare).expect("memory");
     let begin = simulation.save().len();
     (0..30).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
-    let bytes = recorder.finish(&mut simulation).expect("memory");
+    let bytes = recorder.finish().expect("memory");
     assert!(bytes.len() < begin + 30 * 64 + 1000, "{} bytes after {begin}", bytes.len());
 }

@@ -294,9 +294,9 @@ fn moved(problem: &StepProblem) -> u64 {
 
 fn the_first_step_sends_everything_and_a_settled_one_how_far_points_are_apart() {
     let scene = pile(200);
-    let (first, mut simulation) = traffic_of(&scene, 1, 1);
+    let (first, simulation) = traffic_of(&scene, 1, 1);
     assert!(first[0].up as usize >= all_rows(simulation.problem()), "{first:?}");
-    let (settled, mut simulation) = traffic_of(&scene, 400, 10);
+    let (settled, simulation) = traffic_of(&scene, 400, 10);
     let problem = simulation.problem();
     let separations = 4 * size_of::<f32>() * problem.swept_contacts().count();
     let least = settled.iter().map(|t| t.up).min().expect("ten steps") as usize;

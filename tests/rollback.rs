@@ -36,13 +36,13 @@ fn late_inputs_give_the_bits_of_inputs_in_time() {
     for step in 0..120_u32 {
         push(&mut in_time, step);
         in_time.step(dt).expect("a step");
-        rollback.push(&mut late);
+        rollback.push(&late);
         late.step(dt).expect("a step");
         differed |= late.hash() != in_time.hash();
         if step % 20 == 19 {
             rollback.back(7, &mut late).expect("eight states");
             for again in step - 6..=step {
-                rollback.push(&mut late);
+                rollback.push(&late);
                 push(&mut late, again);
                 late.step(dt).expect("a step");
             }
@@ -64,7 +64,7 @@ fn a_lap_later_nothing_is_allocated() {
         let mut lap = |count: usize| {
             let mut of_states = 0;
             for _ in 0..count {
-                of_states += asked(|| rollback.push(&mut simulation));
+                of_states += asked(|| rollback.push(&simulation));
                 simulation.step(dt).expect("a step");
             }
             of_states + asked(|| rollback.back(4, &mut simulation).expect("six states"))

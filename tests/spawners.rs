@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::scenes::{Leaves, SceneFile, Spawner, Spawners};
-use drystone::{Body, Cpu, Error, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Error, Groups, Reference, Scene, Shape, Simulation, SolverConfig, World};
 
 fn read(text: &str) -> Result<Scene, Error> {
     SceneFile::parse(text)?.into_scene("unnamed")
@@ -14,9 +14,9 @@ const RAIN: &str = r#"{"version": 1, "bodies": [
     {"name": "box", "position": [3, 0.5, 0], "leaves": {"after": 0.5}, "groups": {"membership": 1},
      "shapes": [{"type": "cuboid", "half_extents": [0.5, 0.5, 0.5]}]}],
   "spawners": [
-    {"every": 10, "body": {"name": "drop", "position": [0, 2, 0], "leaves": {"below": 1}, "shapes": [{"type": "ball", "radius": 0.1}]}},
+    {"every": 10, "body": {"name": "drop", "position": [0, 2, 0], "leaves": {"below": 1}, "groups": {"membership": 2, "filter": 1}, "shapes": [{"type": "ball", "radius": 0.1}]}},
     {"every": 7, "first": 3, "count": 4, "body": {"position": [9, 5, 0], "torque": [0, 1, 0], "gravity_scale": 0.5,
-     "linear_velocity": [1, 0, 0], "shapes": [{"type": "cuboid", "half_extents": [0.1, 0.2, 0.3]}]}}]}"#;
+     "linear_velocity": [3, 0, 0], "shapes": [{"type": "cuboid", "half_extents": [0.1, 0.2, 0.3]}]}}]}"#;
 
 /// Runs a scene and tells before each step who is there.
 fn run(scene: &Scene, steps: u32, mut tell: impl FnMut(&World, &Spawners)) -> (Simulation, Spawners) {
@@ -53,6 +53,37 @@ fn bodies_come_every_so_many_steps_and_leave_below_a_height_or_after_a_time() {
     // The box, and the drops that came before steps 0, 10, 20 and 30.
     assert_eq!(spawners.left(), 5);
     assert!(simulation.world.bodies.iter().all(|body| body.name != "drop" || body.position.y > 0.9));
+}
+
+/// A ball of 0.3 m falls out of its own place in 0.35 s; in a pipe that is closed below there is room for five.
+#[test]
+fn a_spawner_waits_while_its_place_is_taken() {
+    let mut scene = Scene::new("pipe", World::new(), 600);
+    scene.world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    for (x, z) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+        let wall = Body::fixed().shape(Shape::cuboid(0.6, 5.0, 0.6));
+        scene.world.add(wall.position(0.95 * x, 5.0, 0.95 * z));
+    }
+    let group = |bit: u32| Groups { membership: bit, filter: bit };
+    let ball = Body::dynamic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0).groups(group(1));
+    scene.spawners.push(Spawner { count: Some(20), ..Spawner::new(ball, 1) });
+    // What it meets is not in its way: fixed bodies, sensors, and what is of other groups.
+    scene.world.add(Body::fixed().sensor(Shape::ball(5.0)));
+    scene.world.add(Body::fixed().shape(Shape::ball(0.1)).position(0.0, 3.39, 0.0));
+    let other = Body::kinematic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0);
+    scene.world.add(other.groups(group(2)));
+    let (mut came, mut deepest) = (Vec::new(), 0.0_f64);
+    let (_, spawners) = run(&scene, 600, |world, spawners| {
+        came.push(spawners.came());
+        deepest = deepest.max(drystone::metrics::Penetration::of_world(world, &SolverConfig::default()).max);
+    });
+    let second = came.iter().position(|&came| came == 2).expect("a second ball");
+    assert!((20..24).contains(&second) && came[0] == 1, "the second ball comes before step {second}");
+    assert!((4..7).contains(&spawners.came()), "{} balls", spawners.came());
+    assert!(deepest < 0.02, "{deepest} m deep");
+    // In a file that is written meanwhile it waits as well.
+    let (left, _) = spawners.remaining(scene.dt);
+    assert_eq!((left[0].first, left[0].count), (0, Some(20 - spawners.came())));
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub fn replays() -> Vec<Vec<u8>> {
         for _ in 0..6 {
             recorder.step(&mut simulation, 1.0 / 60.0).expect("a step");
         }
-        recorder.finish(&mut simulation).expect("memory")
+        recorder.finish().expect("memory")
     };
     SPECS.iter().map(recorded).collect()
 }

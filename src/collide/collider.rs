@@ -159,9 +159,7 @@ impl BodyState {
         let (position, rotation) = (body.position, body.rotation);
         let moves = body.kind != BodyKind::Fixed;
         let (v, w) = if moves { (body.linear_velocity, body.angular_velocity) } else { (Vec3::ZERO, Vec3::ZERO) };
-        let is_near = position.abs().cmple(Vec3::splat(FARTHEST)).all();
-        // parry squares lengths, and takes rotations for unit quaternions.
-        let in_range = is_near && (squared_length(rotation) - 1.0).abs() < 0.1 && (v.is_finite() && w.is_finite());
+        let in_range = is_placed(position, rotation, FARTHEST) && v.is_finite() && w.is_finite();
         Self {
             rotation,
             center: body.center_of_mass(),
@@ -179,6 +177,12 @@ impl BodyState {
 
 /// Farthest that something is from the origin and still touches anything (m): the square is far inside of single precision.
 pub(super) const FARTHEST: f32 = 1e15;
+
+/// Whether contacts can be computed at a pose, at most `farthest` from the origin along each axis (m): parry squares lengths, and takes rotations
+/// for unit quaternions.
+pub(super) fn is_placed(position: Vec3, rotation: Quat, farthest: f32) -> bool {
+    position.abs().cmple(Vec3::splat(farthest)).all() && (squared_length(rotation) - 1.0).abs() < 0.1
+}
 
 /// Whether a box is so near that something may touch it.
 pub(super) fn is_in_range(aabb: &Aabb) -> bool {

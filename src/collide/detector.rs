@@ -26,7 +26,8 @@ pub struct Detector {
     kinds: Vec<BodyKind>,
     groups: Vec<Groups>,
     moving: Vec<BodyState>,
-    /// Where the last step left each body.
+    /// Where the last step left each body. What has to stay the same for a body to sleep is kept by `sleep`, which stands
+    /// above the detector.
     left: Vec<Left>,
     /// How far gravity moves a body in one step, in each world (m).
     falls: Vec<f32>,

@@ -1,14 +1,13 @@
 //! The colliders of a world where they are now, for queries.
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use rayon::prelude::*;
 
-use super::collider::is_in_range;
+use super::collider::{is_in_range, is_placed};
 use super::tree::{NOWHERE, Tree};
-use crate::math::rotation::squared_length;
-use crate::world::{Body, Collider, MOST_LENGTH, World, placed, pose};
+use crate::world::{Collider, MOST_LENGTH, World, placed, pose};
 
 /// A collider by its body and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,13 +21,9 @@ impl Place {
     pub fn find(self, world: &World) -> Option<(&Collider, Pose)> {
         let body = world.bodies.get(self.body as usize)?;
         let collider = body.colliders.get(self.collider as usize)?;
-        is_placed(body)
+        is_placed(body.position, body.rotation, MOST_LENGTH)
             .then(|| (collider, placed(pose(body.position, body.rotation), pose(collider.position, collider.rotation))))
     }
-}
-
-fn is_placed(body: &Body) -> bool {
-    body.position.abs().cmple(Vec3::splat(MOST_LENGTH)).all() && (squared_length(body.rotation) - 1.0).abs() < 0.1
 }
 
 /// Colliders as the tree of a detection has them, with their boxes there.

@@ -8,6 +8,7 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 
 use crate::collide::{Detector, Place, Places};
+use crate::math::rotation::squared_length;
 use crate::world::{BodyHandle, Collider, MOST_LENGTH, Shape, World, pose};
 use boxes::BoxRay;
 pub use filter::{Filter, Predicate};
@@ -320,7 +321,7 @@ fn is_place(point: Vec3) -> bool {
 
 /// The pose of a shape that is asked about, with its box; none if it is no pose.
 fn placed(shape: &Shape, position: Vec3, rotation: Quat) -> Option<(Pose, (Vec3, Vec3))> {
-    let is_pose = is_place(position) && (rotation.length_squared() - 1.0).abs() < 0.01 && shape.check().is_ok();
+    let is_pose = is_place(position) && (squared_length(rotation) - 1.0).abs() < 0.01 && shape.check().is_ok();
     is_pose.then(|| {
         let own = pose(position, rotation);
         let aabb = shape.0.compute_aabb(&own);

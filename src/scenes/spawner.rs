@@ -2,7 +2,8 @@
 
 use crate::world::Body;
 
-/// Brings bodies that are alike: one every so many steps, at the same place with the same velocity, whatever is there already.
+/// Brings bodies that are alike: one every so many steps, at the same place with the same velocity. It waits while a body overlaps that place which the
+/// new one would push and which is not fixed.
 ///
 /// ```
 /// use drystone::{Body, Scene, Shape, World, scenes::{Leaves, Spawner}};
@@ -21,7 +22,7 @@ pub struct Spawner {
     pub leaves: Leaves,
     /// Steps before the first comes.
     pub first: u32,
-    /// Steps from one to the next; 0 is taken as 1.
+    /// Steps from one to the next, at least; 0 is taken as 1.
     pub every: u32,
     /// How many come in all; none for no end.
     pub count: Option<u32>,

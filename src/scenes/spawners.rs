@@ -2,7 +2,8 @@
 
 use super::scene::Scene;
 use super::spawner::{Leaves, Spawner};
-use crate::world::{Body, BodyHandle, World};
+use crate::queries::{Filter, Queries};
+use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
 
 /// Lets the bodies of a scene come and go. The calls alone decide which index a body has.
 ///
@@ -29,6 +30,8 @@ pub struct Spawners {
     spawners: Vec<Spawner>,
     /// Bodies that came by each.
     brought: Vec<u32>,
+    /// The step before which the next body of each comes at the earliest.
+    due: Vec<u32>,
     /// Bodies that may leave.
     staying: Vec<Staying>,
     steps: u32,
@@ -67,12 +70,15 @@ impl Spawners {
         Self {
             spawners: scene.spawners.clone(),
             brought: vec![0; scene.spawners.len()],
+            due: scene.spawners.iter().map(|spawner| spawner.first).collect(),
             staying: scene.leaving.iter().filter_map(staying).collect(),
             ..Self::default()
         }
     }
 
-    /// Takes out the bodies that leave before a step of `dt` seconds, then brings those that come. A scene without either costs nothing.
+    /// Takes out the bodies that leave before a step of `dt` seconds, then brings those that come, spawner by spawner. A body whose place is taken
+    /// comes before the first step in which it is free, and the next one as many steps later. A scene without either costs nothing; each body
+    /// that is due costs a look at all bodies.
     pub fn before_step(&mut self, world: &mut World, dt: f32) {
         let (steps, left) = (self.steps, &mut self.left);
         self.staying.retain(|staying| match world.body(staying.body) {
@@ -83,9 +89,10 @@ impl Spawners {
             }
             body => body.is_some(),
         });
-        for (spawner, brought) in self.spawners.iter().zip(&mut self.brought) {
-            if steps_to_next(spawner, *brought, steps) == Some(0) {
+        for ((spawner, brought), due) in self.spawners.iter().zip(&mut self.brought).zip(&mut self.due) {
+            if *due <= steps && !is_done(spawner, *brought) && is_free(spawner, world) {
                 *brought += 1;
+                *due = steps.saturating_add(spawner.every.max(1));
                 let body = world.insert_in(spawner.world, spawner.body.clone());
                 if spawner.leaves != Leaves::default() {
                     self.staying.push(Staying { body, leaves: spawner.leaves, came: steps });
@@ -117,23 +124,37 @@ impl Spawners {
     /// assert_eq!((left[0].first, left[0].count), (5, Some(1)));
     /// ```
     pub fn remaining(&self, dt: f32) -> (Vec<Spawner>, Vec<(usize, Leaves)>) {
-        let spawner = |(spawner, brought): (&Spawner, &u32)| {
-            let first = steps_to_next(spawner, *brought, self.steps)?;
-            Some(Spawner { first, count: spawner.count.map(|count| count - brought), ..spawner.clone() })
+        let spawner = |((spawner, &brought), due): ((&Spawner, &u32), &u32)| {
+            let (first, count) = (due.saturating_sub(self.steps), spawner.count.map(|count| count - brought));
+            (!is_done(spawner, brought)).then(|| Spawner { first, count, ..spawner.clone() })
         };
         let leaving = |staying: &Staying| {
             let after =
                 staying.leaves.after.map(|after| (f64::from(after) - staying.age(self.steps, dt)).max(0.0) as f32);
             (staying.body.index(), Leaves { after, ..staying.leaves })
         };
-        let spawners = self.spawners.iter().zip(&self.brought).filter_map(spawner).collect();
+        let spawners = self.spawners.iter().zip(&self.brought).zip(&self.due).filter_map(spawner).collect();
         (spawners, self.staying.iter().map(leaving).collect())
     }
 }
 
-/// Steps until the next body of a spawner comes; none if all came.
-fn steps_to_next(spawner: &Spawner, brought: u32, steps: u32) -> Option<u32> {
-    let is_done = spawner.count.is_some_and(|count| brought >= count);
-    let next = u64::from(spawner.first) + u64::from(brought) * u64::from(spawner.every.max(1));
-    if is_done { None } else { u32::try_from(next - u64::from(steps)).ok() }
+/// Whether all bodies of a spawner came.
+fn is_done(spawner: &Spawner, brought: u32) -> bool {
+    spawner.count.is_some_and(|count| brought >= count)
+}
+
+/// Whether the next body of a spawner would overlap none that it would push and that may move away.
+fn is_free(spawner: &Spawner, world: &World) -> bool {
+    let Spawner { body, world: part, .. } = spawner;
+    let may_leave = |_, other: &Body| match other.kind {
+        BodyKind::Fixed => false,
+        BodyKind::Kinematic => body.kind == BodyKind::Dynamic,
+        BodyKind::Dynamic => true,
+    };
+    let filter = Filter::default().groups(body.groups).world(*part).only(&may_leave);
+    let queries = Queries::of(world);
+    body.colliders.iter().filter(|collider| !collider.sensor).all(|collider| {
+        let own = placed(pose(body.position, body.rotation), pose(collider.position, collider.rotation));
+        queries.intersecting(&collider.shape, own.translation, own.rotation, &filter).is_empty()
+    })
 }

@@ -1,7 +1,7 @@
 //! One number for the state of all bodies.
 
 use super::Simulation;
-use crate::world::Body;
+use crate::world::{Bodies, Body};
 
 /// Basis and prime of FNV-1a with 64 bits.
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
@@ -14,25 +14,36 @@ impl Simulation {
     /// out, the index and the generation of its handle (32 bits each), then position, rotation (x y z w), linear and angular velocity in
     /// single precision. -0 is not 0, and a number that is none counts by its bits. The definition stays.
     pub fn hash(&self) -> u64 {
-        let bodies = &self.world.bodies;
-        bodies.handles().fold(BASIS, |hash, body| {
-            add(hash, bodies.generations()[body.index()], body.index(), &bodies[body.index()])
-        })
-    }
-
-    /// The same hash of each body alone, in the order of their indices.
-    pub(crate) fn body_hashes(&self) -> impl Iterator<Item = u64> {
-        let bodies = &self.world.bodies;
-        bodies.handles().map(|body| add(BASIS, bodies.generations()[body.index()], body.index(), &bodies[body.index()]))
+        numbers_of(&self.world.bodies).fold(BASIS, add)
     }
 }
 
-/// The hash with a body added.
-fn add(hash: u64, generation: u32, index: usize, body: &Body) -> u64 {
-    let place = [index as u32, generation];
-    let vectors = [body.position, body.linear_velocity, body.angular_velocity].map(|v| v.to_array().map(f32::to_bits));
-    let rotation = body.rotation.to_array().map(f32::to_bits);
-    let motion = vectors[0].iter().chain(&rotation).chain(&vectors[1]).chain(&vectors[2]);
-    let bytes = place.iter().chain(motion).flat_map(|number| number.to_le_bytes());
+/// The hash of all bodies, and a byte for each in the order of their indices: the least of the same hash of that body alone.
+pub(crate) fn hashes(bodies: &Bodies) -> (u64, Vec<u8>) {
+    let mut of_all = BASIS;
+    let of_each = numbers_of(bodies).map(|numbers| {
+        of_all = add(of_all, numbers);
+        add(BASIS, numbers) as u8
+    });
+    let of_each = of_each.collect();
+    (of_all, of_each)
+}
+
+/// The numbers of each body.
+fn numbers_of(bodies: &Bodies) -> impl Iterator<Item = [u32; 15]> {
+    bodies.handles().map(|handle| {
+        let Body { position, rotation, linear_velocity, angular_velocity, .. } = &bodies[handle.index()];
+        let mut numbers = [0; 15];
+        numbers[..2].copy_from_slice(&[handle.index() as u32, bodies.generations()[handle.index()]]);
+        let vectors = [linear_velocity, angular_velocity].into_iter().flat_map(|v| v.to_array());
+        let motion = position.to_array().into_iter().chain(rotation.to_array()).chain(vectors);
+        numbers[2..].iter_mut().zip(motion).for_each(|(number, x)| *number = x.to_bits());
+        numbers
+    })
+}
+
+/// The hash with the bytes of some numbers added.
+fn add(hash: u64, numbers: [u32; 15]) -> u64 {
+    let bytes = numbers.into_iter().flat_map(u32::to_le_bytes);
     bytes.fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
 }

@@ -18,14 +18,14 @@ use crate::error::{Result, input};
 /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let mut rollback = Rollback::new(8);
 /// for _ in 0..20 {
-///     rollback.push(&mut simulation);
+///     rollback.push(&simulation);
 ///     simulation.step(1.0 / 60.0)?;
 /// }
 /// // The ball was pushed three steps ago, as it turns out.
 /// rollback.back(3, &mut simulation)?;
 /// simulation.world.bodies[ball].linear_velocity.x = 1.0;
 /// for _ in 0..3 {
-///     rollback.push(&mut simulation);
+///     rollback.push(&simulation);
 ///     simulation.step(1.0 / 60.0)?;
 /// }
 /// assert!(simulation.world.bodies[ball].position.x > 0.04 && rollback.len() == 8);
@@ -67,7 +67,7 @@ impl Rollback {
     }
 
     /// Keeps the state of now, before a step. Where there is no more room, the oldest state goes.
-    pub fn push(&mut self, simulation: &mut Simulation) {
+    pub fn push(&mut self, simulation: &Simulation) {
         let is_full = self.states.len() == self.capacity;
         let memory = if is_full { self.states.pop_front() } else { self.spare.pop() };
         let state = match memory {

@@ -1,6 +1,6 @@
 //! Runs that fork, go back, and go into bytes.
 
-use super::{Simulation, Stages};
+use super::{Simulation, Stages, next_state};
 use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result, ensure, input};
@@ -55,7 +55,7 @@ impl Simulation {
     /// assert_eq!(one.hash(), other.hash());
     /// # Ok::<(), drystone::Error>(())
     /// ```
-    pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
+    pub fn fork(&self, backend: Box<dyn Backend>) -> Self {
         let Snapshot { world, config, stages } = self.snapshot();
         Self {
             world,
@@ -64,7 +64,7 @@ impl Simulation {
             stages: *stages,
             on_device: false,
             unfinished: None,
-            restored: 0,
+            state: next_state(),
             is_pending: false,
         }
     }
@@ -84,13 +84,13 @@ impl Simulation {
     /// assert_eq!(simulation.hash(), after);
     /// # Ok::<(), drystone::Error>(())
     /// ```
-    pub fn snapshot(&mut self) -> Snapshot {
-        let Self { world, config, stages, backend: _, on_device: _, unfinished: _, restored: _, is_pending: _ } = self;
+    pub fn snapshot(&self) -> Snapshot {
+        let Self { world, config, stages, .. } = self;
         Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
     }
 
     /// The same, in place of another state, with its memory.
-    pub fn snapshot_into(&mut self, snapshot: &mut Snapshot) {
+    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         snapshot.world.clone_from(&self.world);
         snapshot.config.clone_from(&self.config);
         (*snapshot.stages).clone_from(&self.stages);
@@ -105,7 +105,7 @@ impl Simulation {
         self.on_device = false;
         self.unfinished = None;
         self.is_pending = false;
-        self.restored += 1;
+        self.state = next_state();
     }
 
     /// The state between two steps as bytes, for [`Simulation::load`]: the same on every machine. They begin with a version and a hash of
@@ -156,8 +156,16 @@ impl Simulation {
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
         let stages = Stages::new(&world, &config);
-        let mut simulation =
-            Self { stages, world, config, backend, on_device: false, unfinished: None, restored: 0, is_pending: false };
+        let mut simulation = Self {
+            stages,
+            world,
+            config,
+            backend,
+            on_device: false,
+            unfinished: None,
+            state: next_state(),
+            is_pending: false,
+        };
         let mut reader = Reader::new(content);
         simulation.walk(&mut reader).map_err(refused)?;
         ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
@@ -173,7 +181,7 @@ impl Simulation {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, restored: _, is_pending: _ } = self;
+        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, state: _, is_pending: _ } = self;
         world.walk(archive)?;
         config.walk(archive)?;
         if A::READS {

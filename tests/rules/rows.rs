@@ -73,7 +73,7 @@ fn the_row_of_a_patch_is_the_middle_of_its_points_with_the_masses_there() {
 #[test]
 fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
-        let mut simulation = on_a_slope(SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
+        let simulation = on_a_slope(SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
         let up = -1000.0 * simulation.world.gravity * DT / 8.0;
         let manifold = simulation.manifolds().next().expect("it lies");
         let pushed = manifold.points().iter().map(|p| manifold.normal * p.normal_impulse + p.friction_impulse);

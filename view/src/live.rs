@@ -501,7 +501,7 @@ mod tests {
                 simulation.hash()
             })
             .collect();
-        let replay = Replay::read(&recorder.finish(&mut simulation).expect("memory")).expect("a recording");
+        let replay = Replay::read(&recorder.finish().expect("memory")).expect("a recording");
         let mut live = Live::of_recording(replay, BackendChoice::Reference, false, ColorBy::Batch).expect("a scene");
         // Whatever stands before the bodies is not drawn.
         let Bounds { low, high } = live.container().expect("bodies");

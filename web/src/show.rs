@@ -261,7 +261,7 @@ impl Show {
                 false => "the run has become too long to be recorded: restart it",
             })
         };
-        thrown(self.recorder.as_ref().ok_or_else(none).and_then(|recorder| recorder.ended(&self.live.simulation)))
+        thrown(self.recorder.as_ref().ok_or_else(none).and_then(|recorder| recorder.ended()))
     }
 }
 

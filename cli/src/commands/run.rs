@@ -146,7 +146,7 @@ impl RunArgs {
             replacing(path, || trajectory.finish())?;
         }
         if let (Some(recorder), Some(draft), Some(path)) = (recorder, draft, &self.record) {
-            recorder.finish(&mut simulation).map_err(named)?;
+            recorder.finish().map_err(named)?;
             replacing(path, || draft.keep())?;
         }
         if let Some(path) = &self.out_scene {

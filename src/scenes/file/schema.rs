@@ -78,7 +78,7 @@ pub struct SceneFile {
     pub spawners: Vec<SpawnerFile>,
 }
 
-/// Brings bodies that are alike while a scene runs: before a step, one every so many steps, whatever is at their place already.
+/// Brings bodies that are alike while a scene runs: before a step, one every so many steps, later where their place is taken.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spawner")]

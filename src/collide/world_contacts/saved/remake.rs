@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::WorldContacts;
-use crate::collide::collider::{BodyState, FARTHEST};
+use crate::collide::collider::{BodyState, FARTHEST, is_placed};
 use crate::collide::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
 use crate::collide::manifold::Manifold;
 use crate::collide::pair::{Pair, PairScratch, Side};
@@ -39,10 +39,7 @@ impl WorldContacts {
     pub(super) fn remake(&mut self, wanted: &[u32], counts: &[u32], mut slots: &[u32]) -> Result<()> {
         let can_be = |&i: &u32| {
             let (_, Track { predicted, then, .. }) = self.pairs.with_track(i as usize);
-            let is_near = |place: &Placed| {
-                place.center.abs().max_element() <= FARTHEST && (place.rotation.length_squared() - 1.0).abs() < 0.1
-            };
-            then.iter().all(is_near) && *predicted >= 0.0
+            then.iter().all(|place| is_placed(place.center, place.rotation, FARTHEST)) && *predicted >= 0.0
         };
         ensure(wanted.par_iter().all(can_be), || "a pair was computed where nothing can be".to_owned())?;
         let again = wanted.par_chunks(PAIRS_A_TASK).flat_map_iter(|chunk| {
