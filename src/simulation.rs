@@ -302,6 +302,9 @@ impl Simulation {
 
     /// Runs and stores what is assembled.
     fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
+        if self.stages.is_foreign {
+            self.check_foreign()?;
+        }
         let stages = &mut self.stages;
         let (carry, passes) = (&stages.contacts.carry, &stages.plan.passes);
         let step = CheckedStep::built(&mut stages.problem, passes);
@@ -317,8 +320,18 @@ impl Simulation {
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
+        self.stages.is_foreign &= stats.asleep > 0;
         stats.first_non_finite = self.world.first_non_finite();
         Ok(())
+    }
+
+    /// Refuses rows that follow from state which someone forged.
+    fn check_foreign(&mut self) -> Result<()> {
+        let checked = CheckedStep::new(&mut self.stages.problem, &self.stages.plan.passes).map(drop);
+        checked.map_err(|error| {
+            self.begin_anew();
+            error.within("the state that was loaded")
+        })
     }
 
     /// Lets another backend repeat a step whose device was lost. Other errors leave the step to the caller.
