@@ -322,10 +322,14 @@ impl Simulation {
             stages.prepare(world, config, dt, *on_device, stats);
             true
         });
-        assembled.map_err(|panic| {
+        let is_assembled = assembled.map_err(|panic| {
             self.begin_anew();
             self.panicked(panic)
-        })
+        })?;
+        if is_assembled && self.stages.is_foreign {
+            self.check_foreign()?;
+        }
+        Ok(is_assembled)
     }
 
     /// Gives up the state between steps, which a panic left half done: the next step finds all contacts anew.
@@ -381,7 +385,17 @@ impl Simulation {
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
+        self.stages.is_foreign &= stats.asleep > 0;
         stats.first_non_finite = self.world.first_non_finite();
+    }
+
+    /// Refuses rows that follow from state which someone forged.
+    fn check_foreign(&mut self) -> Result<()> {
+        let checked = CheckedStep::new(&mut self.stages.problem, &self.stages.plan.passes).map(drop);
+        checked.map_err(|error| {
+            self.begin_anew();
+            error.within("the state that was loaded")
+        })
     }
 
     /// Lets another backend repeat a step whose device was lost. Without one the step is left to the caller.

@@ -66,7 +66,15 @@ fn is_one_line(error: &Error) {
     assert!(line.len() < 4000, "an error of {} bytes: {}...", line.len(), line.chars().take(200).collect::<String>());
 }
 
-/// The value, or none after a look at the error.
+/// The value, or none after a look at the error, which must not be a mistake of the library.
 fn good<T>(result: drystone::Result<T>) -> Option<T> {
+    if let Err(error) = &result {
+        assert!(!matches!(error, Error::Panicked(_)), "{error}");
+    }
+    borne(result)
+}
+
+/// The same, of what someone forged.
+fn borne<T>(result: drystone::Result<T>) -> Option<T> {
     result.map_err(|error| is_one_line(&error)).ok()
 }

@@ -2,6 +2,7 @@
 //! a kind it names all kinds, each with its longest input.
 #![no_main]
 
+use std::panic::catch_unwind;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -29,6 +30,8 @@ fn write_seeds(folder: &Path) -> std::io::Result<()> {
 
 libfuzzer_sys::fuzz_target!(
     init: {
+        // A panic that the library makes an error of is none here: libfuzzer-sys would abort in its hook.
+        std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
         chosen();
         if let Some(folder) = std::env::var_os("DRYSTONE_FUZZ_SEEDS") {
             std::process::exit(match write_seeds(Path::new(&folder)) {
@@ -40,5 +43,5 @@ libfuzzer_sys::fuzz_target!(
             });
         }
     },
-    |data: &[u8]| (chosen().check)(data)
+    |data: &[u8]| catch_unwind(|| (chosen().check)(data)).unwrap_or_else(|_| std::process::abort())
 );

@@ -12,6 +12,7 @@ use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
+use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
 use crate::world::{BodyKind, Bounds, Joint, JointHandle, Linear, World};
 
@@ -70,6 +71,27 @@ impl JointRows {
     /// Whether the rows are those of the joints of the world.
     pub fn are_of(&self, world: &World) -> bool {
         self.joints == *world.joints && self.handles == world.joints.handles()
+    }
+
+    /// Refuses rows that name bodies, joints or systems that are not there.
+    pub(crate) fn check(&self, bodies: usize, problem: &StepProblem) -> Result<()> {
+        let count = self.joints.len();
+        let lengths = [self.handles.len(), self.edges.len(), self.shares.len()];
+        // The impulses of axes stand behind those of joints.
+        let impulses = problem.joint_impulses.len();
+        ensure(lengths == [count; 3] && impulses >= count, || {
+            format!("{lengths:?}, {impulses} rows of {count} joints")
+        })?;
+        let is_body = |&body: &u32| body == IMMOVABLE || (body as usize) < bodies;
+        let has_bodies = |joint: &Joint| joint.body_a < bodies && joint.body_b.is_none_or(|body| body < bodies);
+        let are_bodies = self.edges.iter().all(|edge| is_body(&edge.a) && is_body(&edge.b));
+        ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint is of a body beyond the last".into())?;
+        let Coloring { order, offsets, .. } = &self.coloring;
+        let are_joints = order.iter().all(|&joint| (joint as usize) < count);
+        let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
+        let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
+        let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.needs.len()] == [count; 2];
+        ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
     }
 
     /// Lets all joints choose their colors anew.

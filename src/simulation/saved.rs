@@ -4,6 +4,7 @@ use super::{Simulation, Stages, next_state};
 use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::{Error, Result, ensure, input};
+use crate::panics;
 use crate::saved::{Archive, Reader, Saved, Writer, hash_of};
 use crate::world::World;
 
@@ -130,7 +131,7 @@ impl Simulation {
     /// The simulation that was saved, with a backend of its own.
     ///
     /// # Errors
-    /// The bytes are none of a saved run, of another version, damaged or cut short.
+    /// The bytes are none of a saved run, of another version, damaged or cut short. Of bytes that someone forged the first steps may fail.
     ///
     /// ```
     /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
@@ -167,7 +168,8 @@ impl Simulation {
             is_pending: false,
         };
         let mut reader = Reader::new(content);
-        simulation.walk(&mut reader).map_err(refused)?;
+        let read = panics::caught(|| simulation.walk(&mut reader));
+        read.map_err(|panic| refused(format_args!("damaged: {}", panic.text)))?.map_err(refused)?;
         ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
         Ok(simulation)
     }

@@ -34,6 +34,8 @@ pub(super) struct Stages {
     /// Points of the contacts that take part, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
+    /// Whether rows came from bytes that were loaded, whose hash anyone can make, and did not all take part in a step since.
+    pub is_foreign: bool,
 }
 
 crate::saved::cloned!(Stages {
@@ -51,6 +53,7 @@ crate::saved::cloned!(Stages {
     plan_key,
     points,
     bytes_moved,
+    is_foreign,
 });
 
 /// The settings and the properties of bodies that all rows were written for. A change of this value, and nothing else, brings all state
@@ -123,6 +126,7 @@ impl Stages {
             plan_key: None,
             points: 0,
             bytes_moved: 0,
+            is_foreign: false,
         }
     }
 
@@ -144,8 +148,13 @@ impl Stages {
             plan_key: _,
             points: _,
             bytes_moved: _,
+            is_foreign,
         } = self;
+        *is_foreign = A::READS;
         key.walk(archive)?;
+        if A::READS {
+            key.config.check()?;
+        }
         let step = key.scale.map_or(0.0, |scale| scale.step(key.config.substeps));
         detector.walk(world, [key.config.speculative_margin, world.gravity.length() * step * step], archive)?;
         sleep.walk(world, detector.kinds(), archive)?;
@@ -155,6 +164,9 @@ impl Stages {
         joints.walk(archive)?;
         events.walk(archive)?;
         let bodies = detector.kinds().len();
+        if A::READS {
+            joints.check(bodies, problem)?;
+        }
         let of_effort = effort.classes().len();
         ensure(key.surfaces.len() == bodies && (of_effort == 0 || of_effort == bodies), || {
             format!("classes of {of_effort} and surfaces of {} bodies, and not of {bodies}", key.surfaces.len())

@@ -97,6 +97,15 @@ pub struct Collider {
 
 crate::saved::fields!(Collider { shape, position, rotation, sensor });
 
+impl Collider {
+    /// Refuses a shape or a place that cannot be simulated on any body.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.shape.check()?;
+        check_place("position", self.position)?;
+        check_rotation("rotation", self.rotation)
+    }
+}
+
 /// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
 ///
 /// ```
@@ -606,9 +615,7 @@ impl Body {
 
     fn check_shapes(&self) -> Result<()> {
         let check = |c: &Collider| {
-            c.shape.check()?;
-            check_place("position", c.position)?;
-            check_rotation("rotation", c.rotation)?;
+            c.check()?;
             let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
             ensure(fits, || "half-spaces are for fixed bodies, and no sensors".into())?;
             let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();

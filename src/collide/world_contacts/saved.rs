@@ -16,7 +16,7 @@ use crate::collide::collider::{ColliderInfo, CuboidPlace};
 use crate::collide::tree::NOWHERE;
 use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
-use crate::world::{Body, World};
+use crate::world::{Body, Collider, World};
 
 /// A body and its colliders.
 pub(in crate::collide) struct PlacedBody<'a> {
@@ -91,6 +91,9 @@ impl WorldContacts {
             ensure(places.end <= self.colliders.len(), || format!("body {index} has colliders {places:?}"))?;
             let own = body.filter(|_| *is_current).map(|body| &body.colliders[..]);
             ensure(own.is_none_or(|own| own.len() == places.len()), || format!("body {index} has other colliders"))?;
+            if A::READS {
+                own.into_iter().flatten().try_for_each(Collider::check)?;
+            }
             for (k, place) in places.enumerate() {
                 if A::READS {
                     let info = own.map(|own| ColliderInfo::new(*index, k as u32, &own[k]));
