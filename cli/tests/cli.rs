@@ -591,6 +591,7 @@ fn every_measurement_of_a_bench_is_printed_in_three_forms() {
         ("bench pyramid:base=4 pyramid:base=5 --growth", 2, "growth"),
         ("bench tower:n=2 --worlds --quick", 3, "of_best"),
         ("bench pyramid:base=4 --limits --turns 1", 1, "of_triad"),
+        ("bench pile:n=27 tower:n=3 --states --turns 2", 2, "bytes_a_body"),
     ] {
         let arguments = format!("{arguments} --threads 1");
         let measured = folder.json(&format!("{arguments} --json"));

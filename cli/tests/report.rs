@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use drystone::{Error, Result, Scene, SolverConfig, World};
 use drystone_cli::files;
-use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
+use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, StatesRow, WorldsRow};
 use drystone_cli::report::comparison::{
     Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all,
 };
@@ -254,6 +254,15 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
     let worlds =
         WorldsRow { scene: "tower".into(), threads: 1, worlds: 16, per_second: 190_123.0, ..WorldsRow::default() };
     write("worlds.csv", files::csv(&[worlds]).unwrap());
+    let states = StatesRow {
+        scene: "pile:n=9".into(),
+        threads: 2,
+        ms: 2.0,
+        save: 3.3,
+        bytes_a_body: 281.6,
+        ..StatesRow::default()
+    };
+    write("states.csv", files::csv(&[states]).unwrap());
     // One file is missing.
     let message = performance(folder.path()).unwrap_err().to_string();
     assert!(message.contains("limits.csv") && message.lines().count() == 1, "{message}");
@@ -277,6 +286,7 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
         "63 % of a triad",
         "46 % of a peak",
         "190123",
+        "| pile:n=9 | 2 | 2.00 | 0 | 0 | 1.65 | 0 | 282 |",
         "Machine: a machine. Commit c0ffee",
         "Tried and left out",
     ] {

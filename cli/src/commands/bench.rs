@@ -12,7 +12,7 @@ use super::words;
 use crate::files;
 use crate::report::bench::{
     self, Bench, COUNTS, Change, FALLING, FALLING_QUICK, GROWTH, LIMITS, LIMITS_QUICK, Machine, QUICK, STANDARD,
-    StagesRow, WORLDS, compare_with,
+    STATES, StagesRow, WORLDS, compare_with,
 };
 use crate::report::number::number;
 use crate::settings;
@@ -36,23 +36,26 @@ pub struct BenchArgs {
     /// Count the steps of one world in a second, in 1 to 4096 worlds; with --quick to 256.
     #[arg(long, group = "subject")]
     worlds: bool,
+    /// Time what it takes to keep a state, to go back, to save and to load, beside a step, and count bytes a body.
+    #[arg(long, group = "subject")]
+    states: bool,
     /// Compare sweeps with the limits of memory and arithmetic: bytes and operations that are counted, beside a triad and the peak.
     #[arg(long, group = "subject")]
     limits: bool,
     /// Steps of falling scenes.
     #[arg(long, requires = "falling", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
-    /// Turns of each scene; a turn is 10 steps.
+    /// Turns of each scene; a turn is 10 steps, and with --states one.
     #[arg(long, value_name = "N", conflicts_with_all = ["falling", "growth", "worlds"], value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
     /// Backends that run the sweeps.
-    #[arg(long, conflicts_with_all = ["growth", "worlds", "limits"], value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
+    #[arg(long, conflicts_with_all = ["growth", "worlds", "states", "limits"], value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
     backend: Vec<BackendChoice>,
     /// Numbers of threads; 0 means one per core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: Vec<u16>,
     /// Any setting; may be given several times.
-    #[arg(long, conflicts_with_all = ["growth", "worlds", "limits"], value_name = "KEY=VALUE")]
+    #[arg(long, conflicts_with_all = ["growth", "worlds", "states", "limits"], value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Show time ratios to an earlier output of --json.
     ///
@@ -87,6 +90,11 @@ impl BenchArgs {
             let specs = self.specs(&WORLDS);
             let bar = bar(specs.len() * counts.len());
             self.show(&bench::worlds(&specs, counts, &threads, &mut || bar.inc())?, &bar)
+        } else if self.states {
+            let specs = self.specs(&STATES[..STATES.len() - usize::from(self.quick)]);
+            let rounds = self.turns().into();
+            let bar = bar(specs.len() * threads.len() * rounds);
+            self.show(&bench::states(&specs, &threads, rounds, &mut || bar.inc())?, &bar)
         } else if self.limits {
             let specs = self.specs(if self.quick { &LIMITS_QUICK } else { &LIMITS });
             let turns = self.turns().into();

@@ -3,7 +3,7 @@
 //! All scenes are settled first. Then they take turns of a few steps, so that a slow phase of the machine affects all of them. A time
 //! is the median over the turns, its spread the quartiles. All backends and numbers of threads share one simulation of a scene, so that
 //! they do the same work. Other measurements have files of their own: scenes from their first step on (`falling`), one island of
-//! growing size (`growth`), many worlds (`worlds`), and sweeps against the limits of the machine (`limits`).
+//! growing size (`growth`), many worlds (`worlds`), states that are kept (`states`), and sweeps against the limits of the machine (`limits`).
 
 mod baseline;
 mod falling;
@@ -12,6 +12,7 @@ mod limits;
 mod machine;
 mod memory;
 mod rates;
+mod states;
 mod worlds;
 
 pub use baseline::{Change, compare_with};
@@ -19,6 +20,7 @@ pub use falling::{FALLING, FALLING_QUICK, FallingRow, falling, turns};
 pub use growth::{GROWTH, GrowthRow, growth};
 pub use limits::{LIMITS, LIMITS_QUICK, LimitRow, OPERATIONS, limits};
 pub use machine::Machine;
+pub use states::{STATES, StatesRow, states};
 pub use worlds::{COUNTS, WORLDS, WorldsRow, worlds};
 
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Rows;
 use super::engines::{OWN, distinct};
-use crate::report::bench::{FallingRow, GrowthRow, LimitRow, OPERATIONS, WorldsRow};
+use crate::report::bench::{FallingRow, GrowthRow, LimitRow, OPERATIONS, StatesRow, WorldsRow};
 use crate::report::comparison::WindowRow;
 use crate::report::number::number;
 
@@ -16,6 +16,7 @@ pub(super) fn findings(rows: &Rows) -> String {
         ("One island of any size", "growth.csv", growth(&rows.growth)),
         ("Sweeps and the limits of the machine", "limits.csv", limits(&rows.limits)),
         ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
+        ("States that are kept", "states.csv", states(&rows.states)),
     ]
     .map(|(title, files, text)| format!("\n## {title}\n\n{text}\n\nRows: {}.\n", links(files)))
     .concat()
@@ -150,6 +151,26 @@ fn worlds(rows: &[WorldsRow]) -> String {
         let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
         let list = own.map(|r| format!("{:.0} ({}) of {}", r.per_second, number(r.of_best), r.worlds));
         let _ = writeln!(text, "* {}, {}: {} worlds", key.0, on(key.1), list.collect::<Vec<_>>().join(", "));
+    }
+    text.trim_end().to_owned()
+}
+
+fn states(rows: &[StatesRow]) -> String {
+    let mut text = String::from(
+        "The time of a step of a pile at rest that is awake (ms), and in parts of that time: a state into memory that stands (`Rollback::push`), the \
+         way back (`Simulation::restore`), into bytes (`save`) and from them (`load`):\n\n\
+         | scene | threads | step | push | back | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
+    );
+    for r in rows {
+        let [push, back, save, load] = [r.snapshot, r.restore, r.save, r.load].map(|time| number(time / r.ms));
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {push} | {back} | {save} | {load} | {:.0} |",
+            r.scene,
+            r.threads,
+            number(r.ms),
+            r.bytes_a_body
+        );
     }
     text.trim_end().to_owned()
 }

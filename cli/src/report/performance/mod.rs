@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-use super::bench::{FallingRow, GrowthRow, LimitRow, WorldsRow};
+use super::bench::{FallingRow, GrowthRow, LimitRow, StatesRow, WorldsRow};
 use super::comparison::WindowRow;
 use crate::files;
 use drystone::{Error, Result};
@@ -19,6 +19,7 @@ struct Rows {
     growth: Vec<GrowthRow>,
     worlds: Vec<WorldsRow>,
     limits: Vec<LimitRow>,
+    states: Vec<StatesRow>,
 }
 
 /// Files of `drystone-peers --thirds`, one for each number of threads: Rapier's builds for one and for several differ.
@@ -35,6 +36,7 @@ impl Rows {
             growth: rows(folder, "growth.csv")?,
             worlds: rows(folder, "worlds.csv")?,
             limits: rows(folder, "limits.csv")?,
+            states: rows(folder, "states.csv")?,
         })
     }
 
