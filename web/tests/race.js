@@ -102,4 +102,4 @@ window.race = async ({ boxes, entrants, steps, block }) => {
   return found;
 };
 
-window.ready = Promise.all([start(), rapier.init(), simd.init()]).then(() => ({ rapier: rapier.version(), simd: simd.version() }));
+window.ready = Promise.all([start({ module_or_path: "drystone_web_bg.wasm" }), rapier.init(), simd.init()]).then(() => ({ rapier: rapier.version(), simd: simd.version() }));
