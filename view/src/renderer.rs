@@ -4,7 +4,6 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
-use wgpu::util::DeviceExt;
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
@@ -98,7 +97,7 @@ impl Renderer {
         world: &World,
     ) -> Self {
         let meshes = Meshes::new(world);
-        let vertices = vertex_buffer(device, &meshes);
+        let vertices = vertex_buffer(device, queue, bytemuck::cast_slice(&meshes.vertices));
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("view"),
             size: size_of::<View>() as u64,
@@ -183,7 +182,7 @@ impl Renderer {
     pub fn replace(&mut self, world: &World) {
         self.meshes = Meshes::new(world);
         self.drawn = world.bodies.handles().collect();
-        self.vertices = vertex_buffer(&self.device, &self.meshes);
+        self.vertices = vertex_buffer(&self.device, &self.queue, bytemuck::cast_slice(&self.meshes.vertices));
     }
 
     /// Draws `shot` into `target` of width and height `size` (pixels).
@@ -195,12 +194,9 @@ impl Renderer {
         let (middle, reach) = (shot.bounds.center(), 40.0 * shot.bounds.radius().max(shot.camera.distance));
         let ground = Ground { middle, reach, color: self.shades.ground };
         let instances = self.meshes.instances(shot.poses, shot.colors, &ground, hidden);
-        let buffer = |bytes: &[u8]| {
-            let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
-            let usage = wgpu::BufferUsages::VERTEX;
-            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
-        };
-        let (rows, ends) = (buffer(bytemuck::cast_slice(&instances)), buffer(bytemuck::cast_slice(shot.lines)));
+        let (device, queue) = (&self.device, &self.queue);
+        let rows = vertex_buffer(device, queue, bytemuck::cast_slice(&instances));
+        let ends = vertex_buffer(device, queue, bytemuck::cast_slice(shot.lines));
 
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
             let samples = self.quality.samples;
@@ -289,10 +285,14 @@ fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
     })
 }
 
-fn vertex_buffer(device: &wgpu::Device, meshes: &Meshes) -> wgpu::Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+/// A buffer of vertices or instances. It is not mapped when it is made: in a browser that fails where the device is lost.
+fn vertex_buffer(device: &wgpu::Device, queue: &wgpu::Queue, contents: &[u8]) -> wgpu::Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("vertices"),
-        contents: if meshes.vertices.is_empty() { &[0; 24] } else { bytemuck::cast_slice(&meshes.vertices) },
-        usage: wgpu::BufferUsages::VERTEX,
-    })
+        size: contents.len().max(64) as u64,
+        usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&buffer, 0, contents);
+    buffer
 }

@@ -1,5 +1,8 @@
 //! A surface that shows are drawn on: a window, or a canvas of a browser.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use drystone::{Error, Result, World};
 
 use crate::camera::Camera;
@@ -15,6 +18,7 @@ pub struct Sight {
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     api: wgpu::Backend,
+    is_lost: Arc<AtomicBool>,
     pub renderer: Renderer,
 }
 
@@ -91,7 +95,10 @@ impl Sight {
         let formats = surface.get_capabilities(adapter).formats;
         config.format = formats.into_iter().find(|f| !f.is_srgb()).unwrap_or(config.format);
         let renderer = Renderer::new(&device, &queue, config.format, Quality::of(adapter), &World::new());
-        let mut sight = Self { device, queue, surface, config, api: adapter.get_info().backend, renderer };
+        let is_lost = Arc::new(AtomicBool::new(false));
+        let noted = is_lost.clone();
+        device.set_device_lost_callback(move |_, _| noted.store(true, Ordering::Relaxed));
+        let mut sight = Self { device, queue, surface, config, api: adapter.get_info().backend, is_lost, renderer };
         sight.resize((width, height));
         Ok(sight)
     }
@@ -112,6 +119,11 @@ impl Sight {
     /// What draws: Vulkan, Metal, Direct3D, OpenGL (in a browser WebGL2), or WebGPU.
     pub fn api(&self) -> wgpu::Backend {
         self.api
+    }
+
+    /// Whether the device is lost: nothing is drawn from now on, and another sight has to be opened.
+    pub fn is_lost(&self) -> bool {
+        self.is_lost.load(Ordering::Relaxed)
     }
 
     /// Width and height (pixels).

@@ -1,5 +1,5 @@
 // The page: what runs, the loop that steps and draws it, and the controls.
-import start, { Maze, Picture, Show, catalogue, first_difference, hash_after, settings } from "./drystone_web.js";
+import start, { Maze, Picture, Show, catalogue, conform, first_difference, hash_after, settings } from "./drystone_web.js";
 import * as device from "./device.js";
 import * as fields from "./fields.js";
 import * as link from "./link.js";
@@ -70,7 +70,7 @@ function refuse(error) {
 /// Runs what a control asks for, and says why where it cannot be done.
 const tried = (call) => enqueue(call).then((value) => value, refuse);
 
-const hasWebGPU = () => "gpu" in navigator;
+const hasWebGPU = () => pictures[0]?.api() === "WebGPU";
 const aspect = () => {
   const { clientWidth, clientHeight } = element("picture");
   return clientHeight > 0 ? clientWidth / clientHeight : 1;
@@ -110,7 +110,7 @@ function replace(made, opened, next, nextFile) {
   const world = ({ scene, parameters }) => JSON.stringify([scene, parameters]);
   const isSame = shows.length > 0 && made.length > 0 && nextFile === file && world(next) === world(chosen);
   for (const show of made) if (isSame) show.look_as(shows[0]);
-  if (!isSame) framed = null;
+  if (!isSame || framed !== "by hand") framed = null;
   [...shows, ...(game ? [game] : [])].forEach((old) => old.free());
   [shows, game, chosen, file] = [made, opened, next, nextFile];
   [owed, last, difference, tilts.pressed] = [0, null, null, null];
@@ -126,16 +126,33 @@ function replace(made, opened, next, nextFile) {
   say("");
 }
 
-/// The second picture, for the second of two shows.
+const canvases = ["picture", "picture-beside"];
+const MOST_LOSSES = 3;
+let losses = 0;
+
+/// The second picture, for the second of two shows; and new pictures for those whose device was lost.
 async function besides() {
-  if (shows.length === 2 && pictures.length === 1) pictures.push(await Picture.open(element("picture-beside")));
+  if (losses > MOST_LOSSES) return;
+  if (shows.length === 2 && pictures.length === 1) pictures.push(await Picture.open(element(canvases[1])));
+  for (const [k, picture] of pictures.entries()) {
+    if (!picture.is_lost()) continue;
+    losses += 1;
+    if (losses > MOST_LOSSES) {
+      pictures.splice(0).forEach((lost) => lost.free());
+      throw new Error("there is no picture: the device that draws was lost again and again. The numbers are those of the run");
+    }
+    pictures[k] = await Picture.open(element(canvases[k]));
+    picture.free();
+  }
 }
 
-/// Shows all of the scene, unless the view was turned or moved since.
+/// Shows all of the scene and follows its bodies, until the view is turned or moved or a body is touched.
 function whole() {
-  if (framed === "by hand" || framed === aspect()) return;
-  framed = aspect();
-  (game ? [game] : shows).forEach((show) => show.whole(framed));
+  if (framed === "by hand") return;
+  if (framed !== aspect()) {
+    framed = aspect();
+    (game ? [game] : shows).forEach((show) => show.whole(framed));
+  } else if (!paused) shows.forEach((show) => show.follow(framed));
 }
 
 /// Steps as much as time has passed since the last picture, and draws.
@@ -153,26 +170,35 @@ async function frame(now) {
 
 async function play(seconds) {
   if (paused) return;
-  game.advance(seconds, ...tilts.wanted());
+  await game.advance(seconds, ...tilts.wanted());
 }
 
 async function advance(seconds) {
   if (paused) return;
+  try {
+    await steps(seconds);
+  } catch (error) {
+    pause(true);
+    throw error;
+  }
+}
+
+async function steps(seconds) {
   const dt = shows[0].dt();
   owed = Math.min(owed + seconds * pace, MOST_STEPS * dt);
   const began = performance.now();
-  let steps = 0;
+  let made = 0;
   while (owed >= dt && performance.now() - began < PATIENCE) {
     await step();
     owed -= dt;
-    steps += 1;
+    made += 1;
     if (shows[0].is_at_end()) {
       pause(true);
       say("The recording has ended.");
       break;
     }
   }
-  if (seconds > 0) rates.steps += 0.1 * (steps / seconds - rates.steps);
+  if (seconds > 0) rates.steps += 0.1 * (made / seconds - rates.steps);
 }
 
 /// One step of all that runs; notes the first number that differs.
@@ -192,7 +218,7 @@ function draw() {
   const ground = getComputedStyle(document.documentElement).getPropertyValue("--picture").trim();
   const color = [1, 3, 5].map((k) => parseInt(ground.slice(k, k + 2), 16) / 255);
   pictures.forEach((picture, k) => {
-    const canvas = element(k === 0 ? "picture" : "picture-beside");
+    const canvas = element(canvases[k]);
     const size = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * scale));
     const what = game ?? shows[k];
     if (!picture || !what || size[0] === 0 || size[1] === 0) return;
@@ -237,23 +263,22 @@ function tell(now) {
   if (shows.length > 0) {
     numbers.show(told, told.steps !== shown.steps);
     shown.steps = told.steps;
+    // The device was lost, and another backend goes on.
+    if (told.fault && told.fault !== shown.fault) say(told.fault, true);
+    shown.fault = told.fault;
   }
   shown.at = now;
 }
 
 function tick(now) {
   enqueue(() => frame(now))
-    .catch((error) => {
-      pause(true);
-      refuse(error);
-    })
+    .catch(refuse)
     .finally(() => requestAnimationFrame(tick));
 }
 
 function pause(value) {
   paused = value;
   element("play").textContent = paused ? "Run" : "Pause";
-  element("play").setAttribute("aria-pressed", String(!paused));
 }
 
 const restart = () => tried(() => open(chosen, file));
@@ -294,12 +319,11 @@ function panel() {
   told();
   if (isMaze) {
     element("board").value = chosen.maze;
-    element("runs-on").textContent = "runs on the CPU";
+    element("runs-on").lastElementChild.textContent = "CPU";
     element("picture").setAttribute("aria-label", `Picture of the maze ${chosen.maze}`);
     return;
   }
-  const backend = { cpu: "the CPU", webgpu: "WebGPU", both: "the CPU and WebGPU" }[chosen.backend];
-  element("runs-on").textContent = `runs on ${backend}`;
+  element("runs-on").lastElementChild.textContent = { cpu: "CPU", webgpu: "WebGPU", both: "CPU and WebGPU" }[chosen.backend];
   element("picture").setAttribute("aria-label", `Picture of ${file ? file.name : chosen.scene}`);
   document.querySelector(`input[name="backend"][value="${chosen.backend}"]`).checked = true;
   element("settings").hidden = shows[0].is_recording();
@@ -395,6 +419,26 @@ async function openFile(given) {
   });
 }
 
+/// Checks the WebGPU of this browser, and lists what was found.
+async function check() {
+  const list = element("checks");
+  list.replaceChildren();
+  const add = (line) => {
+    const item = Object.assign(document.createElement("li"), { textContent: line });
+    if (line.startsWith("failed")) item.className = "bad";
+    list.prepend(item);
+  };
+  element("conform").disabled = true;
+  element("checked").textContent = "The checks run.";
+  element("conform-dialog").showModal();
+  try {
+    element("checked").textContent = `${await conform(true, [], add)}.`;
+  } catch (error) {
+    element("checked").textContent = error.message;
+  }
+  element("conform").disabled = false;
+}
+
 function gallery() {
   const cards = element("cards");
   if (cards.children.length === 0) {
@@ -448,6 +492,8 @@ function controls() {
   element("backend-note").textContent = hasWebGPU()
     ? "Both runs the CPU beside WebGPU and names the first number that differs."
     : "This browser has no WebGPU: everything runs on the CPU.";
+  element("conform").hidden = !hasWebGPU();
+  on("conform", "click", check);
   for (const id of ["color", "contacts", "joints", "boxes"]) on(id, "change", () => tried(look));
   on("pace", "change", ({ target }) => (pace = Number(target.value)));
   on("open-file", "click", () => element("file").click());
@@ -496,6 +542,10 @@ function dropping() {
 }
 
 const both = (call) => tried(() => shows.map(call)[0]);
+const touched = (call) => {
+  framed = "by hand";
+  return both(call);
+};
 const turned = (call) =>
   tried(() => {
     framed = "by hand";
@@ -506,12 +556,14 @@ const act = {
   pan: (by) => turned((show) => show.pan(...by)),
   zoom: (notches) => turned((show) => show.zoom(notches)),
   whole: () => tried(() => (framed = null)),
-  grab: (at) => (game ? Promise.resolve(false) : both((show) => show.grab(...at, aspect()))),
+  grab: (at) => (game ? Promise.resolve(false) : touched((show) => show.grab(...at, aspect()))),
   drag: (at) => both((show) => show.drag(...at, aspect())),
   release: () => both((show) => show.release()),
-  throw: (at) => both((show) => show.throw_cube(...at, aspect())),
-  delete: (at) => both((show) => show.delete_body(...at, aspect())),
+  throw: (at) => touched((show) => show.throw_cube(...at, aspect())),
+  delete: (at) => touched((show) => show.delete_body(...at, aspect())),
   point: (at) => (pointer = at),
+  /// Whether arrow keys tilt a board.
+  tilts: () => game !== null,
   press: (at) => {
     tilts.pressed = game ? at : null;
     return game !== null;
@@ -545,7 +597,6 @@ function shortcut(event) {
 async function begin() {
   await start({ module_or_path: new URL("drystone_web_bg.wasm", import.meta.url) });
   [scenes, described] = [catalogue(), settings()].map((text) => JSON.parse(text));
-  controls();
   let note = null;
   try {
     pictures = [await Picture.open(element("picture"))];
@@ -553,7 +604,8 @@ async function begin() {
     pictures = [];
     note = `There is no picture: ${error.message}. The numbers are those of the run.`;
   }
-  listen(element("picture"), act, () => document.querySelector('input[name="tool"]:checked').value);
+  controls();
+  for (const id of canvases) listen(element(id), act, () => document.querySelector('input[name="tool"]:checked').value);
   keys(element("picture"), act);
   if (!device.known() && !location.hash) device.measure();
   await enqueue(async () => {
@@ -589,4 +641,10 @@ window.drystone = {
   pause: (value) => ready.then(() => enqueue(() => pause(value))),
   step: () => ready.then(() => enqueue(step)),
   restart: () => ready.then(() => enqueue(() => open(chosen, file))),
+  conform: async (names = [], short = true) => {
+    await ready;
+    const lines = [];
+    lines.push(await conform(short, names, (line) => lines.push(line)));
+    return lines;
+  },
 };

@@ -106,6 +106,7 @@ export function show(state, grows) {
     ["deepest overlap", `${short(state.overlap_max_mm)} mm`],
     ["kinetic energy", `${short(state.kinetic_energy)} J`],
   ];
+  if (state.beside) rows.push(["a step on WebGPU", `${STAGES.reduce((sum, stage) => sum + state.beside.stage_ms[stage], 0).toFixed(2)} ms`]);
   list(element("numbers"), rows);
   bar(state.stage_ms);
   if (grows) {

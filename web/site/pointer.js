@@ -22,6 +22,7 @@ export function listen(canvas, act, tool) {
     const at = place(canvas, event);
     if (down.size > 1) {
       if (drag === "body") act.release();
+      if (drag === "press") act.press(null);
       drag = "pinch";
       return;
     }
@@ -84,6 +85,7 @@ export function keys(canvas, act) {
   canvas.addEventListener("keydown", async (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrow = arrows[event.key];
+    if (arrow && act.tilts()) return;
     if (arrow && held) {
       held = [held[0] + TURN * arrow[0], held[1] + TURN * arrow[1]].map((x) => Math.max(-1, Math.min(1, x)));
       act.drag(held);

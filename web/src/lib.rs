@@ -1,6 +1,7 @@
 //! The page of drystone: what its JavaScript calls.
 
 mod choice;
+mod conform;
 mod describe;
 mod maze;
 mod measure;

@@ -41,7 +41,7 @@ impl Maze {
     }
 
     /// Lets some seconds pass; the board tilts to the right and to the front, each -1 to 1.
-    pub fn advance(&mut self, seconds: f32, right: f32, front: f32) -> std::result::Result<(), JsError> {
+    pub async fn advance(&mut self, seconds: f32, right: f32, front: f32) -> std::result::Result<(), JsError> {
         // A game tilts towards a pointer; at two thirds of the picture the tilt is at its limit.
         let at = Vec2::new(right, -front) / 1.5;
         if at == Vec2::ZERO {
@@ -49,7 +49,7 @@ impl Maze {
         } else {
             self.labyrinth.drag(&Pointer { at, origin: Vec3::ZERO, direction: Vec3::NEG_Z });
         }
-        thrown(self.labyrinth.pass(seconds))
+        thrown(self.labyrinth.advance(seconds).await)
     }
 
     /// Time, tilt and outcome as JSON.

@@ -20,12 +20,11 @@ pub struct Picture {
 impl Picture {
     async fn on(canvas: HtmlCanvasElement) -> Result<Self> {
         let size = (canvas.width(), canvas.height());
-        let sight = Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size).await?;
-        Ok(Self { sight, drawn: 0 })
+        Ok(Self { sight: Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size).await?, drawn: 0 })
     }
 
     /// Draws what has the number `number` on a canvas of `size` pixels.
-    fn draw_show(
+    fn paint(
         &mut self,
         number: u32,
         show: &mut dyn drystone_view::Show,
@@ -59,15 +58,20 @@ impl Picture {
         if self.sight.api() == wgpu::Backend::BrowserWebGpu { "WebGPU" } else { "WebGL" }.into()
     }
 
-    /// Draws a scene on a canvas of `width` times `height` pixels, before a ground of some color (sRGB, 0 to 1).
+    /// Whether the device of the picture is lost, so that another picture has to be opened.
+    pub fn is_lost(&self) -> bool {
+        self.sight.is_lost()
+    }
+
+    /// Draws a scene on a canvas of `width` times `height` pixels, before a background of some color (sRGB, 0 to 1).
     pub fn draw(&mut self, show: &mut Show, width: u32, height: u32, red: f32, green: f32, blue: f32) {
         let camera = show.camera;
-        self.draw_show(show.number, &mut show.live, &camera, (width, height), [red, green, blue]);
+        self.paint(show.number, &mut show.live, &camera, (width, height), [red, green, blue]);
     }
 
     /// Draws a maze likewise.
     pub fn draw_maze(&mut self, maze: &mut Maze, width: u32, height: u32, red: f32, green: f32, blue: f32) {
         let camera = maze.camera;
-        self.draw_show(maze.number, &mut maze.labyrinth, &camera, (width, height), [red, green, blue]);
+        self.paint(maze.number, &mut maze.labyrinth, &camera, (width, height), [red, green, blue]);
     }
 }

@@ -6,7 +6,7 @@ use drystone::metrics::rms_speed;
 use drystone::scenes::SceneFile;
 use drystone::stages::compare::BodyDifference;
 use drystone::{Backend, Cpu, Error, Gpu, Recorder, RecordingIntervals, Replay, Result};
-use drystone_view::{Camera, ColorBy, Live, Overlay, Pointer, Show as _};
+use drystone_view::{Bounds, Camera, ColorBy, Live, Overlay, Pointer, Show as _};
 use glam::Vec2;
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::*;
@@ -23,15 +23,19 @@ const LONGEST: usize = 128 << 20;
 pub struct Show {
     pub(crate) live: Live,
     pub(crate) camera: Camera,
+    /// Where bodies were since all of them were shown.
+    reached: Bounds,
     #[cfg_attr(not(target_family = "wasm"), expect(dead_code, reason = "only browsers draw"))]
     pub(crate) number: u32,
     /// What records the run; none where a recording runs again, or where the run became too long.
     recorder: Option<Recorder<Vec<u8>>>,
+    /// Why another backend went on, if a device was lost.
+    fault: Option<String>,
 }
 
 impl Show {
     fn new(mut live: Live) -> Result<Self> {
-        let camera = live.camera(1.0);
+        let (camera, reached) = (live.camera(1.0), live.bounds());
         let recorder = match live.is_recording() {
             true => None,
             false => {
@@ -39,12 +43,12 @@ impl Show {
                 Some(Recorder::new(Vec::new(), &live.title(), &mut live.simulation, intervals)?)
             }
         };
-        Ok(Self { live, camera, number: next_number(), recorder })
+        Ok(Self { live, camera, reached, number: next_number(), recorder, fault: None })
     }
 
     fn of_scene(name: &str, parameters: &[String], settings: &str) -> Result<Self> {
         let (config, scene) = (choice::config(settings)?, choice::scene(name, parameters)?);
-        Self::new(Live::new(scene, config, BackendChoice::Cpu, false, ColorBy::default())?)
+        Self::new(Live::with(scene, config, Box::new(Cpu::new()), ColorBy::default())?)
     }
 
     fn of_file(name: &str, bytes: &[u8], settings: &str) -> Result<Self> {
@@ -57,17 +61,22 @@ impl Show {
         let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
         let scene = SceneFile::parse(text).and_then(|file| file.into_scene(stem)).map_err(|e| e.within(name))?;
         choice::check_size(name, scene.world.dynamic_count() as u64)?;
-        Self::new(Live::new(scene, choice::config(settings)?, BackendChoice::Cpu, false, ColorBy::default())?)
+        Self::new(Live::with(scene, choice::config(settings)?, Box::new(Cpu::new()), ColorBy::default())?)
     }
 
     async fn make_step(&mut self) -> Result<()> {
-        let Some(recorder) = &mut self.recorder else { return self.live.step_async().await };
-        let dt = self.live.scene().dt;
-        self.live.before_step();
-        let stats = recorder.step_async(&mut self.live.simulation, dt).await?;
-        self.live.after_step(stats);
-        if recorder.so_far().len() > LONGEST {
-            self.recorder = None;
+        match &mut self.recorder {
+            Some(recorder) => {
+                let dt = self.live.scene().dt;
+                self.live.before_step();
+                let stats = recorder.step_async(&mut self.live.simulation, dt).await?;
+                self.live.after_step(stats);
+            }
+            None => self.live.step_async().await?,
+        }
+        self.recorder.take_if(|recorder| recorder.so_far().len() > LONGEST);
+        if let Some(fault) = &self.live.stats.fault {
+            self.fault = Some(fault.clone());
         }
         Ok(())
     }
@@ -104,7 +113,7 @@ impl Show {
             "speed_mm_s": rms_speed(&simulation.world) * 1e3,
             "kinetic_energy": simulation.world.kinetic_energy(),
             "stage_ms": stages,
-            "fault": stats.fault,
+            "fault": self.fault,
         })
     }
 }
@@ -183,7 +192,14 @@ impl Show {
 
     /// Shows the whole scene in a picture of width `aspect` times its height.
     pub fn whole(&mut self, aspect: f32) {
-        self.camera = self.live.camera(aspect);
+        (self.camera, self.reached) = (self.live.camera(aspect), self.live.bounds());
+    }
+
+    /// Moves the camera back as far as bodies have come since [`Self::whole`].
+    pub fn follow(&mut self, aspect: f32) {
+        self.reached = self.reached.join(self.live.bounds());
+        let Camera { up, yaw, pitch, .. } = self.camera;
+        self.camera = Camera::framing(&self.reached, up, yaw, pitch, aspect);
     }
 
     /// Looks as another show does.

@@ -1,0 +1,22 @@
+//! Checks of the WebGPU of this browser.
+
+use drystone::conform::{ConformOptions, Mode, Verdict, conform_async};
+use js_sys::Function;
+use wasm_bindgen::prelude::*;
+
+use crate::thrown;
+
+/// Checks WebGPU as `drystone conform` checks an adapter, fewer variants where it is `short`, and those checks only whose names contain one of
+/// `names`, if there are some. Calls `each` with a line after each check, and gives a line that counts them.
+#[wasm_bindgen]
+pub async fn conform(short: bool, names: Vec<String>, each: Function) -> std::result::Result<String, JsError> {
+    let options = ConformOptions { modes: vec![Mode::Plain], short, names, ..ConformOptions::default() };
+    let mut tell = |check: &drystone::conform::Check| {
+        let line = format!("{}: {}, {}: {}", check.verdict, check.group, check.name, check.figure);
+        // A listener that fails is no reason to stop.
+        let _ = each.call1(&JsValue::NULL, &line.into());
+    };
+    let found = thrown(conform_async(&options, &mut tell).await)?;
+    let [passed, failed, skipped] = [Verdict::Passed, Verdict::Failed, Verdict::Skipped].map(|v| found.count(v));
+    Ok(format!("{}: {passed} passed, {failed} failed, {skipped} skipped", found.adapter.name))
+}
