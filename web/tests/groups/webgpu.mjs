@@ -3,7 +3,7 @@ import { state, until } from "../browser.mjs";
 export const name = "webgpu";
 export const mistakes = [
   {
-    fails: "wall: WebGPU computes what the CPU does",
+    fails: "pile: WebGPU computes what the CPU does",
     // Normal impulses of every contact are one percent too large.
     script: `
       const right = GPUDevice.prototype.createShaderModule;
@@ -11,7 +11,7 @@ export const mistakes = [
         const code = given.code.replaceAll(/(\w*impulses\w*\[\w+\] = (\w+);)/g, "$2.normal *= 1.01; $1");
         return right.call(this, { ...given, code });
       };`,
-    only: ["wall"],
+    only: ["pile"],
   },
 ];
 
