@@ -14,7 +14,8 @@ export class Browser {
 
   /// A browser with WebGPU, or one without. Software draws and computes: SwiftShader, which Chromium brings along.
   async launched(webgpu) {
-    if (!this.running.has(webgpu)) {
+    // A new one also where the last one has crashed.
+    if (!this.running.get(webgpu)?.isConnected()) {
       const { chromium } = await import("playwright-core");
       const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
       const args = ["--no-sandbox", ...(webgpu ? WEBGPU : ["--enable-unsafe-swiftshader"])];

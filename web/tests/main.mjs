@@ -49,8 +49,10 @@ async function run(group, browser, print, mistake = {}) {
 async function selfTest(group, browser) {
   const check = new Checks(`self-test of ${group.name}`);
   for (const mistake of group.mistakes) {
-    const { failed } = await run(group, browser, () => {}, mistake);
-    check.holds(`a mistake fails "${mistake.fails}"`, failed.includes(mistake.fails), failed.includes(mistake.fails) ? "" : `failed: ${failed}`);
+    const lines = [];
+    const { failed } = await run(group, browser, (line) => lines.push(line), mistake);
+    const isFound = failed.includes(mistake.fails);
+    check.holds(`a mistake fails "${mistake.fails}"`, isFound, isFound ? "" : lines.filter((line) => line.startsWith("FAIL")).join("; ") || "nothing fails");
   }
   return check;
 }

@@ -4,7 +4,7 @@ export const name = "loading";
 export const mistakes = [
   { fails: "nothing is loaded from elsewhere", script: `fetch("http://127.0.0.1:9/").catch(() => {})` },
   { fails: "the console stays silent", script: `addEventListener("load", () => console.error("a mistake on purpose"))` },
-  { fails: "a picture is drawn", script: `addEventListener("load", () => document.getElementById("pictures").remove())` },
+  { fails: "a picture is drawn", script: `addEventListener("load", () => (document.getElementById("stage").style.opacity = 0))` },
 ];
 
 export async function run({ open, check }) {

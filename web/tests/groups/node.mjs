@@ -4,7 +4,7 @@ import { resolve } from "node:path";
 import { SCENES, STEPS, hashAfter } from "../native.mjs";
 
 export const name = "node";
-export const mistakes = [{ fails: "arch has the hash of the native program", steps: STEPS - 1, only: ["arch"] }];
+export const mistakes = [{ fails: "pile has the hash of the native program", steps: STEPS - 1, only: ["pile"] }];
 
 /// The module of the page under Node, without a page.
 export async function run({ check, steps = STEPS, only = null }) {
