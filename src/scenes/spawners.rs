@@ -12,7 +12,7 @@ use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
 /// use drystone::{Body, Reference, Scene, Shape, Simulation, SolverConfig, World};
 ///
 /// let mut scene = Scene::new("rain", World::new(), 60);
-/// let drop = Body::dynamic().shape(Shape::ball(0.1)).position(0.0, 1.0, 0.0);
+/// let drop = Body::dynamic().shape(Shape::ball(0.05)).position(0.0, 1.0, 0.0);
 /// scene.spawners.push(Spawner { leaves: Leaves { below: Some(0.0), after: None }, ..Spawner::new(drop, 10) });
 /// let mut spawners = Spawners::new(&scene);
 /// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
