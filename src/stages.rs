@@ -51,6 +51,7 @@ pub mod backend {
         pub use crate::backend::gpu::reflect::Reflected;
         pub use crate::backend::gpu::resident::{ResidentParams, WrittenContact};
         pub use crate::backend::gpu::rows::{JOINT_BLOCK, JOINT_NODE, SCRATCH_ROW};
+        #[cfg(not(target_family = "wasm"))]
         pub use crate::backend::gpu::spirv_exact::exact_spirv;
         pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, WORKGROUP};
     }

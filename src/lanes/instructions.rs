@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Lanes, Portable};
+use super::Lanes;
 
 /// What a processor can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +33,7 @@ impl InstructionSet {
             Self::Simd128 => true,
         };
         let known = [
+            #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
             Self::Portable,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2,
@@ -75,15 +76,17 @@ impl InstructionSet {
     /// Does some groups of a work; no other task has the same.
     pub fn run(self, work: &impl Work, groups: Range<usize>) {
         match self {
-            Self::Portable => work.over::<Portable>(groups),
+            #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+            Self::Portable => work.over::<super::Portable>(groups),
             // SAFETY: `InstructionSet::each` asked the processor.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { run_avx2(work, groups) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => unsafe { run_avx512(work, groups) },
+            // A module with these instructions leaves the portable lanes out: a page loads them for nothing, and the bits are the same.
             #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-            Self::Simd128 => work.over::<super::simd128::Simd128>(groups),
+            Self::Portable | Self::Simd128 => work.over::<super::simd128::Simd128>(groups),
         }
     }
 }

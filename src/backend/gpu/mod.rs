@@ -21,6 +21,7 @@ mod pipelines;
 pub(crate) mod reflect;
 pub(crate) mod resident;
 pub(crate) mod rows;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) mod spirv_exact;
 mod submissions;
 mod timer;

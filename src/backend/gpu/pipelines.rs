@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::bindings::Binding;
 use super::buffers::Buffers;
 use super::reflect::Reflected;
+#[cfg(not(target_family = "wasm"))]
 use super::spirv_exact;
 use super::wgsl::{ENTRY_POINT, Program};
 use crate::error::Result;
@@ -62,13 +63,13 @@ impl Pipelines {
         }
         let reflected = Reflected::new(name, &source)?;
         let layout = layout(&self.device, &reflected);
-        let module = if self.exact {
-            spirv_exact::shader_module(&self.device, &reflected)?
-        } else {
-            self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let module = match self.exact {
+            #[cfg(not(target_family = "wasm"))]
+            true => spirv_exact::shader_module(&self.device, &reflected)?,
+            _ => self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
-            })
+            }),
         };
         let pipeline_layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),
