@@ -10,26 +10,28 @@ use super::query::convex_contact;
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold, Solid};
 use super::testing::Random;
 
-/// Shapes of about 0.1 m with flat faces, edges, rims and tips.
-fn solids() -> Vec<(&'static str, SharedShape)> {
+/// Shapes of about a tenth of `scale` (m) with flat faces, edges, rims and tips.
+fn solids(scale: f32) -> Vec<(&'static str, SharedShape)> {
     let prism = |sides: usize| -> Vec<Vec3> {
         let corner = |i: usize, y: f32| {
             let (s, c) = (i as f32 / sides as f32 * std::f32::consts::TAU).sin_cos();
-            Vec3::new(0.1 * c, y, 0.1 * s)
+            scale * Vec3::new(0.1 * c, y, 0.1 * s)
         };
         (0..sides).flat_map(|i| [corner(i, -0.06), corner(i, 0.06)]).collect()
     };
     vec![
-        ("cuboid", SharedShape::cuboid(0.1, 0.07, 0.12)),
-        ("capsule", SharedShape::capsule_y(0.1, 0.06)),
-        ("cylinder", SharedShape::cylinder(0.08, 0.1)),
-        ("cone", SharedShape::cone(0.1, 0.1)),
+        ("cuboid", SharedShape::cuboid(0.1 * scale, 0.07 * scale, 0.12 * scale)),
+        ("capsule", SharedShape::capsule_y(0.1 * scale, 0.06 * scale)),
+        ("cylinder", SharedShape::cylinder(0.08 * scale, 0.1 * scale)),
+        ("cone", SharedShape::cone(0.1 * scale, 0.1 * scale)),
         ("prism", SharedShape::convex_hull(&prism(9)).expect("a prism")),
     ]
 }
 
-/// Half of the least side of all of them (m).
+/// Half of the least side of all of them, over their size.
 const SIZE: f32 = 0.06;
+/// Sizes (m): ordinary shapes, and shapes of 0.4 mm.
+const SIZES: [f32; 2] = [1.0, 1.0 / 256.0];
 
 /// The largest gap over directions: spread evenly, then closer and closer to the best.
 fn true_distance(along: impl Fn(Vec3) -> f32) -> f32 {
@@ -62,14 +64,19 @@ fn deepest(found: &ParryManifold) -> f32 {
     found.points.iter().map(|p| p.dist).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether a contact is as far apart as the shapes are; none where these are further apart than a tenth of `prediction` or deeper than
+/// Whether a contact is as far apart as the shapes are; none where these are further apart than a tenth of the prediction or deeper than
 /// a tenth of their size.
-fn is_true(what: &str, found: &ParryManifold, distance: f32, prediction: f32) -> Option<bool> {
-    if !(-0.1 * SIZE..0.1 * prediction).contains(&distance) {
+fn is_true(
+    what: &str,
+    found: &ParryManifold,
+    distance: f32,
+    ContactQuery { prediction, size }: ContactQuery,
+) -> Option<bool> {
+    if !(-0.1 * size..0.1 * prediction).contains(&distance) {
         return None;
     }
     let claimed = deepest(found);
-    let is_true = (claimed - distance).abs() < 0.03 * SIZE;
+    let is_true = (claimed - distance).abs() < 0.03 * size;
     if !is_true {
         println!("{what}: {claimed} m, and they are {distance} m apart");
     }
@@ -78,15 +85,19 @@ fn is_true(what: &str, found: &ParryManifold, distance: f32, prediction: f32) ->
 
 #[test]
 fn a_triangle_is_as_far_from_a_solid_as_the_contact_says() {
+    SIZES.into_iter().for_each(compare_triangles);
+}
+
+fn compare_triangles(s: f32) {
     let (mut random, mut compared) = (Random(1), Vec::new());
-    let search = ContactQuery { prediction: 0.02, size: SIZE };
-    for (name, shape) in solids() {
+    let search = ContactQuery { prediction: 0.02 * s, size: SIZE * s };
+    for (name, shape) in solids(s) {
         for case in 0..1500 {
-            let corners = [0; 3].map(|_| 0.3 * random.vector());
-            let pose = Pose::from_parts(0.15 * random.vector(), random.rotation());
+            let corners = [0; 3].map(|_| 0.3 * s * random.vector());
+            let pose = Pose::from_parts(0.15 * s * random.vector(), random.rotation());
             let solid = Solid::new(&*shape, pose).expect("no ball");
             let triangle = Triangle::new(corners[0], corners[1], corners[2]);
-            if triangle.area() < 0.01 {
+            if triangle.area() < 0.01 * s * s {
                 continue;
             }
             let along = |d: Vec3| d.dot(solid.furthest(-d) - triangle.local_support_point(d)) - solid.radius;
@@ -94,22 +105,54 @@ fn a_triangle_is_as_far_from_a_solid_as_the_contact_says() {
             let mut found = ParryManifold::new();
             triangle_contact(corners, &|| None, &solid, &near, search, &mut ClipBuffers::default(), &mut found);
             let distance = true_distance(along);
-            compared.extend(is_true(&format!("{name} {case}"), &found, distance, search.prediction));
+            compared.extend(is_true(&format!("{name} {case}"), &found, distance, search));
         }
     }
     assert!(compared.len() > 250 && compared.iter().all(|is_true| *is_true), "{} compared", compared.len());
 }
 
+/// parry's search gives the cylinder a direction along which the two overlap by 0.23 m, and the face's normal one by 0.17 m: it lies beside
+/// the triangle, whose corner its rim touches.
+#[test]
+fn a_cylinder_that_touches_the_corner_of_a_triangle_does_not_overlap_it() {
+    let shape = SharedShape::cylinder(0.3092692, 0.3597973);
+    let rotation = Quat::from_xyzw(-0.23126306, 0.07194007, 0.9665501, -0.08439781);
+    let solid = Solid::new(&*shape, Pose::from_parts(Vec3::ZERO, rotation)).expect("no ball");
+    let corners = [
+        Vec3::new(-0.9351425, -0.080924034, 1.0832865),
+        Vec3::new(-0.18514252, -0.38092405, 1.0832865),
+        Vec3::new(-0.18514252, -0.28092405, 0.33328652),
+    ];
+    let search = ContactQuery { prediction: 0.012370767, size: 0.3092692 };
+    let near = shape.compute_aabb(&solid.pose).loosened(search.prediction + search.size);
+    let mut found = ParryManifold::new();
+    triangle_contact(corners, &|| None, &solid, &near, search, &mut ClipBuffers::default(), &mut found);
+    let [a, b, c] = corners;
+    let triangle = Triangle::new(a, b, c);
+    let distance = true_distance(|d| d.dot(solid.furthest(-d) - triangle.local_support_point(d)));
+    assert!(distance.abs() < 2e-4, "{distance} m");
+    assert!((deepest(&found) - distance).abs() < 1e-3, "{} m, and they are {distance} m apart", deepest(&found));
+}
+
 #[test]
 fn two_solids_are_as_far_apart_as_the_contact_says() {
+    SIZES.into_iter().for_each(compare_solids);
+}
+
+fn compare_solids(s: f32) {
     // Pairs without a round rim, and with one.
     let (mut random, mut compared) = (Random(2), [Vec::new(), Vec::new()]);
     let has_rim = |name: &str| ["cylinder", "cone"].contains(&name);
-    let search = ContactQuery { prediction: 0.02, size: SIZE };
-    let mut others = solids();
-    others.push(("block", SharedShape::cuboid(0.4, 0.2, 0.4)));
+    let search = ContactQuery { prediction: 0.02 * s, size: SIZE * s };
+    let mut others = solids(s);
+    others.push(("block", SharedShape::cuboid(0.4 * s, 0.2 * s, 0.4 * s)));
+    let mut seconds = solids(s);
+    if s < 1.0 {
+        // parry's answer for larger balls beside hulls is up to 3.5 mm off.
+        seconds.push(("ball", SharedShape::ball(0.06 * s)));
+    }
     for (name, a) in &others {
-        for (name_b, b) in &solids() {
+        for (name_b, b) in &seconds {
             for case in 0..200 {
                 let direction = random.vector().normalize();
                 let rotation = random.rotation();
@@ -118,24 +161,23 @@ fn two_solids_are_as_far_apart_as_the_contact_says() {
                     shape.as_support_map().expect("convex").local_support_point(d).dot(d)
                 };
                 let touching = reach(a, direction) + reach(b, rotation.inverse() * -direction);
-                let pos12 = Pose::from_parts(direction * (touching + 0.01 * random.next()), rotation);
+                let pos12 = Pose::from_parts(direction * (touching + 0.01 * s * random.next()), rotation);
                 let (map_a, map_b) = (a.as_support_map().expect("convex"), b.as_support_map().expect("convex"));
                 let along = |d: Vec3| {
                     d.dot(
                         pos12 * map_b.local_support_point(pos12.rotation.inverse() * -d) - map_a.local_support_point(d),
                     )
                 };
-                let mut found = ParryManifold::new();
-                convex_contact((a, b), &pos12, search, &mut ClipBuffers::default(), &mut found);
+                let found = convex_contact((a, b), &pos12, search, &mut ClipBuffers::default());
                 let distance = true_distance(along);
                 let what = format!("{name} and {name_b} {case}");
                 let rims = usize::from(has_rim(name) || has_rim(name_b));
-                compared[rims].extend(is_true(&what, &found, distance, search.prediction));
+                compared[rims].extend(is_true(&what, &found, distance, search));
             }
         }
     }
     let [plain, rims] = compared.map(|all| [all.len(), all.iter().filter(|is_true| !**is_true).count()]);
-    println!("{} of {} without rims wrong, {} of {} with", plain[1], plain[0], rims[1], rims[0]);
+    println!("{s} times the size: {} of {} without rims wrong, {} of {} with", plain[1], plain[0], rims[1], rims[0]);
     assert!(plain[0] > 100 && rims[0] > 100 && plain[1] == 0);
     // parry's search stops short on rims: 14 of 300 are wrong, by up to 9 mm of 100.
     assert!(rims[1] <= 20, "{} of {} with rims wrong", rims[1], rims[0]);

@@ -14,7 +14,8 @@ use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
 use super::solid::{
-    ClipBuffers, ContactQuery, DEEP, EXACT, ParryManifold, Patch, Solid, add_above, ask, clip, clip_to,
+    ClipBuffers, ContactQuery, DEEP, EXACT, Magnified, PUSH, ParryManifold, Patch, Solid, add_above, ask, clip,
+    clip_to, magnification,
 };
 
 /// The contact of a half-space with a convex shape at `pos12`; none for a ball.
@@ -59,7 +60,7 @@ pub(super) fn composite_contacts(
         } else {
             let cone = cone();
             let cone = cone.as_ref().map(|cone| cone as &dyn NormalConstraints);
-            ask((triangle, shape), pos12, cone, search.prediction, &mut found);
+            ask((triangle, shape), pos12, cone, search, &mut found);
         }
         if !found.points.is_empty() {
             many.push(found);
@@ -132,21 +133,37 @@ pub(super) fn triangle_contact(
             consider(out, along(out));
         }
         if !is_flat {
-            let simplex = &mut VoronoiSimplex::new();
-            let (pose, solid) = (&convex.pose, convex.map);
-            let most = prediction + convex.radius;
-            match contact_support_map_support_map_with_params(pose, &patch, solid, most, simplex, Some(face)) {
+            let by = magnification(size);
+            let (patch, solid) = (Magnified { map: &patch, by }, Magnified { map: convex.map, by });
+            // Finds a direction while the solid is pushed off the face by a length.
+            let search = |push: f32| {
+                let pose = Pose::from_parts(by * (convex.pose.translation + push * face), convex.pose.rotation);
+                let (most, simplex) = (by * (prediction + push + convex.radius), &mut VoronoiSimplex::new());
+                contact_support_map_support_map_with_params(&pose, &patch, &solid, most, simplex, Some(face))
+            };
+            let is_true = match search(0.0) {
                 GJKResult::ClosestPoints(on_patch, on_solid, d) => {
-                    let distance = along(d);
+                    let (on_patch, on_solid, distance) = (on_patch / by, on_solid / by, along(d));
                     let claimed = d.dot(on_solid - on_patch) - convex.radius;
-                    if consider(d, distance) && (claimed - distance).abs() < EXACT * size {
+                    let is_true = (claimed - distance).abs() < EXACT * size;
+                    if consider(d, distance) && is_true {
                         closest = Some((d, on_patch, on_solid, claimed));
                     }
+                    is_true
                 }
                 GJKResult::NoIntersection(d) => {
-                    consider(d, along(d));
+                    let distance = along(d);
+                    consider(d, distance);
+                    distance > prediction
                 }
-                _ => {}
+                _ => false,
+            };
+            // Shapes that just touch can leave the search without a direction. None through the face parts them.
+            if !is_true
+                && let GJKResult::ClosestPoints(.., d) | GJKResult::NoIntersection(d) = search(PUSH * size)
+                && d.dot(face) > 0.0
+            {
+                consider(d, along(d));
             }
         }
     }

@@ -135,7 +135,7 @@ impl Pair {
             many.iter_mut().for_each(flip);
             many
         } else {
-            convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers, one);
+            *one = convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers);
             std::slice::from_ref(one)
         };
         self.renew(found, sides, prediction, renewal)

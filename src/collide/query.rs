@@ -2,18 +2,15 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::details::contact_manifold_cuboid_cuboid;
 use parry3d::shape::SharedShape;
 
 use super::facet::half_space_contact;
-use super::solid::{ClipBuffers, ContactQuery, DEEP, ParryManifold, Solid, add_above, ask, clip_to};
+use super::solid::{ClipBuffers, ContactQuery, DEEP, PUSH, ParryManifold, Solid, add_above, ask, clip_to};
 
 /// How far a distance may be from that along its normal, relative to the thinner shape's smallest half extent.
 const TRUE: f32 = 0.01;
 /// Cosine of the angle up to which two directions are the same, short of 1: 0.6 degrees.
 const SAME: f32 = 5e-5;
-/// How far the shapes are pushed apart for the second opinion, likewise.
-const PUSH: f32 = 0.02;
 
 /// Finds the contact of two convex shapes up to the distance `prediction`; b's pose is `pos12` as seen from a.
 ///
@@ -21,31 +18,9 @@ const PUSH: f32 = 0.02;
 /// any: overlaps of a meter between stones that only touch. A cone that lies on a cuboid may get the direction to the cuboid's
 /// other side. An answer that is deep, or other than the distance along its own normal, which has a closed form, is therefore
 /// compared with two more: that with the shapes pushed a little apart, along the line of their middles, and that across the
-/// best face of either shape. No direction gives more than the true distance: what gives most is taken.
+/// best face of either shape. No direction gives more than the true distance: what gives most is taken. The contacts of two
+/// cuboids come from [`cuboids`](super::cuboids).
 pub(super) fn convex_contact(
-    (a, b): (&SharedShape, &SharedShape),
-    pos12: &Pose,
-    search: ContactQuery,
-    buffers: &mut ClipBuffers,
-    found: &mut ParryManifold,
-) {
-    empty(found);
-    if let (Some(box_a), Some(box_b)) = (a.as_cuboid(), b.as_cuboid()) {
-        return contact_manifold_cuboid_cuboid(pos12, box_a, box_b, search.prediction, found);
-    }
-    *found = searched_contact((a, b), pos12, search, buffers);
-}
-
-/// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
-/// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
-pub(super) fn empty(manifold: &mut ParryManifold) {
-    let mut points = std::mem::take(&mut manifold.points);
-    points.clear();
-    *manifold = ParryManifold { points, ..ParryManifold::new() };
-}
-
-/// The contact of two shapes that are not both cuboids.
-fn searched_contact(
     (a, b): (&SharedShape, &SharedShape),
     pos12: &Pose,
     search: ContactQuery,
@@ -56,11 +31,11 @@ fn searched_contact(
     // A half-space reaches further than any other shape.
     if let Some(plane) = a.as_halfspace() {
         if half_space_contact(plane.normal, &**b, pos12, buffers, &mut found).is_none() {
-            ask((&**a, &**b), pos12, None, prediction, &mut found);
+            ask((&**a, &**b), pos12, None, search, &mut found);
         }
         return found;
     }
-    ask((&**a, &**b), pos12, None, prediction, &mut found);
+    ask((&**a, &**b), pos12, None, search, &mut found);
     let (Some(map_a), Some(map_b)) = (a.as_support_map(), b.as_support_map()) else { return found };
     let along = |d: Vec3| {
         let own = pos12.rotation.inverse() * -d;
@@ -87,7 +62,7 @@ fn searched_contact(
         let mut apart = *pos12;
         apart.translation += away * push;
         let mut again = ParryManifold::new();
-        ask((&**a, &**b), &apart, None, prediction + push, &mut again);
+        ask((&**a, &**b), &apart, None, ContactQuery { prediction: prediction + push, size }, &mut again);
         let (distance, pushed) = (along(again.local_n1), push * again.local_n1.dot(away));
         again.points.iter_mut().for_each(|p| p.dist -= pushed);
         if is_better(distance, best, found_is_true) && is_true(&again, distance) {
@@ -116,6 +91,14 @@ fn searched_contact(
         None => {}
     }
     found
+}
+
+/// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
+/// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
+pub(super) fn empty(manifold: &mut ParryManifold) {
+    let mut points = std::mem::take(&mut manifold.points);
+    points.clear();
+    *manifold = ParryManifold { points, ..ParryManifold::new() };
 }
 
 /// The contact of `other` across the face of `solid` with the unit normal `face`.
@@ -186,8 +169,7 @@ mod tests {
                 let angle = |k: i32| width * k as f32;
                 let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
                 let search = ContactQuery { prediction: 0.002, size: 0.05 };
-                let mut found = ParryManifold::new();
-                convex_contact((&a, &b), &Pose::IDENTITY, search, &mut ClipBuffers::default(), &mut found);
+                let found = convex_contact((&a, &b), &Pose::IDENTITY, search, &mut ClipBuffers::default());
                 let depth = deepest(&found);
                 assert!(depth.is_finite(), "{count} stones, joint {i}: no contact");
                 worst = worst.max(-depth);
@@ -202,16 +184,17 @@ mod tests {
     fn an_answer_does_not_depend_on_the_pair_before_it() {
         let width = std::f32::consts::PI / 17.0;
         let angle = |k: i32| width * k as f32;
-        let answer = |buffers: &mut ClipBuffers, found: &mut ParryManifold, i: i32| {
+        let answer = |buffers: &mut ClipBuffers, i: i32| {
             let (a, b) = (stone(angle(i), angle(i + 1)), stone(angle(i + 1), angle(i + 2)));
-            convex_contact((&a, &b), &Pose::IDENTITY, ContactQuery { prediction: 0.002, size: 0.05 }, buffers, found);
+            let search = ContactQuery { prediction: 0.002, size: 0.05 };
+            let found = convex_contact((&a, &b), &Pose::IDENTITY, search, buffers);
             let points = found.points.iter().map(|p| (p.local_p1, p.local_p2, p.dist, p.fid1, p.fid2));
             (found.local_n1, found.local_n2, points.collect::<Vec<_>>())
         };
-        let (mut buffers, mut found) = (ClipBuffers::default(), ParryManifold::new());
+        let mut buffers = ClipBuffers::default();
         for i in 0..15 {
-            let after_another = answer(&mut buffers, &mut found, i);
-            assert_eq!(after_another, answer(&mut ClipBuffers::default(), &mut ParryManifold::new(), i), "joint {i}");
+            let after_another = answer(&mut buffers, i);
+            assert_eq!(after_another, answer(&mut ClipBuffers::default(), i), "joint {i}");
         }
     }
 
@@ -220,8 +203,7 @@ mod tests {
         let (a, b) = (SharedShape::cylinder(0.5, 0.5), SharedShape::cylinder(0.5, 0.5));
         let pos12 = Pose::translation(0.0, 0.8, 0.0);
         let search = ContactQuery { prediction: 0.02, size: 0.5 };
-        let mut found = ParryManifold::new();
-        convex_contact((&a, &b), &pos12, search, &mut ClipBuffers::default(), &mut found);
+        let found = convex_contact((&a, &b), &pos12, search, &mut ClipBuffers::default());
         assert!((deepest(&found) + 0.2).abs() < 1e-3, "{} m", deepest(&found));
     }
 }

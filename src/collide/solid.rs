@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::query::details::NormalConstraints;
+use parry3d::query::details::{NormalConstraints, contact_manifold_pfm_pfm};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
 
@@ -11,6 +11,11 @@ pub(super) type ParryManifold = ContactManifold<(), ()>;
 
 /// Overlap from which an answer is checked, relative to the thinner shape's smallest half extent.
 pub(super) const DEEP: f32 = 0.05;
+/// How far shapes are pushed apart for a second opinion, relative to the thinner shape's smallest half extent.
+pub(super) const PUSH: f32 = 0.02;
+/// Smallest half extent (m) from which the thinner shape of a pair is large beside parry's tolerances. They are absolute: parry takes
+/// sides as parallel that span less than 3.5 cm², and its search for a direction stops at a triangle of 11 cm².
+pub(super) const SMALL: f32 = 1.0 / 64.0;
 /// How exactly a distance is known, relative to the thinner shape's smallest half extent.
 pub(super) const EXACT: f32 = 1e-3;
 
@@ -94,6 +99,52 @@ impl SupportMap for Patch<'_> {
     fn local_support_point(&self, d: Vec3) -> Vec3 {
         let furthest = self.0.iter().max_by(|p, q| p.0.dot(d).total_cmp(&q.0.dot(d)));
         furthest.map_or(Vec3::ZERO, |corner| corner.0)
+    }
+}
+
+/// How many times as large as it is parry sees a pair whose thinner shape has the smallest half extent `size` (m): 1 from [`SMALL`] on, and
+/// otherwise a power of two, which rounds nothing.
+pub(super) fn magnification(size: f32) -> f32 {
+    const LEAST: f32 = 1.0 / (1 << 20) as f32;
+    if size < SMALL { f32::from_bits(0x7f00_0000 - (size.max(LEAST).to_bits() & 0x7f80_0000)) } else { 1.0 }
+}
+
+/// A solid that is `by` times as large.
+pub(super) struct Magnified<'a, M: ?Sized> {
+    pub map: &'a M,
+    pub by: f32,
+}
+
+impl<M: SupportMap + ?Sized> SupportMap for Magnified<'_, M> {
+    fn local_support_point(&self, d: Vec3) -> Vec3 {
+        self.map.local_support_point(d) * self.by
+    }
+}
+
+impl<M: PolygonalFeatureMap + ?Sized> PolygonalFeatureMap for Magnified<'_, M> {
+    fn local_support_feature(&self, d: Vec3, feature: &mut PolygonalFeature) {
+        self.map.local_support_feature(d, feature);
+        feature.vertices.iter_mut().for_each(|corner| *corner *= self.by);
+    }
+
+    fn local_support_feature_toward(&self, d: Vec3, hint: Vec3, feature: &mut PolygonalFeature) {
+        self.map.local_support_feature_toward(d, hint / self.by, feature);
+        feature.vertices.iter_mut().for_each(|corner| *corner *= self.by);
+    }
+}
+
+/// The middle of a ball.
+struct Point;
+
+impl SupportMap for Point {
+    fn local_support_point(&self, _: Vec3) -> Vec3 {
+        Vec3::ZERO
+    }
+}
+
+impl PolygonalFeatureMap for Point {
+    fn local_support_feature(&self, _: Vec3, feature: &mut PolygonalFeature) {
+        *feature = PolygonalFeature { num_vertices: 1, ..PolygonalFeature::default() };
     }
 }
 
@@ -191,13 +242,31 @@ impl<'a> Solid<'a> {
     }
 }
 
+/// What a shape touches with, and the radius that rounds it off. parry needs no search for a ball but beside a hull.
+fn features(shape: &dyn Shape, has_hull: bool) -> Option<(&dyn PolygonalFeatureMap, f32)> {
+    let ball = shape.as_ball().filter(|_| has_hull).map(|ball| (&Point as &dyn PolygonalFeatureMap, ball.radius));
+    ball.or(shape.as_polygonal_feature_map())
+}
+
 /// parry's answer, with normals of a within `cone`. Every pair of convex shapes is supported.
 pub(super) fn ask(
     (a, b): (&dyn Shape, &dyn Shape),
     pos12: &Pose,
     cone: Option<&dyn NormalConstraints>,
-    prediction: f32,
+    ContactQuery { prediction, size }: ContactQuery,
     found: &mut ParryManifold,
 ) {
-    let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
+    let by = magnification(size);
+    let has_hull = a.as_convex_polyhedron().is_some() || b.as_convex_polyhedron().is_some();
+    let features = (features(a, has_hull), features(b, has_hull));
+    let (true, (Some((a, radius_a)), Some((b, radius_b)))) = (by > 1.0, features) else {
+        let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
+        return;
+    };
+    let pos12 = Pose::from_parts(pos12.translation * by, pos12.rotation);
+    let [a, b] = [a, b].map(|map| Magnified { map, by });
+    contact_manifold_pfm_pfm(&pos12, &a, radius_a * by, cone, &b, radius_b * by, None, prediction * by, found);
+    for point in &mut found.points {
+        (point.local_p1, point.local_p2, point.dist) = (point.local_p1 / by, point.local_p2 / by, point.dist / by);
+    }
 }

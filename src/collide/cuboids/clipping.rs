@@ -9,7 +9,7 @@ use parry3d::shape::{Cuboid, PolygonalFeature};
 
 use super::super::lane_pose::{Pose, Turn, backwards, magnitude, negative};
 use super::super::solid::ParryManifold;
-use super::Near;
+use super::{Near, is_small};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Vec3, cross3, dot3, vec3};
 
@@ -65,7 +65,9 @@ struct Face<L> {
 
 #[inline(always)]
 fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &mut Clipped) {
-    let (zero, one, eps) = (L::constant(0.0), L::constant(1.0), L::constant(f64::from(f32::EPSILON)));
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    // The square of the area of a parallelogram up to which parry takes its sides as parallel.
+    let flat = L::select(L::constant(f64::from(f32::EPSILON)), zero, is_small(half[0], half[1]));
     let turn = Turn::of(pose.rotation);
     let back = Turn::of(backwards(pose.rotation)).of_vector(negative(normal));
     // parry's basis of the plane.
@@ -91,11 +93,9 @@ fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &
         let c = &other.corners;
         let across = cross3(c[2] - c[1], c[0] - c[1]);
         let along = if side == 0 { dot3(across, normal) } else { -dot3(across, normal) };
-        let is_open = magnitude(along).gt(eps);
         for k in 0..4 {
             let is_outside = outside(own.flat[k], &other.flat);
-            let is_touching = L::and(is_open, one.gt(is_outside));
-            touching = touching + L::select(zero, L::constant(bit), is_touching);
+            touching = touching + L::select(zero, L::constant(bit), one.gt(is_outside));
             clipped.distances[4 * side + k] = dot3(c[0] - own.corners[k], across).divided_by(along).store();
             bit *= 2.0;
         }
@@ -112,9 +112,8 @@ fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &
             let denominator = ae - bb;
             let s = (b * f - c * e).divided_by(denominator);
             let t = (b * s + f).divided_by(e);
-            // Neither side is a point, and they are not parallel: by more than four floats.
-            let is_crossing =
-                L::and(L::and(a.gt(eps), e.gt(eps)), L::and(denominator.gt(eps), ae.floats_below(4).gt(bb)));
+            // Not parallel: by more than four floats.
+            let is_crossing = L::and(denominator.gt(flat), ae.floats_below(4).gt(bb));
             let is_within = L::and(L::and(s.gt(zero), one.gt(s)), L::and(t.gt(zero), one.gt(t)));
             touching = touching + L::select(zero, L::constant(bit), L::and(is_crossing, is_within));
             bit *= 2.0;

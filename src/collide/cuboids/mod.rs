@@ -1,4 +1,5 @@
 //! The contacts of cuboids, sixteen pairs at a time: bit by bit what parry's `contact_manifold_cuboid_cuboid` says of each pair.
+//! Where a half extent is below [`SMALL`], it is what parry says of a pair many times as large: parry's tolerances are lengths.
 //!
 //! parry tests the three faces of either cuboid and the nine directions across two edges, and takes the one along which the
 //! cuboids are furthest apart. Then it clips the two faces that lie best across that direction. Both stages are the same arithmetic for
@@ -17,8 +18,9 @@ use std::sync::Mutex;
 use self::clipping::{Clipped, Clipping};
 use self::separation::Separation;
 use super::collider::{BodyState, CuboidPlace};
-use super::solid::ParryManifold;
-use crate::lanes::{InstructionSet, Row8, WIDTH};
+use super::solid::{ParryManifold, SMALL};
+use crate::lanes::{InstructionSet, Lanes, Row8, WIDTH};
+use crate::math::Vec3;
 
 /// Two cuboids to be compared.
 #[derive(Clone, Copy)]
@@ -71,4 +73,12 @@ pub(super) fn cuboid_contacts(
             with(near.number, &|found| clipped.write(lane, near, found));
         }
     }
+}
+
+/// Whether the thinner of two cuboids with these half extents is so thin that parry's tolerances would show.
+#[inline(always)]
+fn is_small<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>) -> L::Mask {
+    let thickness_1 = L::smaller(L::smaller(half_1.x, half_1.y), half_1.z);
+    let thickness_2 = L::smaller(L::smaller(half_2.x, half_2.y), half_2.z);
+    L::constant(f64::from(SMALL)).gt(L::smaller(thickness_1, thickness_2))
 }

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use super::super::collider::{BodyState, CuboidPlace, POSE, POSITION};
 use super::super::lane_pose::{Pose, Turn, backwards, choose, corner, length, negative};
-use super::{CuboidPair, Near};
+use super::{CuboidPair, Near, is_small};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, Vec3, dot3, vec3};
 
@@ -89,6 +89,8 @@ fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L
     let (turn, back) = (Turn::of(pose.rotation), Turn::of(backwards(pose.rotation)));
     let place = [pose.at.x, pose.at.y, pose.at.z];
     let half = [half_1.x, half_1.y, half_1.z];
+    // Instead of a distance of zero: parry's length, and for small cuboids one whose square is just a number.
+    let least = L::select(L::constant(f64::from(f32::EPSILON)), L::constant(1e-15), is_small(half_1, half_2));
     let mut best = (L::constant(f64::from(f32::MIN)), vec3(zero, zero, zero));
     let (mut sum, mut beyond) = ([zero; 3], zero);
     for i in 0..3 {
@@ -101,7 +103,7 @@ fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L
         let is_better = distance.gt(best.0);
         best = (L::select(best.0, distance, is_better), choose(best.1, axis, is_better));
         let is_inside = zero.gt(distance);
-        sum[i] = L::select(sign * L::larger(distance, L::constant(f64::from(f32::EPSILON))), zero, is_inside);
+        sum[i] = L::select(sign * L::larger(distance, least), zero, is_inside);
         beyond = beyond + L::select(one, zero, is_inside);
     }
     let sum = vec3(sum[0], sum[1], sum[2]);
