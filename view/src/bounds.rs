@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::poses::{Poses, poses};
+use crate::poses::{Poses, anchors, poses};
 use drystone::{BodyKind, World};
 
 /// Room on each side of a body, as a share of its size.
@@ -46,7 +46,7 @@ impl Bounds {
         std::array::from_fn(|k| Vec3::new(pick(k, 0, 0), pick(k, 1, 1), pick(k, 2, 2)))
     }
 
-    /// Bounds of everything that moves in a world, with a margin, of sensors, and of the points from which bodies hang.
+    /// Bounds of everything that moves in a world, with a margin, of sensors, and of the anchors of joints.
     pub fn of(world: &World) -> Self {
         Self::at(world, &poses(world))
     }
@@ -69,8 +69,7 @@ impl Bounds {
             let room = margin * (body.high - body.low);
             Self { low: body.low - room, high: body.high + room }
         });
-        let hung = world.joints.iter().filter(|j| j.body_b.is_none());
-        let anchors = hung.map(|j| Self::around(j.anchor_b, 0.0));
-        around.chain(anchors).fold(Self::EMPTY, Self::join)
+        let anchors = world.joints.iter().flat_map(|joint| anchors(joint, poses));
+        around.chain(anchors.map(|at| Self::around(at, 0.0))).fold(Self::EMPTY, Self::join)
     }
 }

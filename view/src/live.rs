@@ -13,7 +13,7 @@ use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
 use drystone::scenes::Spawners;
 use drystone::{
-    Backend, Body, BodyKind, JointHandle, Reference, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig,
+    Backend, Body, BodyKind, Cpu, JointHandle, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig,
     StepStats,
 };
 
@@ -124,7 +124,7 @@ impl Live {
     /// # Errors
     /// Those of [`choose`], or a damaged recording.
     pub fn of_recording(mut replay: Replay, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
-        let mut simulation = replay.begin(Box::new(Reference::<f32>::new()))?;
+        let mut simulation = replay.begin(Box::new(Cpu::new()))?;
         let scene = scene_of(&replay, &simulation);
         simulation.set_backend(choose(choice, scene.world.dynamic_count(), exact)?.0);
         Ok(Self { choice, exact, replay: Some(replay), ..Self::of(scene, simulation, color) })
@@ -205,7 +205,7 @@ impl Live {
 
     fn restart(&mut self) -> Result<()> {
         let config = self.simulation.config().clone();
-        let backend = self.simulation.set_backend(Box::new(Reference::<f32>::new()));
+        let backend = self.simulation.set_backend(Box::new(Cpu::new()));
         self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
         self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
@@ -361,7 +361,7 @@ mod tests {
 
     use super::*;
     use crate::show::{Key, Pointer, Show};
-    use drystone::{Recorder, RecordingIntervals};
+    use drystone::{Recorder, RecordingIntervals, Reference};
 
     fn live(name: &str) -> Live {
         let scene = Scene::find(name, &[]).expect("a scene");

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::bounds::Bounds;
 use crate::colors::{Rgba, batch_color};
-use crate::poses::Poses;
+use crate::poses::{Poses, anchors};
 use drystone::{BodyKind, Joint, Linear, Simulation, SolvedManifold, World};
 
 /// An end of a line, in the layout of the shader.
@@ -33,11 +33,11 @@ const BOX: Rgba = [90, 90, 90, 255];
 pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     let line = |ends: [Vec3; 2]| Some(ends.map(|p| LineEnd { position: p.to_array(), color: BOX }));
     let rope = |j: &Joint| {
-        let (position, rotation) = poses[j.body_a];
-        let on_b = j.body_b.map_or(j.anchor_b, |b| poses[b].0 + poses[b].1 * j.anchor_b);
+        let ends = anchors(j, poses);
         if let Linear::Distance(_) = j.linear {
-            return line([position + rotation * j.anchor_a, on_b]);
+            return line(ends);
         }
+        let ((position, rotation), [_, on_b]) = (poses[j.body_a], ends);
         let body = &world.bodies[j.body_a];
         let is_inside = |(low, high): (Vec3, Vec3)| low.cmple(on_b).all() && on_b.cmple(high).all();
         if j.body_b.is_some() || body.colliders.iter().any(|c| is_inside(c.bounds(position, rotation))) {

@@ -1,6 +1,6 @@
 //! Where the bodies of a world are.
 
-use drystone::World;
+use drystone::{Joint, World};
 use glam::{Quat, Vec3};
 
 /// Position (m) and rotation of each body of a world.
@@ -9,4 +9,10 @@ pub type Poses = [(Vec3, Quat)];
 /// Poses of the bodies of `world`, in their order.
 pub fn poses(world: &World) -> Vec<(Vec3, Quat)> {
     world.bodies.iter().map(|b| (b.position, b.rotation)).collect()
+}
+
+/// Where the anchors of a joint are, that of a first, with the bodies at `poses`.
+pub(crate) fn anchors(joint: &Joint, poses: &Poses) -> [Vec3; 2] {
+    let on = |body: usize, anchor: Vec3| poses[body].0 + poses[body].1 * anchor;
+    [on(joint.body_a, joint.anchor_a), joint.body_b.map_or(joint.anchor_b, |b| on(b, joint.anchor_b))]
 }

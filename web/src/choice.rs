@@ -1,9 +1,10 @@
 //! Scenes and settings as the page names them.
 
+use drystone::backend::gpu::GpuOptions;
 use drystone::preset::Preset;
 use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::{hint, shorten};
-use drystone::{Error, Result, Scene, SolverConfig};
+use drystone::{Backend, Cpu, Error, Gpu, Result, Scene, SolverConfig};
 use serde_json::{Map, Value};
 
 /// Most bodies of a scene of the page: about 4 kB each, of 4 GiB that WebAssembly has at most.
@@ -25,6 +26,14 @@ pub fn check_size(name: &str, bodies: u64) -> Result<()> {
         return Ok(());
     }
     Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser")))
+}
+
+/// What runs the sweeps: `cpu` or `webgpu`.
+pub async fn backend(name: &str) -> Result<Box<dyn Backend>> {
+    Ok(match name {
+        "cpu" => Box::new(Cpu::new()),
+        _ => Box::new(Gpu::open_async(GpuOptions::default()).await?),
+    })
 }
 
 /// The settings of a JSON object: each by its name, over those of its `preset`.

@@ -66,26 +66,3 @@ fn hash_of(scene: &str, parameters: &[String], steps: u32) -> Result<String> {
     }
     Ok(format!("{:016x}", simulation.hash()))
 }
-
-/// A pile of boxes that is stepped to measure a device.
-#[wasm_bindgen]
-pub struct Pile {
-    simulation: Simulation,
-    dt: f32,
-}
-
-#[wasm_bindgen]
-impl Pile {
-    /// A pile of `boxes`.
-    #[wasm_bindgen(constructor)]
-    pub fn new(boxes: u32) -> std::result::Result<Pile, JsError> {
-        let scene = thrown(choice::scene("pile", &[format!("n={boxes}")]))?;
-        let simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()));
-        Ok(Self { simulation: thrown(simulation)?, dt: scene.dt })
-    }
-
-    /// Makes so many steps.
-    pub fn steps(&mut self, count: u32) -> std::result::Result<(), JsError> {
-        thrown((0..count).try_for_each(|_| self.simulation.step(self.dt).map(drop)))
-    }
-}

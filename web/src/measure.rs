@@ -1,9 +1,8 @@
-//! A scene without pictures and records, for measurements (web/measure).
+//! A scene without pictures and records, for measurements: of a device by the page, of engines by web/measure.
 
-use drystone::backend::gpu::GpuOptions;
 use drystone::metrics::Penetration;
 use drystone::scenes::SceneFile;
-use drystone::{Backend, Cpu, Error, Gpu, Result, Scene, Simulation};
+use drystone::{Cpu, Error, Result, Scene, Simulation};
 use glam::{Quat, Vec3};
 use wasm_bindgen::prelude::*;
 
@@ -54,11 +53,7 @@ impl Bare {
 
     /// Chooses what runs the sweeps: `cpu` or `webgpu`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
-        let backend: Box<dyn Backend> = match name.as_str() {
-            "cpu" => Box::new(Cpu::new()),
-            _ => Box::new(thrown(Gpu::open_async(GpuOptions::default()).await)?),
-        };
-        self.simulation.set_backend(backend);
+        self.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())
     }
 

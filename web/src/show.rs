@@ -1,11 +1,10 @@
 //! A scene or a recording that runs in the page.
 
 use drystone::backend::BackendChoice;
-use drystone::backend::gpu::GpuOptions;
 use drystone::metrics::rms_speed;
 use drystone::scenes::SceneFile;
 use drystone::stages::compare::BodyDifference;
-use drystone::{Backend, Cpu, Error, Gpu, Recorder, RecordingIntervals, Replay, Result};
+use drystone::{Cpu, Error, Recorder, RecordingIntervals, Replay, Result};
 use drystone_view::{Bounds, Camera, ColorBy, Live, Overlay, Pointer, Show as _};
 use glam::Vec2;
 use serde_json::{Map, Value, json};
@@ -91,6 +90,7 @@ impl Show {
         let (manifolds, points) =
             self.live.simulation.manifolds().fold((0, 0), |(all, points), m| (all + 1, points + m.points().len()));
         let Live { simulation, stats, stage_ms, steps, .. } = &self.live;
+        let Camera { target, distance, yaw, pitch, .. } = self.camera;
         let stages: Map<String, Value> = stats
             .times
             .stages()
@@ -114,6 +114,7 @@ impl Show {
             "kinetic_energy": simulation.world.kinetic_energy(),
             "stage_ms": stages,
             "fault": self.fault,
+            "camera": {"target": target.to_array(), "distance": distance, "yaw": yaw, "pitch": pitch},
         })
     }
 }
@@ -137,11 +138,7 @@ impl Show {
 
     /// Chooses what runs the sweeps: `cpu` or `webgpu`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
-        let backend: Box<dyn Backend> = match name.as_str() {
-            "cpu" => Box::new(Cpu::new()),
-            _ => Box::new(thrown(Gpu::open_async(GpuOptions { goes_on: true, ..GpuOptions::default() }).await)?),
-        };
-        self.live.simulation.set_backend(backend);
+        self.live.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())
     }
 

@@ -4,6 +4,8 @@ export const WEBGPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--
 
 /// What Chromium itself says where it has no adapter for WebGPU and a page asks for one, and where software draws a canvas of WebGL.
 const OF_CHROMIUM = /^No available adapters\.$|^Failed to create WebGPU Context Provider$|GL Driver Message .*Performance.*ReadPixels/;
+/// What it says where a test tells the tilt of the device.
+const OF_TILTS = /^A reload is required so that the existing .*Sensor/;
 
 export class Browser {
   running = new Map();
@@ -31,7 +33,8 @@ export class Browser {
     const page = await profile.newPage();
     const [said, elsewhere] = [[], []];
     page.on("console", (message) => {
-      if (webgpu || !OF_CHROMIUM.test(message.text())) said.push(`${message.type()}: ${message.text()}`);
+      if (OF_TILTS.test(message.text()) || (!webgpu && OF_CHROMIUM.test(message.text()))) return;
+      said.push(`${message.type()}: ${message.text()}`);
     });
     page.on("pageerror", (error) => said.push(`error: ${error.message}`));
     page.on("requestfailed", (request) => said.push(`failed: ${request.url()}`));

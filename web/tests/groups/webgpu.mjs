@@ -44,5 +44,5 @@ export async function run({ open, check, only = Object.keys(SCENES) }) {
   // All checks take software a quarter of an hour, most of it to compile shaders. The last line counts the verdicts.
   const lines = await page.evaluate(() => window.drystone.conform(["integrate_velocities", "chain", "wall", "large", "refused"]));
   check.equal("conform fails no check", lines.slice(0, -1).filter((line) => !line.startsWith("passed")), []);
-  check.holds("conform checks kernels, scenes and limits", / 6 passed, 0 failed, 0 skipped$/.test(lines.at(-1)), lines.at(-1));
+  check.holds("conform checks kernels, scenes and limits", / 6 passed, 0 failed$/.test(lines.at(-1)), lines.at(-1));
 }

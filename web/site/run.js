@@ -1,0 +1,332 @@
+// What runs, and the loop that steps and draws it. Other files read what is exported here; only functions of this file change it.
+import { Maze, Picture, Show, first_difference } from "./drystone_web.js";
+import * as link from "./link.js";
+import * as maze from "./maze.js";
+import * as numbers from "./numbers.js";
+
+const element = (id) => document.getElementById(id);
+/// Most steps between two pictures, and the time after which none begins (ms).
+const [MOST_STEPS, PATIENCE] = [4, 25];
+
+/// Tells `replaced` when something else runs, and `differs` at the first number that differs.
+export const changes = new EventTarget();
+/// What the controls say.
+export let chosen = { maze: null, scene: "pile", parameters: {}, settings: {}, backend: "cpu" };
+/// The bytes and name of the file that runs instead of a scene of the catalogue.
+export let file = null;
+/// What runs: one show, or two beside each other; or a game.
+export let shows = [];
+export let game = null;
+let pictures = [];
+export let paused = false;
+let owed = 0;
+let last = null;
+/// Where the pointer was last, -1 to 1 from left to right and from bottom to top.
+export let pointer = [0, 0];
+/// The first number that differs between two shows.
+export let difference = null;
+let pace = 1;
+/// The width over the height that all of the scene was last shown for, or "by hand".
+let framed = null;
+const rates = { steps: 0, pictures: 0 };
+/// Wanted tilts of the board.
+export const tilts = new maze.Tilts();
+tilts.listens = () => game !== null;
+
+// Calls of the solver may wait for a device and must not overlap: each begins when the one before has ended.
+let line = Promise.resolve();
+let isBusy = false;
+export function enqueue(call) {
+  const result = line.then(() => {
+    isBusy = true;
+    return call();
+  });
+  line = result.catch(() => {}).finally(() => (isBusy = false));
+  return result;
+}
+
+export function say(text, isBad = false) {
+  const message = element("message");
+  message.textContent = text;
+  message.className = isBad ? "bad" : "";
+  clearTimeout(say.timer);
+  if (!isBad) say.timer = setTimeout(() => (message.textContent = ""), 6000);
+}
+
+/// Shows the line of an error. What runs goes on, unless the solver itself broke.
+export function refuse(error) {
+  if (error instanceof WebAssembly.RuntimeError) {
+    pause(true);
+    [shows, game] = [[], null];
+    say("The solver has stopped by a mistake of its own. Load the page again to go on.", true);
+    throw error;
+  }
+  say(error.message ?? String(error), true);
+}
+
+/// Runs what a control asks for, and says why where it cannot be done.
+export const tried = (call) => enqueue(call).then((value) => value, refuse);
+
+export const hasWebGPU = () => pictures[0]?.api() === "WebGPU";
+const aspect = () => {
+  const { clientWidth, clientHeight } = element("picture");
+  return clientHeight > 0 ? clientWidth / clientHeight : 1;
+};
+export const assignments = (parameters) =>
+  Array.isArray(parameters) ? parameters : Object.entries(parameters ?? {}).map(([name, value]) => `${name}=${value}`);
+
+/// Opens what is chosen. Only where all of it can be opened does it replace what runs.
+export async function open(next, nextFile = null) {
+  if (next.maze) {
+    const opened = new Maze(next.maze);
+    replace([], opened, next, null);
+    return;
+  }
+  const make = () =>
+    nextFile
+      ? Show.file(nextFile.name, nextFile.bytes, JSON.stringify(next.settings))
+      : Show.scene(next.scene, assignments(next.parameters), JSON.stringify(next.settings));
+  const made = [];
+  try {
+    for (const backend of next.backend === "both" ? ["cpu", "webgpu"] : [next.backend]) {
+      const show = make();
+      made.push(show);
+      await show.use_backend(backend);
+    }
+    if (made.length === 2 && made[0].is_recording()) throw new Error("a recording runs on one backend at a time");
+  } catch (error) {
+    made.forEach((show) => show.free());
+    throw error;
+  }
+  replace(made, null, next, nextFile);
+}
+
+function replace(made, opened, next, nextFile) {
+  const world = ({ scene, parameters }) => JSON.stringify([scene, parameters]);
+  const isSame = shows.length > 0 && made.length > 0 && nextFile === file && world(next) === world(chosen);
+  for (const show of made) if (isSame) show.look_as(shows[0]);
+  if (!isSame || framed !== "by hand") framed = null;
+  [...shows, ...(game ? [game] : [])].forEach((old) => old.free());
+  [shows, game, chosen, file] = [made, opened, next, nextFile];
+  [owed, last, difference, tilts.pressed] = [0, null, null, null];
+  const isTwo = shows.length === 2;
+  element("beside").hidden = !isTwo;
+  document.querySelectorAll("figcaption").forEach((caption) => (caption.hidden = !isTwo));
+  pause(false);
+  numbers.restart();
+  changes.dispatchEvent(new Event("replaced"));
+  address();
+  say("");
+}
+
+/// Writes what runs into the address; a file has no link.
+const address = () => history.replaceState(null, "", file ? location.pathname + location.search : link.write(chosen));
+
+/// Changes the settings of what runs.
+export function setSettings(next) {
+  for (const show of shows) show.set_settings(JSON.stringify(next));
+  chosen = { ...chosen, settings: next };
+  address();
+}
+
+export const setPace = (times) => (pace = times);
+
+/// The first picture.
+export const openPicture = async () => (pictures = [await Picture.open(element(canvases[0]))]);
+
+export const canvases = ["picture", "picture-beside"];
+const MOST_LOSSES = 3;
+let losses = 0;
+
+/// The second picture, for the second of two shows; and new pictures for those whose device was lost.
+async function besides() {
+  if (losses > MOST_LOSSES) return;
+  if (shows.length === 2 && pictures.length === 1) pictures.push(await Picture.open(element(canvases[1])));
+  for (const [k, picture] of pictures.entries()) {
+    if (!picture.is_lost()) continue;
+    losses += 1;
+    if (losses > MOST_LOSSES) {
+      pictures.splice(0).forEach((lost) => lost.free());
+      throw new Error("there is no picture: the device that draws was lost again and again. The numbers are those of the run");
+    }
+    pictures[k] = await Picture.open(element(canvases[k]));
+    picture.free();
+  }
+}
+
+/// Shows all of the scene and follows its bodies, until the view is turned or moved or a body is touched.
+function whole() {
+  if (framed === "by hand") return;
+  if (framed !== aspect()) {
+    framed = aspect();
+    (game ? [game] : shows).forEach((show) => show.whole(framed));
+  } else if (!paused) shows.forEach((show) => show.follow(framed));
+}
+
+/// Steps as much as time has passed since the last picture, and draws.
+export async function frame(now) {
+  const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.1);
+  last = now;
+  if (game) await play(seconds);
+  else if (shows.length > 0) await advance(seconds);
+  await besides();
+  whole();
+  draw();
+  tell(now);
+  if (seconds > 0) rates.pictures += 0.1 * (1 / seconds - rates.pictures);
+}
+
+async function play(seconds) {
+  if (paused) return;
+  await game.advance(seconds, ...tilts.wanted());
+}
+
+async function advance(seconds) {
+  if (paused) return;
+  try {
+    await steps(seconds);
+  } catch (error) {
+    pause(true);
+    throw error;
+  }
+}
+
+async function steps(seconds) {
+  const dt = shows[0].dt();
+  owed = Math.min(owed + seconds * pace, MOST_STEPS * dt);
+  const began = performance.now();
+  let made = 0;
+  while (owed >= dt && performance.now() - began < PATIENCE) {
+    await step();
+    owed -= dt;
+    made += 1;
+    if (shows[0].is_at_end()) {
+      pause(true);
+      say("The recording has ended.");
+      break;
+    }
+  }
+  if (seconds > 0) rates.steps += 0.1 * (made / seconds - rates.steps);
+}
+
+/// One step of all that runs; notes the first number that differs.
+export async function step() {
+  for (const show of shows) await show.step();
+  if (shows.length === 2 && difference === null) {
+    const found = first_difference(shows[0], shows[1]);
+    if (found !== undefined) {
+      difference = JSON.parse(found);
+      changes.dispatchEvent(new Event("differs"));
+    }
+  }
+}
+
+function draw() {
+  const scale = Math.min(window.devicePixelRatio || 1, 2);
+  const ground = getComputedStyle(document.documentElement).getPropertyValue("--picture").trim();
+  const color = [1, 3, 5].map((k) => parseInt(ground.slice(k, k + 2), 16) / 255);
+  pictures.forEach((picture, k) => {
+    const canvas = element(canvases[k]);
+    const size = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * scale));
+    const what = game ?? shows[k];
+    if (!picture || !what || size[0] === 0 || size[1] === 0) return;
+    if (game) picture.draw_maze(game, ...size, ...color);
+    else picture.draw(what, ...size, ...color);
+  });
+}
+
+/// Numbers of what runs. While a step waits for a device they are those of the step before.
+export function state() {
+  return isBusy && latest ? latest : counted();
+}
+
+function counted() {
+  const common = {
+    picture: pictures[0]?.api() ?? "none",
+    paused,
+    steps_a_second: paused ? 0 : rates.steps,
+    fps: rates.pictures,
+    message: element("message").textContent,
+    maze: game ? JSON.parse(game.numbers()) : null,
+  };
+  const told = shows.map((show) => JSON.parse(show.numbers()));
+  latest = shows.length === 0 ? common : {
+    ...told[0],
+    scene: file ? file.name : chosen.scene,
+    parameters: { ...chosen.parameters },
+    settings: { ...chosen.settings },
+    first_difference: difference,
+    beside: told[1] ?? null,
+    ...common,
+  };
+  return latest;
+}
+
+let latest = null;
+let shown = { at: 0, steps: -1 };
+function tell(now) {
+  if (now - shown.at < 100 || document.hidden) return;
+  const told = counted();
+  if (game) maze.show(told.maze);
+  if (shows.length > 0) {
+    numbers.show(told, told.steps !== shown.steps);
+    shown.steps = told.steps;
+    // The device was lost, and another backend goes on.
+    if (told.fault && told.fault !== shown.fault) say(told.fault, true);
+    shown.fault = told.fault;
+  }
+  shown.at = now;
+}
+
+/// Steps and draws from now on with each picture of the browser.
+export function loop() {
+  const tick = (now) =>
+    enqueue(() => frame(now))
+      .catch(refuse)
+      .finally(() => requestAnimationFrame(tick));
+  // Time that passes while the page is hidden is not made up for.
+  document.addEventListener("visibilitychange", () => (last = null));
+  requestAnimationFrame(tick);
+}
+
+export function pause(value) {
+  paused = value;
+  element("play").textContent = paused ? "Run" : "Pause";
+}
+
+export const restart = () => tried(() => open(chosen, file));
+export const stepOnce = () =>
+  tried(async () => {
+    pause(true);
+    if (shows.length > 0) await step();
+  });
+
+const both = (call) => tried(() => shows.map(call)[0]);
+const touched = (call) => {
+  framed = "by hand";
+  return both(call);
+};
+const turned = (call) =>
+  tried(() => {
+    framed = "by hand";
+    (game ? [game] : shows).forEach(call);
+  });
+/// What pointers and keys do to what runs (pointer.js).
+export const act = {
+  orbit: (by) => turned((show) => show.orbit(...by)),
+  pan: (by) => turned((show) => show.pan(...by)),
+  zoom: (notches) => turned((show) => show.zoom(notches)),
+  whole: () => tried(() => (framed = null)),
+  grab: (at) => (game ? Promise.resolve(false) : touched((show) => show.grab(...at, aspect()))),
+  drag: (at) => both((show) => show.drag(...at, aspect())),
+  release: () => both((show) => show.release()),
+  throw: (at) => touched((show) => show.throw_cube(...at, aspect())),
+  delete: (at) => touched((show) => show.delete_body(...at, aspect())),
+  point: (at) => (pointer = at),
+  /// Whether arrow keys tilt a board.
+  tilts: () => game !== null,
+  press: (at) => {
+    tilts.pressed = game ? at : null;
+    return game !== null;
+  },
+};
