@@ -269,7 +269,7 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 24] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 25] {
     // A field that is added has to be named here.
     let StepProblem {
         params,
@@ -290,6 +290,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 24] {
         joints,
         axes,
         joint_impulses,
+        joint_totals,
         convergence,
         momentum,
     } = problem;
@@ -316,6 +317,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 24] {
         ("joints", bytemuck::cast_slice(joints)),
         ("axes", bytemuck::cast_slice(axes)),
         ("joint_impulses", bytemuck::cast_slice(joint_impulses)),
+        ("joint_totals", bytemuck::cast_slice(joint_totals)),
         ("convergence", bytemuck::bytes_of(convergence)),
         ("momentum", bytemuck::bytes_of(momentum)),
     ]

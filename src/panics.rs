@@ -12,13 +12,15 @@ pub(crate) struct Panic {
 
 impl Panic {
     fn of(payload: Box<dyn Any + Send>) -> Self {
-        payload.downcast::<Self>().map_or_else(|other| Self { bodies: None, text: text_of(&*other) }, |known| *known)
+        let text = |other: &(dyn Any + Send)| text_of(other).unwrap_or("a panic without a message").to_owned();
+        payload.downcast::<Self>().map_or_else(|other| Self { bodies: None, text: text(&*other) }, |known| *known)
     }
 }
 
-fn text_of(payload: &(dyn Any + Send)) -> String {
+/// The message of a panic, if it has one.
+pub(crate) fn text_of(payload: &(dyn Any + Send)) -> Option<&str> {
     let text = payload.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message").to_owned()
+    text.or_else(|| payload.downcast_ref::<&str>().copied())
 }
 
 /// Calls `compute`. A panic of it goes on with the bodies, up to [`caught`].

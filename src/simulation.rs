@@ -133,16 +133,22 @@ impl Simulation {
         config.check()?;
         world.check()?;
         world.raise_inertias();
-        Ok(Self {
-            stages: Stages::new(&world, &config),
+        let stages = Stages::new(&world, &config);
+        Ok(Self::between_steps(world, config, stages, backend))
+    }
+
+    /// The simulation of a state between two steps.
+    fn between_steps(world: World, config: SolverConfig, stages: Stages, backend: Box<dyn Backend>) -> Self {
+        Self {
             world,
             config,
             backend,
+            stages,
             on_device: false,
             unfinished: None,
             state: next_state(),
             is_pending: false,
-        })
+        }
     }
 
     /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
@@ -546,14 +552,15 @@ impl Simulation {
 
     /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        (0..self.stages.problem.joints.len()).map(|joint| self.stages.joint_impulse(joint)).collect()
+        let problem = &self.stages.problem;
+        (0..problem.joints.len()).map(|joint| problem.joint_impulse(&problem.joint_impulses, joint)).collect()
     }
 
     /// Angular impulse of each joint of the world on its body b about the anchor, in the last of the substeps, world axes (N m s): that of
     /// locks, limits, motors and springs of angles. A torque (N m) is that over the length of the substep.
     pub fn joint_angular_impulses(&self) -> Vec<glam::Vec3> {
         let problem = &self.stages.problem;
-        (0..problem.joints.len()).map(|i| problem.axis_impulse(i, false)).collect()
+        (0..problem.joints.len()).map(|joint| problem.axis_impulse(&problem.joint_impulses, joint, false)).collect()
     }
 
     /// Changes the settings from the next step on.

@@ -54,6 +54,7 @@ pub mod backend {
         #[cfg(not(target_family = "wasm"))]
         pub use crate::backend::gpu::spirv_exact::exact_spirv;
         pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, WORKGROUP};
+        pub use crate::backend::gpu::wgsl_exact::exact_wgsl;
     }
 }
 

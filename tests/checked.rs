@@ -115,10 +115,11 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 42] = [
+    let cases: [(&str, Break); 43] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
+        ("joint_totals: ", |p, _| p.joint_totals.push(JointImpulseRow::default())),
         ("params.body_count: ", |p, _| p.params.body_count += 1),
         ("params.point_count: ", |p, _| p.params.point_count += 1),
         ("params.joint_count: ", |p, _| p.params.joint_count += 1),
@@ -300,8 +301,13 @@ fn sums_of_a_problem_without_room_for_them_are_refused() {
     let sums = Pass { kernel: Kernel::SumImpulses { first: false }, block: 0, colors: 0..1 };
     let line = refusal(problem.clone(), std::slice::from_ref(&sums)).expect("refused");
     assert_eq!(line, "pass 0, sum_impulses: totals: there are none");
+    let of_joints = Kernel::SumJointImpulses { first: false };
+    let of_joints = Pass { kernel: of_joints, block: 0, colors: problem.joint_colors() };
+    let line = refusal(problem.clone(), std::slice::from_ref(&of_joints)).expect("refused");
+    assert_eq!(line, "pass 0, sum_joint_impulses: joint_totals: there are none");
     problem.totals = problem.impulses.clone();
-    assert_eq!(refusal(problem.clone(), &[sums]), None);
+    problem.joint_totals = problem.joint_impulses.clone();
+    assert_eq!(refusal(problem.clone(), &[sums, of_joints]), None);
     problem.totals.pop();
     let line = refusal(problem, &[]).expect("refused");
     assert!(line.contains("totals: "), "{line}");

@@ -98,6 +98,7 @@ fn whatever_a_backend_gives_back_is_compared() {
     // A joint that no pass goes over.
     problem.joints.push(JointRow { body_a: 30, body_b: 31, ..JointRow::default() });
     problem.joint_impulses.push(JointImpulseRow::default());
+    problem.joint_totals.push(JointImpulseRow::default());
     problem.params.joint_count = 1;
     let contacts = problem.rows_of(&problem.contact_colors()).to_vec();
     let colors = problem.contact_colors().len();
@@ -110,10 +111,11 @@ fn whatever_a_backend_gives_back_is_compared() {
     for pass in plan.passes.iter_mut().filter(|pass| pass.kernel.has_one_color()) {
         pass.colors = pass.colors.start + 1..pass.colors.end + 1;
     }
-    let spoils: [fn(&mut StepProblem); 5] = [
+    let spoils: [fn(&mut StepProblem); 6] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
         |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),
         |problem| problem.joint_impulses[0].linear[1] = -0.0,
+        |problem| problem.joint_totals[0].linear[1] = -0.0,
         |problem| problem.convergence.sweeps += 1,
         |problem| problem.momentum.restarts += 1,
     ];

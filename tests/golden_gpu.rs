@@ -1,4 +1,4 @@
-//! Exact mode on a GPU has the golden hashes.
+//! Exact mode on a GPU has the golden hashes, by SPIR-V and by steered WGSL.
 
 #[macro_use]
 mod common;
@@ -10,19 +10,34 @@ mod scenes;
 mod table;
 
 use common::gpu;
-use drystone::Backend;
+use drystone::backend::gpu::GpuOptions;
+use drystone::{Backend, Gpu};
 
 tests! {
     exact_gpu {
         exact_mode_has_the_golden_hashes,
     }
+    any_gpu {
+        steered_wgsl_has_golden_hashes,
+    }
 }
 
 fn exact_mode_has_the_golden_hashes() {
+    have_the_golden_hashes(gpu::exact(), 1);
+}
+
+fn steered_wgsl_has_golden_hashes() {
+    let options = GpuOptions { exact: true, steered: true, ..GpuOptions::default() };
+    // Every third scene: its shaders take long to compile.
+    have_the_golden_hashes(Gpu::open(options).expect("an adapter"), 3);
+}
+
+fn have_the_golden_hashes(gpu: Gpu, step: usize) {
     let golden = table::rows(include_str!("golden/hashes.txt")).expect("a file of hashes");
-    let mut backend: Box<dyn Backend> = Box::new(gpu::exact());
+    let golden: Vec<_> = golden.into_iter().step_by(step).collect();
+    let mut backend: Box<dyn Backend> = Box::new(gpu);
     let mut found = Vec::new();
-    for scene in scenes::all() {
+    for scene in scenes::all().into_iter().step_by(step) {
         let begin = std::time::Instant::now();
         let (row, back) = scene.run(backend, |_| {});
         backend = back;

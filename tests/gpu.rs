@@ -10,6 +10,7 @@ mod settings;
 use common::difference::of_velocities;
 use common::gpu;
 use common::tolerance;
+use drystone::backend::gpu::GpuOptions;
 use drystone::config::Method;
 use drystone::glam::Vec3;
 use drystone::scenes::Spawners;
@@ -20,7 +21,8 @@ use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
-    Backend, Body, Cpu, Error, Event, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
+    Backend, Body, Cpu, Error, Event, Gpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan,
+    StepProblem,
 };
 use settings::set;
 
@@ -43,6 +45,8 @@ tests! {
         a_step_of_plain_wgsl_is_near_the_reference_during_a_fall,
         a_problem_too_large_for_the_adapter_is_refused_by_name,
         any_adapter_can_be_measured_against_the_processor,
+        pipelines_stay_from_one_run_to_the_next,
+        steered_wgsl_runs_many_passes_to_their_end,
     }
     timed_gpu {
         a_device_tells_how_long_it_was_at_what,
@@ -347,4 +351,44 @@ fn kernels_that_are_timed_have_the_bits_of_the_reference() {
         theirs.step(scene.dt).expect("the GPU runs");
     }
     assert_eq!(Difference::between(&ours.world, &theirs.world).bodies, 0);
+}
+
+fn pipelines_stay_from_one_run_to_the_next() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = || GpuOptions { cache: Some(folder.path().join("new")), ..GpuOptions::default() };
+    let run = || {
+        let gpu = Gpu::open(options()).expect("an adapter");
+        let Scene { world, dt, .. } = pile();
+        let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(gpu)).expect("a pile");
+        simulation.step(dt).expect("a step");
+        simulation.hash()
+    };
+    let first = run();
+    let files = || -> Vec<std::fs::DirEntry> {
+        std::fs::read_dir(folder.path().join("new")).map_or(Vec::new(), |files| files.flatten().collect())
+    };
+    let [file] = &files()[..] else { panic!("one file: {:?}", files()) };
+    let kept = std::fs::read(file.path()).expect("the file");
+    assert_eq!(run(), first);
+    // A file that was changed counts as none, and the run writes it again.
+    std::fs::write(file.path(), [&kept[..kept.len() - 1], &[0]].concat()).expect("a file");
+    assert_eq!(run(), first);
+    assert_eq!(std::fs::read(file.path()).expect("the file").len(), kept.len());
+    assert_eq!(files().len(), 1);
+}
+
+/// 960 passes over a small world. In one dispatch the software adapter left them before the last ones.
+fn steered_wgsl_runs_many_passes_to_their_end() {
+    let hash = |backend: Box<dyn Backend>| {
+        let Scene { world, dt, .. } = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
+        let config = SolverConfig::default().with(|c| c.substeps = 160);
+        let mut simulation = Simulation::new(world, config, backend).expect("a pile");
+        for _ in 0..40 {
+            simulation.step(dt).expect("a step");
+        }
+        simulation.hash()
+    };
+    let submission = std::time::Duration::from_secs(60);
+    let options = GpuOptions { exact: true, steered: true, submission, ..GpuOptions::default() };
+    assert_eq!(hash(Box::new(Gpu::open(options).expect("an adapter"))), hash(reference()));
 }

@@ -5,6 +5,8 @@ mod common;
 mod exact;
 #[path = "shaders/layouts.rs"]
 mod layouts;
+#[path = "shaders/steered.rs"]
+mod steered;
 
 use std::collections::BTreeSet;
 use std::path::Path;

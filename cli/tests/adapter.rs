@@ -76,8 +76,11 @@ fn adapters_are_listed_with_their_abilities() {
     let output = Command::new(env!("CARGO_BIN_EXE_drystone")).args(["adapters", "--json"]).output().expect("it starts");
     let listed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let first = listed["adapters"][0].as_object().expect("an adapter");
-    assert_eq!(Vec::from_iter(first.keys()), ["api", "buffer_limit", "driver", "exact", "hardware", "kind", "name"]);
-    assert_eq!((&first["name"], &first["exact"]), (&found.name.into(), &found.exact.into()));
+    assert_eq!(
+        Vec::from_iter(first.keys()),
+        ["api", "buffer_limit", "driver", "hardware", "kind", "name", "takes_spirv"]
+    );
+    assert_eq!((&first["name"], &first["takes_spirv"]), (&found.name.into(), &found.takes_spirv.into()));
 }
 
 fn exact_mode_opens_where_the_adapter_has_it() {
@@ -92,14 +95,14 @@ fn opengl() -> AdapterSummary {
         driver: "4.5".into(),
         kind: "software",
         hardware: false,
-        exact: false,
+        takes_spirv: false,
         clock: false,
         buffer_limit: 1 << 27,
     }
 }
 
 fn a_test_fails_on_an_adapter_that_lacks_an_ability() {
-    let vulkan = AdapterSummary { api: "Vulkan".into(), exact: true, clock: true, ..opengl() };
+    let vulkan = AdapterSummary { api: "Vulkan".into(), takes_spirv: true, clock: true, ..opengl() };
     for need in [Need::Adapter, Need::Exact, Need::Clock] {
         let line = need.refusal(None).expect("there is no adapter");
         assert!(line.contains("an adapter, and there is none") && line.contains("DRYSTONE_ADAPTER=none"), "{line}");

@@ -64,6 +64,8 @@ struct Params {
     restitution_threshold: f32, slop: f32, relaxation: f32, tolerance: f32,
     body_count: u32, point_count: u32, joint_count: u32, patches: u32,
     axis_count: u32,
+    // 0, which no compiler knows: exact mode in WGSL.
+    zero: u32,
 }
 
 // What one dispatch sweeps: colors, one after another, with the substep of their block. The buffer `colors` holds where each color begins,
@@ -89,6 +91,8 @@ struct ResidentParams {
     has_points: u32,
     // 1 if friction at points has two directions.
     tangents: u32,
+    // 0, which no compiler knows: exact mode in WGSL.
+    zero: u32,
 }
 
 // A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.

@@ -51,7 +51,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
                 (contacts, Some(rules.patch))
             }
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => (contacts, None),
-            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => (joints, None),
+            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => (joints, None),
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
             Kernel::IntegrateVelocities { .. }
             | Kernel::BeginChanges
@@ -66,8 +66,13 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
             return refuse(format!("colors {colors:?}: there are {known:?}"));
         }
-        if matches!(kernel, Kernel::SumImpulses { .. }) && problem.totals.is_empty() && !colors.is_empty() {
-            return refuse("totals: there are none".into());
+        let sums = match kernel {
+            Kernel::SumImpulses { .. } => Some(("totals", problem.totals.len())),
+            Kernel::SumJointImpulses { .. } => Some(("joint_totals", problem.joint_totals.len())),
+            _ => None,
+        };
+        if let Some((name, 0)) = sums.filter(|_| !colors.is_empty()) {
+            return refuse(format!("{name}: there are none"));
         }
         if matches!(kernel, Kernel::Extrapolate { .. }) && problem.blocks.len() > 1 {
             return refuse("goes over all bodies: there is more than one block".into());

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::difference::{differing, largest as largest_difference};
 use super::scenes::Warm;
-use super::{Ended, Group, Outcome, PLAIN_PASS, PLAIN_STEP, Run, failed};
+use super::{Failure, Group, Outcome, PLAIN_PASS, PLAIN_STEP, Run, failed};
 use crate::backend::cpu::{Cpu, Reference};
 use crate::backend::gpu::{Gpu, GpuOptions, Loss};
 use crate::backend::{Backend, CheckedStep};
@@ -201,13 +201,13 @@ pub(super) async fn check_losses(run: &mut Run<'_>) {
 }
 
 /// Fails unless two runs have the same bits.
-fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Ended> {
+fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Failure> {
     BodyDifference::first(&a.simulation.world, &b.simulation.world).map_or(Ok(()), |first| failed!("{first}"))
 }
 
 /// Fails unless a run is as near to the reference as few steps of plain WGSL are; the same bits in exact mode. The body in the middle counts:
 /// where surfaces just touch, rounding decides whether a contact is stiff or soft, and that concerns few bodies.
-fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Ended> {
+fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Failure> {
     if run.is_exact() {
         return same_worlds(ours, theirs);
     }

@@ -6,11 +6,12 @@ use crate::problem::StepProblem;
 fn numbers(problem: &StepProblem) -> Vec<f32> {
     let c = &problem.convergence;
     let m = &problem.momentum;
-    let rows: [&[f32]; 4] = [
+    let rows: [&[f32]; 5] = [
         bytemuck::cast_slice(&problem.bodies),
         bytemuck::cast_slice(&problem.impulses),
         bytemuck::cast_slice(&problem.totals),
         bytemuck::cast_slice(&problem.joint_impulses),
+        bytemuck::cast_slice(&problem.joint_totals),
     ];
     let counts = [c.moving, c.done, c.sweeps, c.planned].map(|n| n as f32);
     let momentum = [m.t, m.factor, m.square, m.restarts as f32];

@@ -25,6 +25,7 @@ use crate::backend::Backend;
 use crate::backend::gpu::{AdapterSummary, Gpu, GpuOptions, block_on};
 use crate::error::{Error, Result};
 use crate::names::named;
+use crate::panics::text_of;
 use crate::stats::Stopwatch;
 
 /// Largest difference of a number after one kernel of plain WGSL, relative to 1 plus its size ([`difference::largest`]). Measured over
@@ -64,7 +65,7 @@ named!(Group {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 pub enum Mode {
-    /// SPIR-V whose arithmetic no driver may change: results are the reference's to the last bit.
+    /// SPIR-V or WGSL whose arithmetic no driver can change ([`GpuOptions::exact`]): results are the reference's to the last bit.
     Exact,
     /// Plain WGSL: results are near those of the reference.
     Plain,
@@ -80,11 +81,9 @@ pub enum Verdict {
     Passed,
     /// It does not.
     Failed,
-    /// The adapter or its driver does not offer what the check needs.
-    Skipped,
 }
 
-named!(Verdict { Passed = "passed", Failed = "failed", Skipped = "skipped", });
+named!(Verdict { Passed = "passed", Failed = "failed", });
 
 /// A check and its verdict.
 #[derive(Clone, Debug)]
@@ -98,7 +97,7 @@ pub struct Check {
     pub name: String,
     /// What became of it.
     pub verdict: Verdict,
-    /// What was measured, or why it failed or was skipped: one line.
+    /// What was measured, or why it failed: one line.
     pub figure: String,
     /// How long it took (s).
     pub seconds: f64,
@@ -145,7 +144,7 @@ impl Conformance {
 /// Runs the checks that `options` name, and calls `each` after each.
 ///
 /// # Errors
-/// There is no such adapter, or it cannot be opened; or exact mode alone is asked of an adapter without it.
+/// There is no such adapter, or it cannot be opened.
 pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
     block_on(conform_async(options, each))
 }
@@ -164,20 +163,12 @@ pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result
 /// # Errors
 /// As of [`conform`].
 pub async fn conform_async(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
-    let only_exact = options.modes == [Mode::Exact];
-    let opened = Gpu::open_async(GpuOptions { exact: only_exact, ..options.gpu.clone() }).await?;
-    let adapter = opened.summary().clone();
-    drop(opened);
+    let adapter = Gpu::open_async(options.gpu.clone()).await?.summary().clone();
     let mut run = Run { options, mode: Mode::Plain, gpu: None, checks: Vec::new(), each };
     for &mode in &options.modes {
         run.mode = mode;
         run.gpu = None;
         for &group in &options.groups {
-            if mode == Mode::Exact && !adapter.exact {
-                let skipped = || Ended::Skipped("the adapter takes no SPIR-V".into());
-                run.check(group, "exact mode", async |_| Err(skipped())).await;
-                continue;
-            }
             match group {
                 Group::Kernels => kernels::check(&mut run).await,
                 Group::Scenes => scenes::check(&mut run).await,
@@ -207,24 +198,21 @@ pub fn one_percent_off(_: &str, source: String) -> String {
     source.replace("point.r_b, contact.normal * change)", "point.r_b, contact.normal * (1.01 * change))")
 }
 
-/// Why a check ended without passing.
-enum Ended {
-    Failed(String),
-    Skipped(String),
-}
+/// Why a check failed, in words.
+struct Failure(String);
 
-impl From<Error> for Ended {
+impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        Self::Failed(error.to_string())
+        Self(error.to_string())
     }
 }
 
 /// What a check measured, in words.
-type Outcome = std::result::Result<String, Ended>;
+type Outcome = std::result::Result<String, Failure>;
 
-/// An [`Ended::Failed`] with a text as of `format!`.
+/// A [`Failure`] with a text as of `format!`.
 macro_rules! failed {
-    ($($text:tt)*) => { Err($crate::conform::Ended::Failed(format!($($text)*))) };
+    ($($text:tt)*) => { Err($crate::conform::Failure(format!($($text)*))) };
 }
 use failed;
 
@@ -280,13 +268,8 @@ impl Run<'_> {
         let outcome = caught(body(self)).await;
         let (verdict, figure) = match outcome {
             Ok(Ok(figure)) => (Verdict::Passed, figure),
-            Ok(Err(Ended::Failed(why))) => (Verdict::Failed, why),
-            Ok(Err(Ended::Skipped(why))) => (Verdict::Skipped, why),
-            Err(panic) => {
-                let text = panic.downcast_ref::<String>().map(String::as_str);
-                let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-                (Verdict::Failed, format!("a panic: {}", text.unwrap_or("without a message")))
-            }
+            Ok(Err(Failure(why))) => (Verdict::Failed, why),
+            Err(panic) => (Verdict::Failed, format!("a panic: {}", text_of(&*panic).unwrap_or("without a message"))),
         };
         let figure = figure.split_whitespace().collect::<Vec<_>>().join(" ");
         let seconds = start.elapsed().as_secs_f64();

@@ -66,6 +66,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::ClearImpulses,
         Kernel::SumImpulses { first: true },
         Kernel::SumImpulses { first: false },
+        Kernel::SumJointImpulses { first: true },
+        Kernel::SumJointImpulses { first: false },
         Kernel::BeginSweep { first: true },
         Kernel::BeginSweep { first: false },
         Kernel::MeasureStep,
@@ -108,7 +110,7 @@ pub fn has_patches(kernel: Kernel) -> bool {
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
-        Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => joints,
+        Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => joints,
         Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
         Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,

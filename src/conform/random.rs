@@ -121,6 +121,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
             problem.joints[joint].is_loose = 1.0;
         }
     }
+    problem.joint_totals = problem.joint_impulses.iter().rev().copied().collect();
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
     problem.params = params(&problem, patches);
     solve_joints_at_once(random, &mut problem);
@@ -162,6 +163,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.joint_totals).iter_mut().for_each(scale);
     [&mut problem.params.slop, &mut problem.params.tolerance].into_iter().for_each(scale);
     problem
 }
@@ -181,6 +183,7 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
+    bytemuck::cast_slice_mut(&mut problem.joint_totals).iter_mut().for_each(scale);
     problem
 }
 

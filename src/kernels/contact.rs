@@ -9,7 +9,7 @@ use super::friction::{solve_friction, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::config::FrictionRule;
-use crate::math::{Lane, NormalMovement, cross3, dot3, larger, smaller};
+use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, smaller};
 
 /// The points of a manifold and their impulses, wherever they stand.
 pub trait PointRows<L> {
@@ -131,12 +131,17 @@ pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
     *impulse = Impulse { peak: impulse.peak, ..Impulse::default() };
 }
 
-/// Adds the impulse of one point in a substep to those of the substeps before; the first substep begins the sum. Kernel `sum_impulses`.
+/// Adds the impulse of one point in a substep to those of the substeps before. Kernel `sum_impulses`.
 #[inline(always)]
 pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Impulse<L>) {
-    let now = impulse.components();
-    total.set_components(if is_first { now } else { total.components() + now });
+    total.set_components(summed(is_first, total.components(), impulse.components()));
     total.peak = L::constant(0.0);
+}
+
+/// The impulse of a substep and those of the substeps before; the first substep begins the sum. Kernel `sum_joint_impulses`.
+#[inline(always)]
+pub fn summed<L: Lane>(is_first: bool, before: Vec3<L>, now: Vec3<L>) -> Vec3<L> {
+    if is_first { now } else { before + now }
 }
 
 /// Applies the impulses that a manifold already carries. Kernel `warm_start`.

@@ -31,6 +31,8 @@ pub struct KernelRows<S> {
     pub axes: Vec<Axis<S>>,
     /// Impulses of the joints, then of their axes.
     pub joint_impulses: Vec<Vec3<S>>,
+    /// Their sums over the substeps.
+    pub joint_totals: Vec<Vec3<S>>,
     /// How far the sweeps extrapolate.
     pub momentum: Momentum<S>,
 }
@@ -54,6 +56,7 @@ impl<S: Scalar> KernelRows<S> {
         refill(&problem.joints, &mut self.joints, Joint::load);
         refill(&problem.axes, &mut self.axes, Axis::load);
         refill(&problem.joint_impulses, &mut self.joint_impulses, |r| Vec3::load(r.linear));
+        refill(&problem.joint_totals, &mut self.joint_totals, |r| Vec3::load(r.linear));
         self.momentum = Momentum::load(&problem.momentum);
     }
 
@@ -63,7 +66,8 @@ impl<S: Scalar> KernelRows<S> {
         problem.impulses.iter_mut().zip(&self.impulses).for_each(|(row, impulse)| *row = impulse.store());
         problem.totals.iter_mut().zip(&self.totals).for_each(|(row, total)| *row = total.store());
         let joints = problem.joint_impulses.iter_mut().zip(&self.joint_impulses);
-        joints.for_each(|(row, impulse)| row.linear = impulse.store());
+        let totals = problem.joint_totals.iter_mut().zip(&self.joint_totals);
+        joints.chain(totals).for_each(|(row, impulse)| row.linear = impulse.store());
         problem.momentum = self.momentum.store();
     }
 }

@@ -74,6 +74,7 @@ impl Pass {
                 let each = if self.kernel == (Kernel::SumImpulses { first: false }) { 3 } else { 2 };
                 (points_of(&self.colors) + patches) * each * IMPULSE
             }
+            Kernel::SumJointImpulses { first } => (rows.len() + axes(rows)) * if first { 2 } else { 3 } * IMPULSE,
             Kernel::WarmStart(rules) | Kernel::SolveContacts(rules) | Kernel::ApplyRestitution(rules) => {
                 let (contacts, points) = (rows.len(), points_of(&self.colors));
                 let patches = if rules.patch { contacts } else { 0 };

@@ -37,6 +37,11 @@ pub enum Kernel {
         /// Whether no substep came before.
         first: bool,
     },
+    /// The same; over joint colors, all at once.
+    SumJointImpulses {
+        /// As of `SumImpulses`.
+        first: bool,
+    },
     /// Inertia of bodies that turned; over `turning`.
     TurnInertias,
     /// Factors the joints that are solved at once; over systems.
@@ -94,6 +99,7 @@ impl Kernel {
             Self::IntegrateGyroscopic { .. } => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
             Self::SumImpulses { .. } => "sum_impulses",
+            Self::SumJointImpulses { .. } => "sum_joint_impulses",
             Self::TurnInertias => "turn_inertias",
             Self::FactorJoints => "factor_joints",
             Self::WarmStartJoints { .. } => "warm_start_joints",
@@ -197,7 +203,7 @@ impl fmt::Display for Kernel {
         write!(f, "{}", self.name())?;
         match self {
             Self::IntegrateVelocities { warm_start: true, .. } => write!(f, "(warm start)")?,
-            Self::SumImpulses { first: true } => write!(f, "(first)")?,
+            Self::SumImpulses { first: true } | Self::SumJointImpulses { first: true } => write!(f, "(first)")?,
             _ if self.rules().is_none() && self.is_from_start() => write!(f, "(from start)")?,
             _ => {}
         }

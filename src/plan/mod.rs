@@ -74,6 +74,8 @@ pub(crate) struct PlanKey {
     blocks: Vec<Block>,
     /// Whether impulses are summed over the substeps.
     totals: bool,
+    /// Whether those of joints are.
+    joint_totals: bool,
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
@@ -81,7 +83,7 @@ pub(crate) struct PlanKey {
     axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, isotropic, has_torques, axes });
+crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -90,6 +92,7 @@ impl PlanKey {
             && self.colors == problem.colors
             && self.has_torques != problem.torques.is_empty()
             && self.totals != problem.totals.is_empty()
+            && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
@@ -101,6 +104,7 @@ impl PlanKey {
             colors: problem.colors.clone(),
             blocks: problem.blocks.clone(),
             totals: !problem.totals.is_empty(),
+            joint_totals: !problem.joint_totals.is_empty(),
             isotropic,
             has_torques: !problem.torques.is_empty(),
             axes: !problem.axes.is_empty(),
@@ -230,10 +234,12 @@ impl StepPlan {
 
     /// Adds the impulses of a substep to those of the substeps before, where the problem has room for the sums.
     fn sum_impulses(&mut self, problem: &StepProblem, block: u32, substep: u32) {
-        let colors = problem.blocks[block as usize].contacts;
-        let colors = colors[0]..colors[1];
-        if !problem.totals.is_empty() && !colors.is_empty() {
-            self.passes.push(Pass { kernel: Kernel::SumImpulses { first: substep == 0 }, block, colors });
+        let (first, [contacts, joints, ..]) = (substep == 0, problem.blocks[block as usize].colors());
+        if !problem.totals.is_empty() && !contacts.is_empty() {
+            self.passes.push(Pass { kernel: Kernel::SumImpulses { first }, block, colors: contacts });
+        }
+        if !problem.joint_totals.is_empty() && !joints.is_empty() {
+            self.passes.push(Pass { kernel: Kernel::SumJointImpulses { first }, block, colors: joints });
         }
     }
 

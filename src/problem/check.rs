@@ -59,11 +59,13 @@ impl StepProblem {
     fn check_counts(&self) -> Result<()> {
         let params = &self.params;
         let totals = if self.totals.is_empty() { 0 } else { self.points.len() };
+        let joint_totals = if self.joint_totals.is_empty() { 0 } else { self.joint_impulses.len() };
         for (name, rows, wanted, of) in [
             ("masses", self.masses.len(), self.bodies.len(), "bodies"),
             ("impulses", self.impulses.len(), self.points.len(), "points"),
             ("totals", self.totals.len(), totals, "points"),
             ("joint_impulses", self.joint_impulses.len(), self.joints.len() + self.axes.len(), "joints and axes"),
+            ("joint_totals", self.joint_totals.len(), joint_totals, "joints and axes"),
             ("params.body_count", params.body_count as usize, self.bodies.len(), "bodies"),
             ("params.point_count", params.point_count as usize, self.points.len(), "points"),
             ("params.joint_count", params.joint_count as usize, self.joints.len(), "joints"),

@@ -275,6 +275,7 @@ impl JointRows {
     pub fn write(&mut self, world: &World, asleep: &[bool], effort: &Effort, substep: f32, problem: &mut StepProblem) {
         problem.joints.clear();
         problem.axes.clear();
+        problem.joint_totals.clear();
         problem.turning.clear();
         problem.params.joint_count = world.joints.len() as u32;
         if world.joints.is_empty() {
@@ -319,6 +320,10 @@ impl JointRows {
             }
         }));
         problem.params.axis_count = problem.axes.len() as u32;
+        if world.joints.iter().any(Joint::can_break) {
+            // A joint that takes no part bears nothing that could break it.
+            problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
+        }
         let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
         let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
         lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);

@@ -45,7 +45,7 @@ use crate::error::Result;
 use crate::saved::{Archive, Saved};
 
 /// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
-/// `totals`, `joint_impulses`, `convergence`, `momentum`).
+/// `totals`, `joint_impulses`, `joint_totals`, `convergence`, `momentum`).
 ///
 /// ```
 /// use drystone::{Reference, Scene, Simulation, SolverConfig, StepProblem};
@@ -88,6 +88,8 @@ pub struct StepProblem {
     pub axes: Vec<AxisRow>,
     /// Impulses of the joints, then of the axes.
     pub joint_impulses: Vec<JointImpulseRow>,
+    /// Their sums over the substeps of the step; empty where no joint can break.
+    pub joint_totals: Vec<JointImpulseRow>,
     /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, the rows of unequal
     /// moments of inertia, the systems of joints that take part, and the rows of turning inertia.
     pub order: Vec<u32>,
@@ -119,6 +121,7 @@ crate::saved::cloned!(StepProblem {
     joints,
     axes,
     joint_impulses,
+    joint_totals,
     order,
     colors,
     blocks,
@@ -149,6 +152,7 @@ impl Saved for StepProblem {
             joints: _,
             axes: _,
             joint_impulses,
+            joint_totals: _,
             order: _,
             colors: _,
             blocks: _,
@@ -239,11 +243,16 @@ impl StepProblem {
         self.params.patches != 0
     }
 
-    /// The impulse on body b of those axes of a joint that shift it, or turn it.
-    pub(crate) fn axis_impulse(&self, joint: usize, is_linear: bool) -> Vec3 {
+    /// The impulse of a joint on its body b, of the rows `joint_impulses` or `joint_totals`.
+    pub(crate) fn joint_impulse(&self, impulses: &[JointImpulseRow], joint: usize) -> Vec3 {
+        Vec3::from(impulses[joint].linear) + self.axis_impulse(impulses, joint, true)
+    }
+
+    /// That of those axes of a joint that shift body b, or turn it.
+    pub(crate) fn axis_impulse(&self, impulses: &[JointImpulseRow], joint: usize, is_linear: bool) -> Vec3 {
         let JointRow { first_axis, axis_count, .. } = self.joints[joint];
         let own = first_axis as usize..(first_axis + axis_count) as usize;
-        let impulses = &self.joint_impulses[self.joints.len()..];
+        let impulses = &impulses[self.joints.len()..];
         let rows = self.axes[own.clone()].iter().zip(&impulses[own]);
         let wanted = rows.filter(|(axis, _)| (axis.is_linear > 0.0) == is_linear);
         wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()

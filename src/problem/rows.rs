@@ -365,8 +365,10 @@ pub struct Params {
     pub patches: u32,
     /// Number of axes of joints.
     pub axis_count: u32,
+    /// 0, which the compilers of shaders do not know: exact mode in WGSL.
+    pub zero: u32,
     #[doc(hidden)]
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 /// The length of the substeps of a block, and the coefficients that follow from it, 56 B.

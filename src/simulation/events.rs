@@ -128,7 +128,7 @@ pub enum Event {
     Broke {
         /// The joint. The handle is stale.
         joint: JointHandle,
-        /// What the joint bore in the last substep (N).
+        /// What the joint bore, the mean over the step (N).
         force: f32,
     },
 }

@@ -58,16 +58,7 @@ impl Simulation {
     /// ```
     pub fn fork(&self, backend: Box<dyn Backend>) -> Self {
         let Snapshot { world, config, stages } = self.snapshot();
-        Self {
-            world,
-            config,
-            backend,
-            stages: *stages,
-            on_device: false,
-            unfinished: None,
-            state: next_state(),
-            is_pending: false,
-        }
+        Self::between_steps(world, config, *stages, backend)
     }
 
     /// The state between two steps, to go back to.
@@ -157,16 +148,7 @@ impl Simulation {
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
         let stages = Stages::new(&world, &config);
-        let mut simulation = Self {
-            stages,
-            world,
-            config,
-            backend,
-            on_device: false,
-            unfinished: None,
-            state: next_state(),
-            is_pending: false,
-        };
+        let mut simulation = Self::between_steps(world, config, stages, backend);
         let mut reader = Reader::new(content);
         let read = panics::caught(|| simulation.walk(&mut reader));
         read.map_err(|panic| refused(format_args!("damaged: {}", panic.text)))?.map_err(refused)?;

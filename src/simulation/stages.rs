@@ -12,7 +12,7 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{BodyKind, Joint, MassProperties, Material, World};
+use crate::world::{MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
@@ -360,28 +360,13 @@ impl Stages {
         }
     }
 
-    /// Impulse of a joint on its body b in the last substep, world axes (N s).
-    pub fn joint_impulse(&self, joint: usize) -> glam::Vec3 {
-        glam::Vec3::from(self.problem.joint_impulses[joint].linear) + self.problem.axis_impulse(joint, true)
-    }
-
-    /// What a joint bore in the last substep (N).
-    fn force_on_joint(&self, world: &World, joint: usize, dt: f32) -> f32 {
-        let Joint { body_a, body_b, .. } = world.joints[joint];
-        let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
-        let body = body_b.filter(|&b| moves(b) && !moves(body_a)).unwrap_or(body_a);
-        let substep = dt / (self.key.config.substeps << self.effort.class_of(body)) as f32;
-        self.joint_impulse(joint).length() / substep
-    }
-
-    /// Takes the joints out that bore more than they can.
+    /// Takes the joints out that bore more in the step than they can.
     fn break_joints(&mut self, world: &mut World, dt: f32) {
         let first = self.events.all.len();
-        for joint in 0..world.joints.len() {
-            let most = world.joints[joint].break_force;
-            let force = if most < f32::INFINITY { self.force_on_joint(world, joint, dt) } else { 0.0 };
-            if force > most {
-                self.events.all.push(Event::Broke { joint: world.joints.handles()[joint], force });
+        for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| joint.can_break()) {
+            let force = self.problem.joint_impulse(&self.problem.joint_totals, i).length() / dt;
+            if force > joint.break_force {
+                self.events.all.push(Event::Broke { joint: world.joints.handles()[i], force });
             }
         }
         for event in &self.events.all[first..] {

@@ -69,8 +69,9 @@ pub struct Joint {
     pub angular: [Axis; 3],
     /// Whether the two bodies still collide with each other.
     pub collide: bool,
-    /// The force at which the joint breaks (N), above 0; infinite for one that holds. A joint breaks after a step whose last substep took more,
-    /// its impulse over the length of the substep: the joint is then gone, and [`Event::Broke`](crate::Event::Broke) tells of it.
+    /// The force at which the joint breaks (N), above 0; infinite for one that holds. A joint breaks after a step in which it bore more: the
+    /// length of the sum of its impulses over all substeps, over the length of the step. A blow of J (N s) within a step of the length h counts
+    /// as J/h, for any number of substeps. Torques do not count. The joint is then gone, and [`Event::Broke`](crate::Event::Broke) tells of it.
     pub break_force: f32,
 }
 
@@ -250,10 +251,15 @@ impl Joint {
         self.body_a == body || self.body_b == Some(body)
     }
 
-    /// Lets the joint break at a force (N).
+    /// Lets the joint break at a force (N): see [`Self::break_force`].
     pub fn breaking_at(mut self, force: f32) -> Self {
         self.break_force = force;
         self
+    }
+
+    /// Whether there is a force that breaks the joint.
+    pub(crate) fn can_break(&self) -> bool {
+        self.break_force < f32::INFINITY
     }
 
     /// Lets the two bodies collide all the same.

@@ -59,7 +59,7 @@ impl Need {
             );
         };
         let has = match self {
-            Self::Exact => found.exact,
+            Self::Exact => found.takes_spirv,
             Self::Clock => found.clock,
             Self::Adapter => true,
         };

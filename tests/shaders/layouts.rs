@@ -88,7 +88,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
         Params = Params {
             restitution_threshold slop relaxation tolerance body_count point_count joint_count patches
-            axis_count
+            axis_count zero
         }
         PassRow = PassRow {
             first end substep: substep.length inverse_substep: substep.inverse_length
@@ -96,7 +96,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         }
         Preload = Preload { movable_compliance fixed_compliance share warm_start }
         ResidentParams = ResidentParams {
-            preload body_count contact_count order written_count has_points tangents
+            preload body_count contact_count order written_count has_points tangents zero
         }
         Written = Written { row points_before }
         WrittenContact = WrittenContact {

@@ -20,7 +20,7 @@ pub struct CompareArgs {
     /// The two backends; the first is the reference.
     #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
-    /// Require exact shaders, which otherwise run only where the adapter supports them.
+    /// Use exact shaders also where the adapter takes no SPIR-V.
     #[arg(long, conflicts_with = "plain")]
     exact: bool,
     /// Use plain WGSL, as in a browser.
@@ -35,7 +35,7 @@ impl CompareArgs {
         };
         let (scene, config) = self.scene.load_awake(&self.worlds)?;
         self.scene.set_threads(BackendChoice::Auto);
-        let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.exact));
+        let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.takes_spirv));
         let bodies = scene.world.dynamic_count();
         let mut named = [String::new(), String::new()];
         let mut open = |which: usize| {

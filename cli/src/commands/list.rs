@@ -105,7 +105,7 @@ impl AdaptersArgs {
         if self.json {
             let adapter = |a: &AdapterSummary| {
                 json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
-                    "hardware": a.hardware, "exact": a.exact, "buffer_limit": a.buffer_limit})
+                    "hardware": a.hardware, "takes_spirv": a.takes_spirv, "buffer_limit": a.buffer_limit})
             };
             return print_json(&json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
         }
@@ -115,7 +115,8 @@ impl AdaptersArgs {
         let mut table = plain_table();
         table.set_header(["name", "api", "kind", "driver", "exact mode", "largest buffer"]);
         for a in found {
-            let (exact, buffer) = (if a.exact { "yes" } else { "no" }, format!("{} MiB", a.buffer_limit >> 20));
+            let exact = if a.takes_spirv { "by SPIR-V" } else { "by integers" };
+            let buffer = format!("{} MiB", a.buffer_limit >> 20);
             table.add_row([a.name, a.api, a.kind.into(), a.driver, exact.into(), buffer]);
         }
         print(table)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::comparison::Origin;
-use super::shard::{Measured, gathered, missing};
+use super::shard::{Measured, gathered, last_run, missing};
 use crate::files;
 use crate::hard::{Case, Check, Limit, Setup};
 use drystone::{Error, Result};
@@ -35,6 +35,10 @@ impl Measured for HardRow {
 
     fn program(&self) -> [&str; 2] {
         [&self.build, &self.commit]
+    }
+
+    fn run(&self) -> [&str; 2] {
+        [&self.run, &self.machine]
     }
 }
 
@@ -130,9 +134,7 @@ impl HardRows {
         self.rows.clear();
         for case in cases {
             let hash = self.hash(case);
-            let own = || rows.iter().filter(|row| row.hash == hash);
-            let run = own().map(|row| (&row.run, &row.machine)).max();
-            let last: Vec<_> = own().filter(|row| Some((&row.run, &row.machine)) == run).cloned().collect();
+            let last = last_run(rows.iter().filter(|row| row.hash == hash));
             if last.is_empty() {
                 without.push(case.name);
             }

@@ -49,6 +49,15 @@ pub trait Measured: Clone + DeserializeOwned {
 
     /// Program file and commit.
     fn program(&self) -> [&str; 2];
+
+    /// Start of the run, and the machine that it ran on.
+    fn run(&self) -> [&str; 2];
+}
+
+/// The rows of the last run among rows of one thing.
+pub fn last_run<'a, R: Measured + 'a>(rows: impl Iterator<Item = &'a R> + Clone) -> Vec<R> {
+    let last = rows.clone().map(R::run).max();
+    rows.filter(|row| Some(row.run()) == last).cloned().collect()
 }
 
 /// The rows of one kind in files of rows; of a folder those in the file `name`.

@@ -15,7 +15,7 @@ use crate::kernels::ImpulseStep;
 use crate::kernels::momentum::{StepLength, extrapolate, step_length};
 use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH};
 use crate::math::Lane;
-use crate::problem::{ImpulseRow, StepProblem};
+use crate::problem::StepProblem;
 
 /// The place of the impulse of a joint among the lanes.
 #[derive(Clone, Copy, Default)]
@@ -89,9 +89,9 @@ impl<C: Constraint> LaneLayout<C> {
     }
 
     /// Takes over sums of impulses, sixteen side by side as the impulses are.
-    pub fn load_sums(&self, problem: &StepProblem, from: &[ImpulseRow], sums: &mut LaneImpulses, threads: &Threads) {
+    pub fn load_sums(&self, problem: &StepProblem, from: &[[f32; 4]], sums: &mut LaneImpulses, threads: &Threads) {
         sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), true);
-        let (rows, from, sums): (_, &[[f32; 4]], _) = (C::rows(problem), bytemuck::cast_slice(from), sums.shared());
+        let (rows, sums) = (C::rows(problem), sums.shared());
         threads.spread(0..self.groups.len(), &|range| {
             for group in &self.groups[range] {
                 // SAFETY: `LaneLayout::make_groups` gives each group impulses of its own.

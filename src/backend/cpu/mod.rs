@@ -69,6 +69,8 @@ pub struct Cpu {
     joints: LaneLayout<JointRow>,
     joint_axes: LanePoints,
     joint_impulses: LaneImpulses,
+    /// Their sums over the substeps.
+    joint_totals: LaneImpulses,
     /// Joints that are solved at once: their places, factors and corrections.
     systems: SystemLayout,
     factors: JointFactors<f32>,
@@ -125,12 +127,18 @@ impl Cpu {
         self.contacts.load(problem, &self.partition, &self.places, rows, uses, on);
         self.contact_totals.resize(0, false);
         if !problem.totals.is_empty() {
-            self.contacts.load_sums(problem, &problem.totals, &mut self.contact_totals, threads);
+            let totals = bytemuck::cast_slice(&problem.totals);
+            self.contacts.load_sums(problem, totals, &mut self.contact_totals, threads);
         }
         // The last numbers of axes stand where those of points do.
         let uses = Uses { peaks: false, approach_or_slip: true };
         let rows = (&mut self.joint_axes, &mut self.joint_impulses);
         self.joints.load(problem, &self.partition, &self.places, rows, uses, on);
+        self.joint_totals.resize(0, false);
+        if !problem.joint_totals.is_empty() {
+            let totals = bytemuck::cast_slice(&problem.joint_totals);
+            self.joints.load_sums(problem, totals, &mut self.joint_totals, threads);
+        }
         self.systems.load(problem, &self.partition, &self.joints);
         self.turning.clear();
         self.turning.extend(problem.turning.iter().map(|row| {
@@ -157,6 +165,10 @@ impl Cpu {
             self.contacts.store_to(&problem.contacts, &self.contact_totals, totals, on);
         }
         self.joints.store(problem, &self.joint_impulses, on);
+        if !problem.joint_totals.is_empty() {
+            let totals = bytemuck::cast_slice_mut(&mut problem.joint_totals);
+            self.joints.store_to(&problem.joints, &self.joint_totals, totals, on);
+        }
         problem.convergence = self.convergence;
         problem.momentum = self.momentum.store();
     }
@@ -198,6 +210,7 @@ impl Cpu {
             joints: &self.joints,
             joint_axes: self.joint_axes.shared(),
             joint_impulses: self.joint_impulses.shared(),
+            joint_totals: self.joint_totals.shared(),
             problem,
             systems: &self.systems,
             turning: &self.turning,

@@ -3,7 +3,7 @@
 use super::super::{Backend, CheckedStep};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
-use crate::kernels::contact::{clear_impulse, sum_impulse};
+use crate::kernels::contact::{clear_impulse, sum_impulse, summed};
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
@@ -127,6 +127,16 @@ impl<S: Scalar> Reference<S> {
                     let own = row.first_point as usize..(row.first_point + row.point_count) as usize + patch;
                     let totals = self.rows.totals[own.clone()].iter_mut();
                     self.rows.impulses[own].iter().zip(totals).for_each(|(now, total)| sum_impulse(first, now, total));
+                }
+            }
+            Kernel::SumJointImpulses { first } => {
+                for i in places(problem, pass) {
+                    let JointRow { first_axis, axis_count, .. } = problem.joints[i];
+                    let axes = (first_axis..first_axis + axis_count).map(|axis| problem.joints.len() + axis as usize);
+                    for k in std::iter::once(i).chain(axes) {
+                        self.rows.joint_totals[k] =
+                            summed(first, self.rows.joint_totals[k], self.rows.joint_impulses[k]);
+                    }
                 }
             }
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),

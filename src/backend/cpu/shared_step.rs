@@ -33,6 +33,7 @@ pub(super) struct SharedStep<'a> {
     pub joints: &'a LaneLayout<JointRow>,
     pub joint_axes: SharedPoints<'a>,
     pub joint_impulses: SharedImpulses<'a>,
+    pub joint_totals: SharedImpulses<'a>,
     pub problem: &'a StepProblem,
     pub systems: &'a SystemLayout,
     pub turning: &'a [(u32, Row8)],
@@ -72,12 +73,12 @@ impl SharedStep<'_> {
                 }
             }
             Kernel::SumImpulses { first } => {
-                let (impulses, totals) = (self.contact_impulses, self.contact_totals);
-                let work = Sums { is_first: first, impulses, totals };
-                for color in pass.colors.clone() {
-                    let groups = self.contacts.ranges.of(part, color);
-                    spread(self.contacts.impulses_of(groups), &|range| self.instructions.run(&work, range));
-                }
+                let sums = Sums { is_first: first, impulses: self.contact_impulses, totals: self.contact_totals };
+                self.sum(pass, part, self.contacts, &sums, spread);
+            }
+            Kernel::SumJointImpulses { first } => {
+                let sums = Sums { is_first: first, impulses: self.joint_impulses, totals: self.joint_totals };
+                self.sum(pass, part, self.joints, &sums, spread);
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 self.sweep(pass, part, self.contacts, (self.contact_points, self.contact_impulses), spread);
@@ -113,6 +114,13 @@ impl SharedStep<'_> {
             Kernel::BeginSweep { .. } | Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => {
                 unreachable!("{kernel} does not stay on islands")
             }
+        }
+    }
+
+    fn sum<C: Constraint>(&self, pass: &Pass, part: usize, layout: &LaneLayout<C>, sums: &Sums, spread: Spread) {
+        for color in pass.colors.clone() {
+            let groups = layout.ranges.of(part, color);
+            spread(layout.impulses_of(groups), &|range| self.instructions.run(sums, range));
         }
     }
 

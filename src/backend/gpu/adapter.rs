@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::block_on;
-
 use crate::error::{Error, Result};
 
 /// An adapter, as reports name it.
@@ -11,7 +10,7 @@ use crate::error::{Error, Result};
 /// ```
 /// use drystone::backend::gpu::{AdapterSummary, adapters};
 ///
-/// let exact: Vec<AdapterSummary> = adapters().into_iter().filter(|adapter| adapter.exact).collect();
+/// let exact: Vec<AdapterSummary> = adapters().into_iter().filter(|adapter| adapter.takes_spirv).collect();
 /// println!("{} adapters give the bits of the reference", exact.len());
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,8 +25,8 @@ pub struct AdapterSummary {
     pub kind: &'static str,
     /// Whether the adapter is hardware.
     pub hardware: bool,
-    /// Whether it takes SPIR-V, so that exact mode works.
-    pub exact: bool,
+    /// Whether it takes SPIR-V, in which exact mode forbids the driver to reassociate.
+    pub takes_spirv: bool,
     /// Whether it has a clock that times kernels.
     pub clock: bool,
     /// Largest buffer that a kernel can be given (B).
@@ -125,24 +124,11 @@ pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Ada
 /// # Errors
 /// No such adapter, or it cannot be opened.
 pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
-    block_on(open_device_async(choice))
-}
-
-/// As [`open_device`], for a page.
-///
-/// ```
-/// use drystone::backend::gpu::{AdapterChoice, adapters, open_device_async};
-///
-/// let hardware = adapters().iter().any(|adapter| adapter.hardware);
-/// assert_eq!(pollster::block_on(open_device_async(AdapterChoice::Hardware)).is_ok(), hardware);
-/// ```
-///
-/// # Errors
-/// No such adapter, or it cannot be opened.
-pub async fn open_device_async(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
-    let (adapter, summary) = find(choice, "").await?;
-    let (device, queue) = open(&adapter, false).await?;
-    Ok((device, queue, summary))
+    block_on(async {
+        let (adapter, summary) = find(choice, "").await?;
+        let (device, queue) = open(&adapter, false).await?;
+        Ok((device, queue, summary))
+    })
 }
 
 async fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
@@ -175,9 +161,6 @@ async fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgp
     usable
 }
 
-/// A surface to draw on, and an opened adapter that can.
-pub type Drawable = (wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue);
-
 /// Opens the best adapter that can draw on `window`.
 ///
 /// # Errors
@@ -185,40 +168,19 @@ pub type Drawable = (wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::
 pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
-) -> Result<Drawable> {
-    block_on(open_for_surface_async(Some(display), window))
-}
-
-/// As [`open_for_surface`], for a page, which has no handle of a display: `window` is a canvas there.
-///
-/// ```no_run
-/// # async fn page(canvas: impl Into<wgpu::SurfaceTarget<'static>>) -> drystone::Result<()> {
-/// use drystone::backend::gpu::{Drawable, open_for_surface_async};
-///
-/// let (surface, adapter, _device, _queue): Drawable = open_for_surface_async(None, canvas).await?;
-/// assert!(adapter.is_surface_supported(&surface));
-/// # Ok(())
-/// # }
-/// ```
-///
-/// # Errors
-/// As of [`open_for_surface`].
-pub async fn open_for_surface_async(
-    display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>,
-    window: impl Into<wgpu::SurfaceTarget<'static>>,
-) -> Result<Drawable> {
+) -> Result<(wgpu::Surface<'static>, wgpu::Adapter, wgpu::Device, wgpu::Queue)> {
     let none = |why: String| Error::Adapter(format!("no adapter can draw on this display{why}: {INSTALL}"));
-    let mut descriptor = match display {
-        Some(display) => wgpu::InstanceDescriptor::new_with_display_handle(display),
-        None => wgpu::InstanceDescriptor::new_without_display_handle(),
-    };
-    descriptor.flags = wgpu::InstanceFlags::empty();
-    let instance = wgpu::Instance::new(descriptor);
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        flags: wgpu::InstanceFlags::empty(),
+        ..wgpu::InstanceDescriptor::new_with_display_handle(display)
+    });
     let surface = instance.create_surface(window).map_err(|e| none(format!(" ({e})")))?;
-    let mut usable = usable(&instance, wgpu::Backends::all()).await.into_iter();
-    let (adapter, _) = usable.find(|(a, _)| a.is_surface_supported(&surface)).ok_or_else(|| none(String::new()))?;
-    let (device, queue) = open(&adapter, false).await?;
-    Ok((surface, adapter, device, queue))
+    block_on(async {
+        let mut usable = usable(&instance, wgpu::Backends::all()).await.into_iter();
+        let (adapter, _) = usable.find(|(a, _)| a.is_surface_supported(&surface)).ok_or_else(|| none(String::new()))?;
+        let (device, queue) = open(&adapter, false).await?;
+        Ok((surface, adapter, device, queue))
+    })
 }
 
 fn can_compute(adapter: &wgpu::Adapter) -> bool {
@@ -241,7 +203,7 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
     AdapterSummary {
         kind: KINDS.iter().find(|(kind, _)| *kind == info.device_type).map_or("unknown kind", |(_, name)| name),
         hardware: info.device_type != wgpu::DeviceType::Cpu,
-        exact: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
+        takes_spirv: vulkan && adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS),
         clock: adapter.features().contains(super::timer::FEATURES),
         buffer_limit: adapter.limits().max_storage_buffer_binding_size.min(adapter.limits().max_buffer_size),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
@@ -250,12 +212,12 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-pub(super) async fn open(adapter: &wgpu::Adapter, exact: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
+pub(super) async fn open(adapter: &wgpu::Adapter, takes_spirv: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
     let offered = adapter.limits();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("drystone"),
-        required_features: if exact { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
-            | adapter.features() & super::timer::FEATURES,
+        required_features: if takes_spirv { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
+            | adapter.features() & (super::timer::FEATURES | wgpu::Features::PIPELINE_CACHE),
         // The limits of every WebGPU implementation, with buffers as large as the adapter allows.
         required_limits: wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,

@@ -67,6 +67,8 @@ bindings! {
     Axes "axes": "array<Axis>", Read;
     /// Impulses of the joints and of their axes; read back.
     JointImpulses "joint_impulses": "array<JointImpulse>", Write;
+    /// Their sums over the substeps; read back where the problem has room for them.
+    JointTotals "joint_totals": "array<JointImpulse>", Write;
     /// The lists of the systems of joints that are solved at once.
     JointSystems "joint_systems": "array<u32>", Read;
     /// Inertia of their bodies when the step begins.

@@ -49,8 +49,13 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
     };
     let dispatch = |pass: &Pass| {
         // The order of the rows of some kernels does not matter.
-        let is_ordered =
-            !matches!(pass.kernel, Kernel::ClearImpulses | Kernel::SumImpulses { .. } | Kernel::MeasureJoints(_));
+        let is_ordered = !matches!(
+            pass.kernel,
+            Kernel::ClearImpulses
+                | Kernel::SumImpulses { .. }
+                | Kernel::SumJointImpulses { .. }
+                | Kernel::MeasureJoints(_)
+        );
         let pass_row = place(pass);
         let dispatch = Dispatch { pass_row, ..Dispatch::over(Program::Pass(pass.kernel), rows_of(problem, pass)) };
         if pass.colors.len() > 1 && is_ordered {

@@ -15,6 +15,7 @@ mod adapter;
 pub(crate) mod bindings;
 mod buffers;
 mod dispatch;
+mod kept;
 mod one_dispatch;
 mod options;
 mod pipelines;
@@ -26,11 +27,9 @@ pub(crate) mod spirv_exact;
 mod submissions;
 mod timer;
 pub(crate) mod wgsl;
+pub(crate) mod wgsl_exact;
 
-pub use adapter::{
-    AdapterChoice, AdapterSummary, Drawable, adapters, adapters_async, open_device, open_device_async,
-    open_for_surface, open_for_surface_async,
-};
+pub use adapter::{AdapterChoice, AdapterSummary, adapters, adapters_async, open_device, open_for_surface};
 pub use options::{Faults, GpuOptions, Loss};
 
 use super::cpu::Cpu;
@@ -43,7 +42,7 @@ use crate::stats::{KernelTime, Traffic};
 use bindings::Binding;
 use buffers::Buffers;
 use dispatch::Dispatch;
-use pipelines::Pipelines;
+use pipelines::{Pipelines, Shaders};
 use resident::ResidentRows;
 use submissions::{ROWS_OF_A_DISPATCH, Submissions};
 use timer::Timer;
@@ -91,8 +90,8 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the adapter that `choice` finds. `exact` asks for shaders that no driver may reassociate, so that results
-    /// are the reference's to the last bit.
+    /// Opens the adapter that `choice` finds. `exact` asks for shaders that no driver can reassociate ([`GpuOptions::exact`]), so that
+    /// results are the reference's to the last bit.
     ///
     /// ```no_run
     /// use drystone::{Gpu, backend::gpu::AdapterChoice};
@@ -102,7 +101,7 @@ impl Gpu {
     /// ```
     ///
     /// # Errors
-    /// No such adapter; it cannot be opened; or exact shaders are asked of one that cannot take SPIR-V.
+    /// No such adapter, or it cannot be opened.
     pub fn new(choice: AdapterChoice, exact: bool) -> Result<Self> {
         Self::open(GpuOptions { adapter: choice, exact, ..GpuOptions::default() })
     }
@@ -140,15 +139,16 @@ impl Gpu {
     async fn open_after(lost: usize, options: GpuOptions) -> Result<Self> {
         let Faults { shader, losses } = &options.faults;
         let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
-        let (exact, loss) = (options.exact, losses.get(lost).copied());
-        if exact && !summary.exact {
-            let name = &summary.name;
-            return Err(Error::Adapter(format!("exact mode needs an adapter that takes SPIR-V; {name} does not")));
-        }
-        let (device, queue) = adapter::open(&adapter, exact).await?;
+        let loss = losses.get(lost).copied();
+        let shaders = match options.exact {
+            true if summary.takes_spirv && !options.steered => Shaders::Spirv,
+            true => Shaders::Steered,
+            false => Shaders::Plain,
+        };
+        let (device, queue) = adapter::open(&adapter, shaders == Shaders::Spirv).await?;
         let name = || summary.name.clone();
         Ok(Self {
-            pipelines: Pipelines::new(device.clone(), exact, *shader),
+            pipelines: Pipelines::new(device.clone(), shaders, *shader, options.cache.as_deref()),
             buffers: Buffers::new(device.clone(), queue.clone(), name(), [options.buffer_limit, options.memory]),
             submissions: Submissions::new(device.clone(), queue.clone(), name(), options.submission, loss),
             timer: None,

@@ -8,6 +8,7 @@
 //! 8. There 8 threads are one subgroup, and a barrier inside a subgroup costs nothing.
 
 use super::wgsl::{PASS_ROWS, Program, WORKGROUP};
+use crate::collide::MAX_POINTS;
 use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
@@ -15,6 +16,9 @@ use crate::problem::StepProblem;
 const MOST_ROWS: usize = 256;
 /// Most passes: the first row of the uniform is their number.
 const MOST_PASSES: usize = PASS_ROWS - 1;
+/// Most iterations of loops of one thread. Mesa's llvmpipe leaves a program after 65,535 in all, without a word: a step of 770 passes lost
+/// its last ones.
+const MOST_ITERATIONS: usize = 60_000;
 /// Fewest passes that are worth a shader of their own.
 const FEWEST_PASSES: usize = 4;
 
@@ -47,7 +51,20 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
     table.resize(PASS_ROWS, [0; 4]);
     // A thread for each row of the largest color: barriers inside one subgroup cost nothing.
     let threads = passes.iter().map(rows).max().unwrap_or(0).next_power_of_two().clamp(8, WORKGROUP as usize);
+    let iterations = |pass: &Pass| {
+        let of_color = |color| 2 + problem.rows_of(&(color..color + 1)).len().div_ceil(threads) * of_row(pass.kernel);
+        2 + pass.colors.clone().map(of_color).sum::<usize>()
+    };
+    if passes.iter().map(iterations).sum::<usize>() > MOST_ITERATIONS {
+        return None;
+    }
     Some((Program::OneDispatch(kernels.into(), threads as u32), table))
+}
+
+/// Most iterations for a row of a kernel: over its points twice, or over the axes of a joint.
+fn of_row(kernel: Kernel) -> usize {
+    let sweeps = if let Kernel::SolveContacts(rules) = kernel { rules.passes.max(1) as usize } else { 1 };
+    2 + sweeps * (3 + 2 * MAX_POINTS)
 }
 
 /// Whether threads of a kernel share nothing but rows, so that a program can hold the kernel with others.
@@ -62,7 +79,8 @@ fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let contacts = if problem.contacts.is_empty() { 0 } else { 3 };
     let joints = if problem.joints.is_empty() { 0 } else { 2 + usize::from(!problem.axes.is_empty()) };
     let colors = usize::from(contacts + joints > 0);
-    let totals = usize::from(!problem.totals.is_empty());
+    let totals = [!problem.totals.is_empty(), !problem.joint_totals.is_empty()].map(usize::from);
     let of_bodies = [!problem.torques.is_empty(), !problem.inertias.is_empty()].map(usize::from);
-    3 + contacts + totals + joints + colors + of_bodies[0] + of_bodies[1] + usize::from(measured) > 8
+    let all = [3, contacts, joints, colors, usize::from(measured)];
+    all.iter().chain(&totals).chain(&of_bodies).sum::<usize>() > 8
 }

@@ -1,5 +1,6 @@
 //! How a device is opened and used.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use super::adapter::AdapterChoice;
@@ -19,8 +20,15 @@ pub struct GpuOptions {
     pub adapter: AdapterChoice,
     /// A part of the name, the API or the driver of the adapter; empty for any.
     pub name: String,
-    /// Whether no driver may reassociate or fuse arithmetic, so that results are the reference's to the last bit.
+    /// Whether no driver can reassociate or fuse arithmetic, so that results are the reference's to the last bit. An adapter that takes
+    /// SPIR-V gets shaders with a decoration that forbids it. Others get WGSL whose sums and products integers steer, which keeps the bits
+    /// wherever it was tried; [`conform`](crate::conform) says whether it does here.
     pub exact: bool,
+    /// Whether exact mode takes steered WGSL where the adapter takes SPIR-V, too.
+    pub steered: bool,
+    /// The folder in which pipelines stay from one run to the next, so that later runs compile none; [`BackendKind::open`](crate::backend::BackendKind::open)
+    /// and [`choose`](crate::backend::choose) take the variable `DRYSTONE_CACHE`. Vulkan only. A file that was changed is left out.
+    pub cache: Option<PathBuf>,
     /// Largest buffer (B); the limit of the adapter counts where it is lower.
     pub buffer_limit: u64,
     /// Most memory that all buffers take together (B).
@@ -40,6 +48,8 @@ impl Default for GpuOptions {
             adapter: AdapterChoice::Best,
             name: String::new(),
             exact: false,
+            steered: false,
+            cache: None,
             buffer_limit: u64::MAX,
             memory: u64::MAX,
             submission: Duration::from_millis(100),

@@ -1,23 +1,48 @@
 //! The pipelines of programs, compiled when a plan first asks for them.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use super::bindings::Binding;
 use super::buffers::Buffers;
+use super::kept::KeptPipelines;
 use super::reflect::Reflected;
 #[cfg(not(target_family = "wasm"))]
 use super::spirv_exact;
 use super::wgsl::{ENTRY_POINT, Program};
+use super::wgsl_exact::exact_wgsl;
 use crate::error::Result;
 use crate::problem::PassRow;
+
+/// How shaders reach the driver.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shaders {
+    /// As WGSL, which the driver may reassociate.
+    Plain,
+    /// As SPIR-V that forbids it.
+    Spirv,
+    /// As WGSL whose arithmetic integers steer.
+    Steered,
+}
 
 /// The pipelines of a device.
 pub(super) struct Pipelines {
     device: wgpu::Device,
-    exact: bool,
+    shaders: Shaders,
     /// Changes shaders on purpose ([`Faults`](super::Faults)).
     fault: Option<fn(&str, String) -> String>,
     compiled: HashMap<Program, Compiled>,
+    kept: Option<KeptPipelines>,
+}
+
+/// What was compiled stays for the next run.
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        if let Some(kept) = self.kept.as_ref().filter(|_| !self.compiled.is_empty()) {
+            // Without the file the next run compiles again.
+            let _ = kept.write();
+        }
+    }
 }
 
 /// One pipeline.
@@ -39,8 +64,20 @@ impl Compiled {
 }
 
 impl Pipelines {
-    pub fn new(device: wgpu::Device, exact: bool, fault: Option<fn(&str, String) -> String>) -> Self {
-        Self { device, exact, fault, compiled: HashMap::new() }
+    /// `folder` keeps pipelines from run to run, where wgpu can.
+    pub fn new(
+        device: wgpu::Device,
+        shaders: Shaders,
+        fault: Option<fn(&str, String) -> String>,
+        folder: Option<&Path>,
+    ) -> Self {
+        Self {
+            kept: folder.and_then(|folder| KeptPipelines::open(&device, folder)),
+            device,
+            shaders,
+            fault,
+            compiled: HashMap::new(),
+        }
     }
 
     /// A prepared pipeline.
@@ -61,11 +98,16 @@ impl Pipelines {
         if let Some(fault) = self.fault {
             source = fault(name, source);
         }
-        let reflected = Reflected::new(name, &source)?;
+        let mut reflected = Reflected::new(name, &source)?;
+        if self.shaders == Shaders::Steered {
+            source = exact_wgsl(&reflected, &source);
+            // With the buffer of the number that steers.
+            reflected = Reflected::new(name, &source)?;
+        }
         let layout = layout(&self.device, &reflected);
-        let module = match self.exact {
+        let module = match self.shaders {
             #[cfg(not(target_family = "wasm"))]
-            true => spirv_exact::shader_module(&self.device, &reflected)?,
+            Shaders::Spirv => spirv_exact::shader_module(&self.device, &reflected)?,
             _ => self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -82,7 +124,7 @@ impl Pipelines {
             module: &module,
             entry_point: Some(ENTRY_POINT),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
+            cache: self.kept.as_ref().map(KeptPipelines::cache),
         });
         let bindings = reflected.bindings;
         let bind_group = bind(&self.device, buffers, &layout, &bindings);

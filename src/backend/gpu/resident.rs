@@ -47,8 +47,10 @@ pub struct ResidentParams {
     pub has_points: u32,
     /// 1 if friction at points has two directions.
     pub tangents: u32,
+    /// 0, which the compilers of shaders do not know: exact mode in WGSL.
+    pub zero: u32,
     #[doc(hidden)]
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// The manifold of a contact whose rows were written again, 48 B. Twin of the WGSL struct of this name.

@@ -35,7 +35,7 @@ pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
 }
 
 /// Rows of which a step changes little.
-pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 13] {
+pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 14] {
     [
         (Binding::Params, bytemuck::bytes_of(&problem.params)),
         (Binding::Bodies, bytemuck::cast_slice(&problem.bodies)),
@@ -46,6 +46,7 @@ pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'
         (Binding::Joints, bytemuck::cast_slice(&problem.joints)),
         (Binding::Axes, bytemuck::cast_slice(&problem.axes)),
         (Binding::JointImpulses, bytemuck::cast_slice(&problem.joint_impulses)),
+        (Binding::JointTotals, bytemuck::cast_slice(&problem.joint_totals)),
         (Binding::JointSystems, bytemuck::cast_slice(systems)),
         (Binding::Turning, bytemuck::cast_slice(&problem.turning)),
         (Binding::Convergence, bytemuck::bytes_of(&problem.convergence)),
@@ -64,10 +65,11 @@ pub(super) fn of_contacts(problem: &StepProblem) -> [(Binding, &[u8]); 4] {
 }
 
 /// Rows that the host reads back after every step.
-pub(super) fn changed(problem: &mut StepProblem) -> [(Binding, &mut [u8]); 6] {
+pub(super) fn changed(problem: &mut StepProblem) -> [(Binding, &mut [u8]); 7] {
     [
         (Binding::Bodies, bytemuck::cast_slice_mut(&mut problem.bodies)),
         (Binding::JointImpulses, bytemuck::cast_slice_mut(&mut problem.joint_impulses)),
+        (Binding::JointTotals, bytemuck::cast_slice_mut(&mut problem.joint_totals)),
         (Binding::Convergence, bytemuck::bytes_of_mut(&mut problem.convergence)),
         (Binding::Momentum, bytemuck::bytes_of_mut(&mut problem.momentum)),
         (Binding::Impulses, bytemuck::cast_slice_mut(&mut problem.impulses)),

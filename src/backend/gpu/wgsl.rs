@@ -108,6 +108,9 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
         }
         Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
         Kernel::SumImpulses { first } => (&[part!("sum_impulses")], Over::Colors, format!("sum_contact({first}, row)")),
+        Kernel::SumJointImpulses { first } => {
+            (&[part!("sum_joint_impulses")], Over::Colors, format!("sum_joint({first}, row)"))
+        }
         Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
         Kernel::Extrapolate { first, measured } => {
             (&[part!("extrapolate")], Over::Own, format!("extrapolate({first}, {measured}, first, stride)"))

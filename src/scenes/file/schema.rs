@@ -292,7 +292,7 @@ pub struct JointFile {
     /// Whether the two bodies still collide with each other.
     #[serde(default)]
     pub collide: bool,
-    /// The force at which it breaks (N), more than 0; it holds any if left out.
+    /// The force at which it breaks (N), the mean over a step, more than 0; it holds any if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub break_force: Option<f64>,
     /// The kind of joint. Refuses the keys that are unknown to both.

@@ -139,7 +139,7 @@ fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
         anchor: None,
         anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
         collide: joint.collide,
-        break_force: (joint.break_force < f32::INFINITY).then(|| number(joint.break_force)),
+        break_force: joint.can_break().then(|| number(joint.break_force)),
         kind,
     })
 }

@@ -14,7 +14,7 @@ use super::row::Row;
 use super::solves::{self, SolveRow, solves};
 use crate::files;
 use crate::report::scene_hash::content_hash;
-use crate::report::shard::{Measured, Shard, gathered, missing};
+use crate::report::shard::{Measured, Shard, gathered, last_run, missing};
 use drystone::{ContactProblem, Error, Result, Scene};
 
 // Files of rows in the folder of a report.
@@ -100,8 +100,7 @@ impl Survey<'_> {
             let own = rows.iter().filter(|row| row.hash == hash && row.steps == steps && row.threads == threads);
             let own: Vec<_> = own.cloned().collect();
             own.iter().filter_map(|row| row.differs_from(&own)).for_each(&mut *different);
-            let run = own.iter().map(|row| (&row.run, &row.machine)).max();
-            let last: Vec<_> = own.iter().filter(|row| Some((&row.run, &row.machine)) == run).cloned().collect();
+            let last = last_run(own.iter());
             if last.is_empty() {
                 without.push(scene.name.as_str());
             }
@@ -109,9 +108,7 @@ impl Survey<'_> {
         }
         for problem in &self.problems {
             let hash = solves::hash(problem);
-            let own = || solved.iter().filter(|row| row.hash == hash);
-            let run = own().map(|row| (&row.run, &row.machine)).max();
-            let last: Vec<_> = own().filter(|row| Some((&row.run, &row.machine)) == run).cloned().collect();
+            let last = last_run(solved.iter().filter(|row| row.hash == hash));
             if last.is_empty() {
                 without.push(problem.name.as_str());
             }
@@ -133,6 +130,10 @@ impl Measured for Row {
     fn program(&self) -> [&str; 2] {
         [&self.build, &self.commit]
     }
+
+    fn run(&self) -> [&str; 2] {
+        [&self.run, &self.machine]
+    }
 }
 
 impl Measured for SolveRow {
@@ -140,6 +141,10 @@ impl Measured for SolveRow {
 
     fn program(&self) -> [&str; 2] {
         [&self.build, &self.commit]
+    }
+
+    fn run(&self) -> [&str; 2] {
+        [&self.run, &self.machine]
     }
 }
 

@@ -1,0 +1,151 @@
+//! Exact mode in WGSL, where no SPIR-V can be handed over: sums and products that integers steer.
+//!
+//! WGSL lets a compiler reassociate and fuse what it can see. Here every sum, difference and product goes through an exclusive or of its
+//! bits with an integer that the host sets to 0. No compiler knows that number, so each result is rounded before anything uses it.
+//! Choices between numbers go through integers too: a compiler may else read a minimum or maximum in them, whose signed zeros are free.
+//! So do zeros: a compiler may else take 0 for the product of 0 and x, and x for the sum of 0 and x, whatever their signs. And signs: the
+//! opposite of 0 may else be 0.
+
+use std::ops::Range;
+
+use naga::proc::TypeResolution;
+use naga::{BinaryOperator, Expression, Handle, ScalarKind, TypeInner, UnaryOperator};
+
+use super::bindings::Binding;
+use super::reflect::Reflected;
+
+/// The functions that steer, for one number and for vectors of two to four.
+const STEERED: [(&str, &str, &str); 4] =
+    [("1", "f32", "u32"), ("2", "vec2f", "vec2u"), ("3", "vec3f", "vec3u"), ("4", "vec4f", "vec4u")];
+
+/// The same program, computed as written by any compiler that keeps the laws of integers.
+pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
+    let mut edits = Edits(Vec::new());
+    let module = &reflected.module;
+    let functions = module.functions.iter().map(|(handle, function)| (function, &reflected.info[handle]));
+    let entry = (&module.entry_points[0].function, reflected.info.get_entry_point(0));
+    for (function, info) in functions.chain([entry]) {
+        for (handle, expression) in function.expressions.iter() {
+            let Some(size) = floats(&info[handle].ty, module) else { continue };
+            let span = |handle: Handle<Expression>| function.expressions.get_span(handle).to_range();
+            let Some(range) = span(handle) else { continue };
+            match *expression {
+                Expression::Binary {
+                    op: op @ (BinaryOperator::Add | BinaryOperator::Subtract | BinaryOperator::Multiply),
+                    ..
+                } => edits.steer(source, range, op, size),
+                Expression::Select { .. } => edits.choose(source, range, size),
+                Expression::Unary { op: UnaryOperator::Negate, .. } => edits.negate(source, range, size),
+                _ => {}
+            }
+        }
+    }
+    edits.steer_zeros(source);
+    edits.apply(source) + &functions_of(zero(reflected))
+}
+
+/// How many floats a value has; none if it has others.
+fn floats(ty: &TypeResolution, module: &naga::Module) -> Option<usize> {
+    match *ty.inner_with(&module.types) {
+        TypeInner::Scalar(scalar) if scalar.kind == ScalarKind::Float => Some(1),
+        TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => Some(size as usize),
+        _ => None,
+    }
+}
+
+/// The number of a program that the host sets to 0.
+fn zero(reflected: &Reflected) -> &'static str {
+    if reflected.bindings.contains(&Binding::Resident) { "resident.zero" } else { "params.zero" }
+}
+
+fn functions_of(zero: &str) -> String {
+    let function = |(size, floats, integers): (&str, &str, &str)| {
+        format!(
+            "fn steered_{size}(x: {floats}) -> {floats} {{ return bitcast<{floats}>(bitcast<{integers}>(x) ^ {integers}({zero})); }}
+fn opposite_{size}(x: {floats}) -> {floats} {{ return bitcast<{floats}>(bitcast<{integers}>(x) ^ {integers}(0x80000000u)); }}
+fn chosen_{size}(no: {floats}, yes: {floats}, is: bool) -> {floats} {{
+    return bitcast<{floats}>(select(bitcast<{integers}>(no), bitcast<{integers}>(yes), is));
+}}
+"
+        )
+    };
+    STEERED.into_iter().map(function).collect()
+}
+
+/// Replacements of parts of a text.
+struct Edits(Vec<Edit>);
+
+struct Edit {
+    at: usize,
+    /// How many bytes the new text takes the place of.
+    length: usize,
+    new: String,
+    /// Where the expression ends: of two that begin at one place the longer one is the outer one.
+    end: usize,
+}
+
+impl Edits {
+    fn add(&mut self, at: usize, length: usize, new: String, end: usize) {
+        self.0.push(Edit { at, length, new, end });
+    }
+
+    /// Puts an operation, or an assignment with an operation, through the function that steers it.
+    fn steer(&mut self, source: &str, Range { start, end }: Range<usize>, op: BinaryOperator, size: usize) {
+        let text = &source[start..end];
+        let sign = match op {
+            BinaryOperator::Add => "+",
+            BinaryOperator::Subtract => "-",
+            _ => "*",
+        };
+        if let Some(at) = text.find(&format!("{sign}=")) {
+            // a += b; becomes a = steered(a + (b));
+            let left = text[..at].trim_end();
+            let end = start + text.trim_end().trim_end_matches(';').len();
+            self.add(start + at, 2, format!("= steered_{size}({left} {sign} ("), end);
+            self.add(end, 0, "))".into(), end);
+        } else {
+            self.add(start, 0, format!("steered_{size}("), end);
+            self.add(end, 0, ")".into(), end);
+        }
+    }
+
+    /// Puts zeros in functions through the functions that steer, but for those that a number is compared with.
+    fn steer_zeros(&mut self, source: &str) {
+        for (zero, size) in [("0.0", 1), ("vec2f()", 2), ("vec3f()", 3), ("vec4f()", 4)] {
+            for (at, _) in source.match_indices(zero) {
+                let (before, after) = (&source[..at], &source[at + zero.len()..]);
+                let is_part = before.ends_with(|c: char| c.is_alphanumeric() || c == '.')
+                    || after.starts_with(|c: char| c.is_ascii_digit() || c == 'e');
+                let is_compared = before.trim_end().ends_with(['<', '>', '=']) && !before.trim_end().ends_with(" =");
+                let line = before.rsplit('\n').next().expect("a line");
+                if !(is_part || is_compared || line.starts_with("const ")) {
+                    self.add(at, 0, format!("steered_{size}("), at + zero.len());
+                    self.add(at + zero.len(), 0, ")".into(), at + zero.len());
+                }
+            }
+        }
+    }
+
+    fn negate(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {
+        debug_assert!(source[start..].starts_with('-'), "{}", &source[start..end]);
+        self.add(start, 1, format!("opposite_{size}("), end);
+        self.add(end, 0, ")".into(), end);
+    }
+
+    fn choose(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {
+        debug_assert!(source[start..].starts_with("select("), "{}", &source[start..end]);
+        self.add(start, "select".len(), format!("chosen_{size}"), end);
+    }
+
+    /// The text with all replacements.
+    fn apply(mut self, source: &str) -> String {
+        self.0.sort_by_key(|edit| (edit.at, std::cmp::Reverse(edit.end)));
+        let (mut text, mut from) = (String::new(), 0);
+        for Edit { at, length, new, .. } in self.0 {
+            text += &source[from..at];
+            text += &new;
+            from = at + length;
+        }
+        text + &source[from..]
+    }
+}
