@@ -30,8 +30,9 @@ fn pile(n: usize) -> Scene {
     Scene::find("pile", &[format!("n={n}")]).expect("a scene of the catalogue")
 }
 
+/// Exact mode, each step in one submission: losses are counted in submissions, and a plan is cut by time on a busy machine.
 fn exact() -> GpuOptions {
-    GpuOptions { exact: true, ..GpuOptions::default() }
+    GpuOptions { exact: true, submission: Duration::from_secs(60), ..GpuOptions::default() }
 }
 
 fn losses(losses: &[(u32, bool)]) -> Faults {

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 /// ```
 /// use drystone::backend::gpu::{AdapterSummary, adapters};
 ///
-/// let exact: Vec<AdapterSummary> = adapters().into_iter().filter(|adapter| adapter.takes_spirv).collect();
-/// println!("{} adapters give the bits of the reference", exact.len());
+/// let hardware: Vec<AdapterSummary> = adapters().into_iter().filter(|adapter| adapter.hardware).collect();
+/// println!("{} adapters are hardware", hardware.len());
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSummary {
@@ -212,11 +212,12 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-pub(super) async fn open(adapter: &wgpu::Adapter, takes_spirv: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
+/// Opens an adapter, for shaders of SPIR-V too where `spirv` asks for that.
+pub(super) async fn open(adapter: &wgpu::Adapter, spirv: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
     let offered = adapter.limits();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("drystone"),
-        required_features: if takes_spirv { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
+        required_features: if spirv { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
             | adapter.features() & (super::timer::FEATURES | wgpu::Features::PIPELINE_CACHE),
         // The limits of every WebGPU implementation, with buffers as large as the adapter allows.
         required_limits: wgpu::Limits {

@@ -89,6 +89,12 @@ impl Edits {
         self.0.push(Edit { at, length, new, end });
     }
 
+    /// Puts the call of a function, whose name and bracket are `open`, around an expression but for its first `cut` bytes.
+    fn wrap(&mut self, Range { start, end }: Range<usize>, cut: usize, open: String) {
+        self.add(start, cut, open, end);
+        self.add(end, 0, ")".into(), end);
+    }
+
     /// Puts an operation, or an assignment with an operation, through the function that steers it.
     fn steer(&mut self, source: &str, Range { start, end }: Range<usize>, op: BinaryOperator, size: usize) {
         let text = &source[start..end];
@@ -104,8 +110,7 @@ impl Edits {
             self.add(start + at, 2, format!("= steered_{size}({left} {sign} ("), end);
             self.add(end, 0, "))".into(), end);
         } else {
-            self.add(start, 0, format!("steered_{size}("), end);
-            self.add(end, 0, ")".into(), end);
+            self.wrap(start..end, 0, format!("steered_{size}("));
         }
     }
 
@@ -119,8 +124,7 @@ impl Edits {
                 let is_compared = before.trim_end().ends_with(['<', '>', '=']) && !before.trim_end().ends_with(" =");
                 let line = before.rsplit('\n').next().expect("a line");
                 if !(is_part || is_compared || line.starts_with("const ")) {
-                    self.add(at, 0, format!("steered_{size}("), at + zero.len());
-                    self.add(at + zero.len(), 0, ")".into(), at + zero.len());
+                    self.wrap(at..at + zero.len(), 0, format!("steered_{size}("));
                 }
             }
         }
@@ -128,8 +132,7 @@ impl Edits {
 
     fn negate(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {
         debug_assert!(source[start..].starts_with('-'), "{}", &source[start..end]);
-        self.add(start, 1, format!("opposite_{size}("), end);
-        self.add(end, 0, ")".into(), end);
+        self.wrap(start..end, 1, format!("opposite_{size}("));
     }
 
     fn choose(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {
