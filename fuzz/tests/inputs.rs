@@ -1,8 +1,9 @@
-//! Every input that once broke a promise, and good inputs of every kind.
+//! Every input that once broke a promise, good inputs of every kind, and some that chance makes of good ones.
 
 use std::panic::catch_unwind;
 use std::path::Path;
 
+use drystone::stages::random::SplitMix64;
 use drystone_fuzz::{TARGETS, Target, target};
 
 /// What the check of an input says where a promise is broken.
@@ -40,4 +41,52 @@ fn good_inputs_of_every_kind_break_nothing() {
             assert_eq!(broken(target, seed), None, "{}: seed {k}", target.name);
         }
     }
+}
+
+/// Inputs of each kind that chance makes; `DRYSTONE_INPUTS` takes another number.
+const INPUTS: u64 = 500;
+/// What numbers and texts are made of.
+const SIGNS: &[u8] = b"0123456789-.eE\"\n{}[],:=";
+
+#[test]
+fn inputs_that_chance_makes_of_good_ones_break_nothing() {
+    let count = std::env::var("DRYSTONE_INPUTS").map_or(INPUTS, |n| n.parse().expect("a number of inputs"));
+    for target in TARGETS {
+        let seeds = (target.seeds)();
+        for number in 0..count {
+            let input = changed(&seeds, target.longest, &mut SplitMix64::new(number));
+            assert_eq!(broken(target, &input), None, "{}: input {number}", target.name);
+        }
+    }
+}
+
+/// A good input after one to eight changes: bytes of another good input, of its own, or of chance replace, precede or delete some of its own.
+fn changed(seeds: &[Vec<u8>], longest: usize, random: &mut SplitMix64) -> Vec<u8> {
+    let mut below = |n: usize| (random.bits() % n.max(1) as u64) as usize;
+    let mut input = seeds[below(seeds.len())].clone();
+    for _ in 0..=below(8) {
+        let start = below(input.len() + 1);
+        let end = input.len().min(start + [0, 1, below(4), below(64)][below(4)]);
+        let new = match below(4) {
+            0 => Vec::new(),
+            1 => (0..1 + below(4)).map(|_| below(256) as u8).collect(),
+            2 => vec![SIGNS[below(SIGNS.len())]],
+            _ => {
+                let other = &seeds[below(seeds.len())];
+                let from = below(other.len());
+                other[from..other.len().min(from + below(64))].to_vec()
+            }
+        };
+        input.splice(start..end, new);
+    }
+    input.truncate(longest);
+    input
+}
+
+#[test]
+fn a_broken_promise_is_found() {
+    let target =
+        Target { name: "broken", check: |data| assert!(data.len() < 2, "too long"), seeds: Vec::new, longest: 2 };
+    assert_eq!(broken(&target, &[0]), None);
+    assert_eq!(broken(&target, &[0, 0]).as_deref(), Some("too long"));
 }
