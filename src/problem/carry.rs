@@ -60,7 +60,7 @@ pub struct Preload {
 }
 
 /// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
-const LARGEST_PRELOAD: f64 = 2.0;
+pub(super) const LARGEST_PRELOAD: f64 = 2.0;
 
 impl Preload {
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The

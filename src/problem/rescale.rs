@@ -1,6 +1,7 @@
 //! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
 
 use super::StepProblem;
+use super::carry::LARGEST_PRELOAD;
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::softness::HEAP_STIFFNESS;
 use crate::config::SolverConfig;
@@ -47,19 +48,28 @@ impl StepScale {
 
 /// Brings a contact from substeps of one share of those of class 0 to another, so that it bears the same force. Its springs get stiffer by
 /// the square of the ratio, and are then compressed by as much less; the preload takes up what the bodies already sank in. Without that a
-/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled.
-pub(super) fn change_share(contact: &mut ContactRow, share: f32, points: &[PointRow], impulses: &mut [ImpulseRow]) {
+/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled. `sag` is that of [`change_compliance`].
+pub(super) fn change_share(
+    contact: &mut ContactRow,
+    share: f32,
+    sag: f32,
+    points: &[PointRow],
+    impulses: &mut [ImpulseRow],
+) {
     let ratio = ratio(share, contact.substep_share);
     contact.substep_share = share;
-    change_compliance(contact, ratio * ratio, points);
+    change_compliance(contact, ratio * ratio, sag, points);
     impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
 }
 
-/// Brings a contact to springs that the same force compresses `factor` times as much.
-pub(super) fn change_compliance(contact: &mut ContactRow, factor: f32, points: &[PointRow]) {
+/// Brings a contact to springs that the same force compresses `factor` times as much. `sag` is how much what the contact bears compresses
+/// the springs that it had.
+///
+/// An overlap beyond that is no load but a push. A preload that took it up held a body 0.25 m deep in a wall, which was on its way out of it.
+pub(super) fn change_compliance(contact: &mut ContactRow, factor: f32, sag: f32, points: &[PointRow]) {
     let points = &points[..contact.point_count as usize];
     let separation = points.iter().map(|point| point.separation).sum::<f32>() / points.len() as f32;
-    let compression = (contact.preload - separation).max(0.0);
+    let compression = (contact.preload - separation).max(0.0).min(LARGEST_PRELOAD as f32 * sag);
     contact.preload += (factor - 1.0) * compression;
 }
 
@@ -103,11 +113,22 @@ mod tests {
             ContactRow { preload: 0.25, substep_share: 1.0, point_count: 1, ..ContactRow::framed(glam::Vec3::Y) };
         let points = [PointRow { separation: -0.25, ..PointRow::default() }];
         let mut impulses = [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, peak: 1.0 }];
-        change_share(&mut contact, 0.5, &points, &mut impulses);
+        change_share(&mut contact, 0.5, 0.5, &points, &mut impulses);
         assert_eq!((contact.substep_share, contact.preload), (0.5, -0.125));
         assert_eq!(impulses, [ImpulseRow { normal: 4.0, tangent_1: 2.0, tangent_2: -1.0, peak: 1.0 }]);
-        change_share(&mut contact, 1.0, &points, &mut impulses);
+        change_share(&mut contact, 1.0, 0.125, &points, &mut impulses);
         assert_eq!((contact.substep_share, contact.preload), (1.0, 0.25));
         assert_eq!(impulses, [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, peak: 1.0 }]);
+    }
+
+    /// What is 0.25 m deep and bears nothing is pushed out as before. Of what bears a load, twice the overlap at rest counts at most.
+    #[test]
+    fn an_overlap_that_bears_no_load_stays_an_overlap() {
+        let points = [PointRow { separation: -0.25, ..PointRow::default() }];
+        for (sag, preload) in [(0.0, 0.0), (0.0625, -0.09375), (0.125, -0.1875), (0.5, -0.1875)] {
+            let mut contact = ContactRow { substep_share: 1.0, point_count: 1, ..ContactRow::framed(glam::Vec3::Y) };
+            change_share(&mut contact, 0.5, sag, &points, &mut []);
+            assert_eq!(contact.preload, preload, "{sag} m");
+        }
     }
 }

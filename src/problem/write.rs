@@ -192,16 +192,23 @@ impl Writer<'_> {
     fn follow_effort(&self, contact: &mut ContactRow, points: &[PointRow], impulses: &mut [ImpulseRow]) {
         let share = self.share(contact);
         let is_new = contact.substep_share == 0.0;
-        if share != contact.substep_share {
-            change_share(contact, share, points, impulses);
-        }
-        let [body_a, body_b] = [contact.body_a, contact.body_b].map(|body| body as usize);
+        let bodies = [contact.body_a, contact.body_b].map(|body| body as usize);
         let [was, is] = [Effort::was_in_heap, Effort::is_in_heap]
-            .map(|in_heap| in_heap(self.effort, body_a) || in_heap(self.effort, body_b));
+            .map(|in_heap| bodies.into_iter().any(|body| in_heap(self.effort, body)));
+        let both = bodies.into_iter().all(|body| self.masses[body].inv_mass > 0.0);
+        let preload = &self.carry.preload;
+        let count = contact.point_count as usize;
+        let sag = |share: f32, impulses: &[ImpulseRow]| {
+            let pressed = impulses[..count].iter().map(|impulse| impulse.normal).sum();
+            let mass = points[..count].iter().map(|point| point.normal_mass).sum();
+            preload.yielding::<f32>(share, both, was, pressed) * reciprocal::<f32>(mass)
+        };
+        if share != contact.substep_share {
+            change_share(contact, share, sag(contact.substep_share, impulses), points, impulses);
+        }
         if was != is && !is_new {
-            let both = self.masses[body_a].inv_mass > 0.0 && self.masses[body_b].inv_mass > 0.0;
-            let [was, is] = [was, is].map(|in_heap| self.carry.preload.compliance::<f32>(both, in_heap));
-            change_compliance(contact, is * reciprocal(was), points);
+            let [before, now] = [was, is].map(|in_heap| preload.compliance::<f32>(both, in_heap));
+            change_compliance(contact, now * reciprocal(before), sag(share, impulses), points);
         }
     }
 
