@@ -99,6 +99,12 @@ export async function run({ open, check }) {
   for (const width of [320, 390]) {
     const page = await open({ hash: "#scene=stack", viewport: { width, height: 780 }, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
     check.equal(`${width} pixels, scenes: nothing is wider than the phone`, await wide(page), []);
+    // Paused before the first step, for which software would compile shaders.
+    const on = (backend) => page.evaluate((backend) => Promise.all([window.drystone.backend(backend), window.drystone.pause(true)]), backend);
+    await on("both");
+    check.equal(`${width} pixels, CPU and WebGPU: nothing is wider than the phone`, await wide(page), []);
+    await on("cpu");
+    await page.evaluate(() => window.drystone.pause(false));
     await page.tap("#gallery");
     check.equal(`${width} pixels, gallery: nothing is wider than the phone`, await wide(page), []);
     await page.keyboard.press("Escape");
