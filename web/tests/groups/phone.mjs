@@ -12,7 +12,8 @@ export const mistakes = [
   },
   {
     fails: "320 pixels: the phone tilts the board to the right",
-    script: `addEventListener("deviceorientation", (event) => event.stopImmediatePropagation())`,
+    // The test waits for the tilt that it felt; the board does not feel it.
+    script: `addEventListener("deviceorientation", (event) => ((window.felt = event), event.stopImmediatePropagation()))`,
   },
 ];
 
