@@ -55,8 +55,9 @@ function controls() {
     if (input.value !== "cpu") input.disabled = !hasWebGPU();
     input.addEventListener("change", () => tried(() => open({ ...chosen, backend: input.value }, file)).then(panel.panel));
   }
+  on("exact", "change", ({ target }) => tried(() => open({ ...chosen, exact: target.checked }, file)).then(panel.panel));
   element("backend-note").textContent = hasWebGPU()
-    ? "Both runs the CPU beside WebGPU and names the first number that differs."
+    ? "Both runs the CPU beside WebGPU and names the first number that differs. Exact WebGPU has the bits of the CPU, but is slower."
     : "This browser has no WebGPU: everything runs on the CPU.";
   element("conform").hidden = !hasWebGPU();
   on("conform", "click", panel.check);
@@ -176,7 +177,7 @@ window.drystone = {
   open: (scene, given = {}, values = {}) =>
     ready.then(() => enqueue(() => open({ ...chosen, maze: null, scene, parameters: named(given), settings: { ...values } }))),
   maze: (board) => ready.then(() => enqueue(() => open({ ...chosen, maze: board }))),
-  backend: (name) => ready.then(() => enqueue(() => open({ ...chosen, backend: name }, file))),
+  backend: (name, exact = true) => ready.then(() => enqueue(() => open({ ...chosen, backend: name, exact }, file))),
   pause: (value) => ready.then(() => enqueue(() => pause(value))),
   step: () => ready.then(() => enqueue(step)),
   restart: () => ready.then(() => enqueue(() => open(chosen, file))),

@@ -51,9 +51,12 @@ export function panel() {
     element("picture").setAttribute("aria-label", `Picture of the maze ${chosen.maze}`);
     return;
   }
-  element("runs-on").lastElementChild.textContent = { cpu: "CPU", webgpu: "WebGPU", both: "CPU and WebGPU" }[chosen.backend];
+  const webgpu = chosen.exact ? "exact WebGPU" : "WebGPU";
+  element("runs-on").lastElementChild.textContent = { cpu: "CPU", webgpu, both: `CPU and ${webgpu}` }[chosen.backend];
   element("picture").setAttribute("aria-label", `Picture of ${file ? file.name : chosen.scene}`);
   document.querySelector(`input[name="backend"][value="${chosen.backend}"]`).checked = true;
+  element("exact").checked = chosen.exact;
+  element("exact").disabled = chosen.backend === "cpu";
   element("settings").hidden = shows[0].is_recording();
   parameters();
   solver();

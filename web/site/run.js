@@ -11,7 +11,7 @@ const [MOST_STEPS, PATIENCE] = [4, 25];
 /// Tells `replaced` when something else runs, and `differs` at the first number that differs.
 export const changes = new EventTarget();
 /// What the controls say.
-export let chosen = { maze: null, scene: "pile", parameters: {}, settings: {}, backend: "cpu" };
+export let chosen = { maze: null, scene: "pile", parameters: {}, settings: {}, backend: "cpu", exact: true };
 /// The bytes and name of the file that runs instead of a scene of the catalogue.
 export let file = null;
 /// What runs: one show, or two beside each other; or a game.
@@ -91,7 +91,7 @@ export async function open(next, nextFile = null) {
     for (const backend of next.backend === "both" ? ["cpu", "webgpu"] : [next.backend]) {
       const show = make();
       made.push(show);
-      await show.use_backend(backend);
+      await show.use_backend(backend === "webgpu" && next.exact ? "webgpu-exact" : backend);
     }
     if (made.length === 2 && made[0].is_recording()) throw new Error("a recording runs on one backend at a time");
   } catch (error) {

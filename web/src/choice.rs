@@ -28,11 +28,14 @@ pub fn check_size(name: &str, bodies: u64) -> Result<()> {
     Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser")))
 }
 
-/// What runs the sweeps: `cpu` or `webgpu`.
+/// What runs the sweeps: `cpu`, `webgpu`, or `webgpu-exact`, which has the bits of the CPU.
 pub async fn backend(name: &str) -> Result<Box<dyn Backend>> {
     Ok(match name {
         "cpu" => Box::new(Cpu::new()),
-        _ => Box::new(Gpu::open_async(GpuOptions::default()).await?),
+        _ => {
+            let options = GpuOptions { exact: name == "webgpu-exact", ..GpuOptions::default() };
+            Box::new(Gpu::open_async(options).await?)
+        }
     })
 }
 

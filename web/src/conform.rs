@@ -1,18 +1,19 @@
 //! Checks of the WebGPU of this browser.
 
-use drystone::conform::{ConformOptions, Mode, Verdict, conform_async};
+use drystone::conform::{ConformOptions, Verdict, conform_async};
 use js_sys::Function;
 use wasm_bindgen::prelude::*;
 
 use crate::thrown;
 
-/// Checks WebGPU as `drystone conform` checks an adapter, fewer variants where it is `short`, and those checks only whose names contain one of
-/// `names`, if there are some. Calls `each` with a line after each check, and gives a line that counts them.
+/// Checks WebGPU in exact and in plain mode as `drystone conform` checks an adapter, fewer variants where it is `short`, and those checks
+/// only whose names contain one of `names`, if there are some. Calls `each` with a line after each check, and gives a line that counts them.
 #[wasm_bindgen]
 pub async fn conform(short: bool, names: Vec<String>, each: Function) -> std::result::Result<String, JsError> {
-    let options = ConformOptions { modes: vec![Mode::Plain], short, names, ..ConformOptions::default() };
+    let options = ConformOptions { short, names, ..ConformOptions::default() };
     let mut tell = |check: &drystone::conform::Check| {
-        let line = format!("{}: {}, {}: {}", check.verdict, check.group, check.name, check.figure);
+        let drystone::conform::Check { verdict, mode, group, name, figure, .. } = check;
+        let line = format!("{verdict}: {mode}, {group}, {name}: {figure}");
         // A listener that fails is no reason to stop.
         let _ = each.call1(&JsValue::NULL, &line.into());
     };

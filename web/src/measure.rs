@@ -51,7 +51,7 @@ impl Bare {
         thrown(Self::of(text, settings))
     }
 
-    /// Chooses what runs the sweeps: `cpu` or `webgpu`.
+    /// Chooses what runs the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
         self.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())

@@ -136,7 +136,7 @@ impl Show {
         ColorBy::ALL.iter().map(|color| color.name().to_owned()).collect()
     }
 
-    /// Chooses what runs the sweeps: `cpu` or `webgpu`.
+    /// Chooses what runs the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
         self.live.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())

@@ -27,6 +27,7 @@ export async function run({ open, check }) {
     ["#scene=tower&s.substeps=0", "substeps"],
     ["#maze=none", "none"],
     ["#word=1", "word"],
+    ["#scene=tower&exact=maybe", "exact"],
   ]) {
     const bad = await open({ hash });
     const { message } = await state(bad);
