@@ -1,7 +1,8 @@
 //! Errors with a reason outside the numbers: the caller's input, or the machine.
 //!
 //! Trouble *in* the numbers (a body that left the finite range, a contact without a color) is not an
-//! error: it is counted in [`StepStats`](crate::stats::StepStats) and shown.
+//! error where a step made it: it is counted in [`StepStats`](crate::stats::StepStats) and shown. A number out of
+//! range that a caller sets is one.
 
 use std::path::PathBuf;
 

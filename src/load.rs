@@ -18,7 +18,7 @@ use crate::world::{Body, BodyKind, World, placed, pose};
 
 /// Most substeps that the settings take.
 const MOST_SUBSTEPS: f64 = 4096.0;
-/// Bodies whose tops are within this of the highest one below bear together, relative to the height of what they bear.
+/// Bodies share the load of a body above where their tops are within this of the highest top, relative to the height of the body above.
 const LEVEL: f64 = 0.1;
 
 /// The interface that sinks in deepest.

@@ -2,7 +2,7 @@
 //!
 //! Written over [`Lane`], one text is at once the scalar reference (`f32`) and the high-precision path (`f64`).
 //! Branches are `select`s, as in WGSL. Every function here is the double of one in `shaders/lib/math.wgsl`, of the same
-//! name and the same order of operations; `tests/kernels.rs` holds the two together.
+//! name and the same order of operations; `tests/gpu/kernels.rs` holds the two together.
 //!
 //! `#[inline(always)]` and no closures: a helper that is not inlined loses the instruction set of its caller.
 

@@ -1,4 +1,4 @@
-//! Settings by name. A preset is a promise with numbers, which tests/presets.rs keeps.
+//! Settings by name. A preset is a promise with numbers, which tests/scenes/presets.rs keeps.
 
 use crate::config::SolverConfig;
 use crate::names::named;

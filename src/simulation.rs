@@ -101,7 +101,8 @@ struct Unfinished {
 pub struct Simulation {
     /// The bodies, with their moments of inertia raised where they are too small ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)).
     /// Between steps, all of it may change: bodies and joints may come and go, and gravity, poses, velocities, forces, masses, materials, kinds and
-    /// shapes may become others. The next step finds the changes. Contacts of bodies that stay keep their impulses, but for those of a
+    /// shapes may become others. The next step finds the changes, and refuses what [`World::check`] refuses. Contacts of bodies
+    /// that stay keep their impulses, but for those of a
     /// body that changed its kind or shapes.
     pub world: World,
     config: SolverConfig,
@@ -139,6 +140,8 @@ impl Simulation {
 
     /// The simulation of a state between two steps.
     fn between_steps(world: World, config: SolverConfig, stages: Stages, backend: Box<dyn Backend>) -> Self {
+        // The threads of a process begin here, and not within its first step.
+        rayon::current_num_threads();
         Self {
             world,
             config,
@@ -151,11 +154,12 @@ impl Simulation {
         }
     }
 
-    /// Moves the world by `dt` seconds. Where everything sleeps that can, nothing is done.
+    /// Moves the world by `dt` seconds. If all bodies sleep, it computes nothing.
     ///
     /// # Errors
-    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); a body that came or changed, a
-    /// joint or a mass is not fit to be simulated; the backend cannot run the step; a contact cannot be computed ([`Error::Panicked`]). The world
+    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); a body
+    /// that came or changed, a joint or a mass is not fit to be simulated; the caller gave a body a pose, a velocity, a force or a torque
+    /// that [`World::check`] refuses; the backend cannot run the step; a contact cannot be computed ([`Error::Panicked`]). The world
     /// is then as it was. After a contact that cannot be computed all bodies are awake, and contacts begin without impulses.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
@@ -258,7 +262,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// As [`Simulation::step`], or the world has joints, which a contact problem has not.
+    /// As [`Simulation::step`], or the world has joints: a contact problem has none.
     pub fn step_with_contacts(&mut self, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
         if !self.world.joints.is_empty() {
             let joints = self.world.joints.len();
@@ -340,9 +344,10 @@ impl Simulation {
 
     /// Gives up the state between steps, which a panic left half done: the next step finds all contacts anew.
     fn begin_anew(&mut self) {
-        let listen = self.stages.events.listen;
+        let (listen, astray) = (self.stages.events.listen, std::mem::take(&mut self.stages.astray));
         self.stages = Stages::new(&World::new(), &self.config);
         self.stages.events.listen(listen);
+        self.stages.astray = astray;
         self.on_device = false;
     }
 
@@ -392,7 +397,8 @@ impl Simulation {
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
         self.stages.is_foreign &= stats.asleep > 0;
-        stats.first_non_finite = self.world.first_non_finite();
+        let is_finite = |&&i: &&usize| self.world.bodies[i].is_finite();
+        stats.first_non_finite = self.stages.astray.iter().find(|i| !is_finite(i)).copied();
     }
 
     /// Refuses rows that follow from state which someone forged.
@@ -470,7 +476,7 @@ impl Simulation {
         self.world
     }
 
-    /// Whether a body sleeps; see [`SolverConfig::sleep_after`].
+    /// Whether a body sleeps; see [`SolverConfig::sleep_after`]. False for an index without a body.
     pub fn is_asleep(&self, body: usize) -> bool {
         self.stages.sleep.asleep().get(body) == Some(&true)
     }
@@ -486,7 +492,7 @@ impl Simulation {
         self.stages.sleep.asleep()
     }
 
-    /// The substeps that a body takes in a step; see [`SolverConfig::max_substeps`].
+    /// The substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. The least for an index without a body.
     pub fn substeps_of(&self, body: usize) -> u32 {
         self.config.substeps << self.stages.effort.class_of(body)
     }

@@ -2,8 +2,9 @@
 //!
 //! Bodies that touch, or that a joint holds together, form an island. An island whose bodies were all slow for a while falls
 //! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
-//! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it, or when
-//! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it. A body that
+//! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it or is tied to it, or when
+//! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it or at the other
+//! end of one of its joints. A body that
 //! touches nothing never sleeps, nor does an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
@@ -13,7 +14,7 @@ use crate::config::SolverConfig;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::saved::{Archive, Saved};
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, BodyKind, Joint, World};
 
 /// The state of a body that a caller may change between two steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -100,6 +101,13 @@ fn comes_out(pair: &Pair, world: &World, config: &SolverConfig) -> bool {
     let going_on = pair.manifolds.iter().filter(|manifold| !manifold.has_ended());
     let mut points = going_on.flat_map(|manifold| pair.overlaps(manifold, world));
     points.any(|(overlap, parting)| overlap > deep && COMING_OUT * parting > overlap)
+}
+
+/// Bodies that touch each other, and those that a joint ties to each other or to the world.
+fn touching_or_tied(world: &World, detector: &Detector) -> impl Iterator<Item = (usize, Option<usize>)> {
+    let touching = detector.pairs().filter(|p| p.is_touching()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
+    let joints = world.joints.iter().filter(|joint| !joint.holds_nothing());
+    touching.chain(joints.map(Joint::indices))
 }
 
 /// Islands are looked for in every so many steps.
@@ -261,15 +269,15 @@ impl Sleep {
                 _ => Activity::Still,
             };
         }
-        self.wake_touched(detector);
+        self.wake_touched(world, detector);
     }
 
-    /// Wakes what sleeps and is touched by what does not; returns whether that was anything.
-    pub fn wake_touched(&mut self, detector: &Detector) -> bool {
+    /// Wakes what sleeps and is touched by, or tied to, what does not; returns whether that was anything.
+    pub fn wake_touched(&mut self, world: &World, detector: &Detector) -> bool {
         let before = self.count;
         if before > 0 && self.activity.iter().any(|a| *a != Activity::Still) {
-            for pair in detector.pairs().filter(|p| p.is_touching()) {
-                let [a, b] = [pair.body_a as usize, pair.body_b as usize];
+            for (a, b) in touching_or_tied(world, detector) {
+                let Some(b) = b else { continue };
                 for (one, other) in [(a, b), (b, a)] {
                     if self.asleep[one] && self.activity[other] != Activity::Still {
                         self.wake(one);
@@ -325,10 +333,7 @@ impl Sleep {
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];
         self.islands.reset(self.asleep.len());
-        let touching =
-            detector.pairs().filter(|p| p.is_touching()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
-        let joined = world.joints.iter().map(|j| (j.body_a, j.body_b));
-        for (a, b) in touching.chain(joined) {
+        for (a, b) in touching_or_tied(world, detector) {
             for (one, other) in [(Some(a), b), (b, Some(a))] {
                 let Some(one) = one else { continue };
                 held[one] = true;

@@ -46,7 +46,8 @@ pub struct StepStats {
     pub joints: usize,
     /// Those of them that are solved at once and not swept.
     pub direct_joints: usize,
-    /// Largest gap at rest that sweeps would leave in a joint, as a share of its arms: above 1e-3 its joints are solved at once.
+    /// Largest gap at rest that sweeps would leave in a joint, as a share of its arms. Above `max_joint_gap_share` of the settings ball joints
+    /// are solved at once, or take more substeps.
     pub swept_joint_gap: f32,
     /// Sweeps that were done, where the settings have a tolerance; else 0.
     pub sweeps: u32,
@@ -60,7 +61,8 @@ pub struct StepStats {
     pub traffic: Traffic,
     /// How long a device was at each kernel, where it has a clock.
     pub kernels: Vec<KernelTime>,
-    /// The first body whose pose or velocity is not finite, if any.
+    /// The first body whose pose or velocity the step made not finite, if any: it touches nothing from then on, and no step is
+    /// refused for it.
     pub first_non_finite: Option<usize>,
     /// One line where a device was lost in this step: the reason, and the backend that repeated the step and goes on.
     pub fault: Option<String>,

@@ -2,6 +2,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod adapter;
 pub mod commands;
 pub mod files;
 pub mod hard;

@@ -2,7 +2,7 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, BodyKind, Groups, Joint, MassProperties, Material, Shape};
+use drystone::{Axis, Body, BodyHandle, BodyKind, Groups, Joint, MassProperties, Material, Shape};
 
 use crate::good;
 
@@ -276,8 +276,8 @@ enum AnyJointKind {
 }
 
 impl AnyJoint {
-    /// Between two bodies by their indices; none for the world.
-    pub fn joint(&self, a: usize, b: Option<usize>) -> Joint {
+    /// Between two bodies; none for the world.
+    pub fn joint(&self, a: BodyHandle, b: Option<BodyHandle>) -> Joint {
         let [anchor_a, anchor_b] = self.anchors.map(Vector::vec);
         let joint = match b {
             Some(b) => Joint::new(a, anchor_a, b, anchor_b),

@@ -152,7 +152,7 @@ impl Game {
                     let (body, mut handles) = (body.body(), Vec::new());
                     self.runs.each(|simulation| {
                         let world = if *in_first { 0 } else { simulation.world.world_count() - 1 };
-                        handles.push(simulation.world.insert_in(world, body.clone()));
+                        handles.push(simulation.world.insert_in(world, body.clone()).expect("a world"));
                     });
                     assert!(!self.bodies.contains(&handles[0]), "{:?} was another body before", handles[0]);
                     assert!(handles.windows(2).all(|pair| pair[0] == pair[1]), "handles differ: {handles:?}");
@@ -198,7 +198,7 @@ impl Game {
                 let world = &self.runs.first().world;
                 let is_there = |handle: &BodyHandle| world.body(*handle).is_some();
                 let (Some(a), b) = (a.filter(is_there), b.filter(is_there)) else { return };
-                let (joint, mut handles) = (joint.joint(a.index(), b.map(BodyHandle::index)), Vec::new());
+                let (joint, mut handles) = (joint.joint(a, b), Vec::new());
                 self.runs.each(|simulation| handles.push(simulation.world.insert_joint(joint)));
                 assert!(!self.joints.contains(&handles[0]), "{:?} was another joint before", handles[0]);
                 self.joints.push(handles[0]);
@@ -290,8 +290,8 @@ fn play(program: &Program) {
         }
     }
     for joint in program.joints.iter().take(MOST_BODIES).filter(|_| !bodies.is_empty()) {
-        let [a, b] = joint.bodies.map(|k| bodies.get(usize::from(k) % (bodies.len() + 1)).map(|body| body.index()));
-        let handle = world.insert_joint(joint.joint(a.unwrap_or(bodies[0].index()), b));
+        let [a, b] = joint.bodies.map(|k| bodies.get(usize::from(k) % (bodies.len() + 1)).copied());
+        let handle = world.insert_joint(joint.joint(a.unwrap_or(bodies[0]), b));
         if good(world.check()).is_none() {
             world.remove_joint(handle);
         }

@@ -138,7 +138,7 @@ impl Game {
         }
         let [right, front] = self.tilt.map(f32::to_radians);
         let rotation = Quat::from_rotation_x(front) * Quat::from_rotation_z(-right);
-        for body in &mut self.engine.world_mut().bodies[..BALL] {
+        for body in self.engine.world_mut().bodies.iter_mut().take(BALL) {
             body.move_to(Vec3::ZERO, rotation, self.dt);
         }
         self.engine.step(self.dt)?;

@@ -72,14 +72,17 @@ fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
     return dot3(motion.along, motion.along) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turn_a + turn_b);
 }
 
+// Rows that are no limits are further than this above their upper limit (m, rad).
+const LEAST_LEFT: f32 = -5e17;
+
 fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
     let mass = reciprocal(axis_inverse_mass(pair, motion));
 
     // Of two limits the nearer one acts: it pushes the body inwards.
-    let is_limit = axis.range > -0.5;
+    let is_limit = axis.left > LEAST_LEFT;
     let place = axis.gap + motion.moved;
-    let left = axis.range - place;
+    let left = axis.left - motion.moved;
     let is_upper = is_limit && place > left;
     let sign = select(1.0, -1.0, is_upper);
     let gap = select(place, left, is_upper);

@@ -1,4 +1,4 @@
-// The rows of a StepProblem. Layout, names and units: src/problem/rows.rs, held together by tests/shaders.rs.
+// The rows of a StepProblem. Layout, names and units: src/problem/rows.rs, held together by tests/cpu/shaders.rs.
 
 struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
 
@@ -31,7 +31,7 @@ struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f, is_
 
 struct Axis {
     direction: vec3f, is_linear: f32,
-    gap: f32, range: f32, speed: f32, max_impulse: f32,
+    gap: f32, left: f32, speed: f32, max_impulse: f32,
     rate: f32, mass_scale: f32, impulse_scale: f32, length: f32,
 }
 

@@ -16,7 +16,7 @@ use super::world_contacts::{ColliderRange, DetectionInput, PlacedBody, WorldCont
 use crate::config::SolverConfig;
 use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
-use crate::world::{Body, BodyKind, Groups, World};
+use crate::world::{Body, BodyKind, Groups, Joint, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
 pub struct Detector {
@@ -53,7 +53,8 @@ crate::saved::fields!(KnownBody { generation, world, colliders });
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
     let apart = world.joints.iter().filter(|joint| !joint.collide);
-    apart.filter_map(|joint| Some(key(joint.body_a as u32, joint.body_b? as u32))).collect()
+    let ends = |joint: &Joint| (joint.body_a.index() as u32, joint.body_b.map(|b| b.index() as u32));
+    apart.map(ends).filter_map(|(a, b)| Some(key(a, b?))).collect()
 }
 
 impl Detector {
@@ -148,14 +149,15 @@ impl Detector {
         detector
     }
 
-    /// The bodies that came, went, or changed kind, groups or shapes since the last call of [`Self::follow_bodies`], ascending.
-    pub fn changed_bodies(&self, world: &World) -> Vec<usize> {
+    /// The bodies that came, went, or changed kind, groups or shapes since the last call of [`Self::follow_bodies`], and those
+    /// that do not fit, ascending.
+    pub fn changed_bodies(&self, world: &World, fits: impl Fn(usize, &Body) -> bool + Sync) -> Vec<usize> {
         let (generations, worlds) = (world.bodies.generations(), world.bodies.worlds());
         let is_other = |i: usize| {
             let (Some(known), Some(body)) = (self.known.get(i), world.bodies.get(i)) else { return true };
             let same_place = known.generation == generations[i] && known.world == worlds[i];
             let same = same_place && self.kinds[i] == body.kind && self.groups[i] == body.groups;
-            !same || !self.has_shapes_of(i, *known, body)
+            !same || !self.has_shapes_of(i, *known, body) || !fits(i, body)
         };
         let all = (0..world.bodies.len().max(self.known.len())).into_par_iter().with_min_len(1024);
         // Most steps change none, and then nothing is allocated.

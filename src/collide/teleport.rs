@@ -49,8 +49,8 @@ impl<'a> Teleports<'a> {
     }
 
     /// Ends the contacts between bodies of which one was put farther off from the other than the thinner shape is thick, half of its smallest side:
-    /// what it touched is not where it touches now. A body that was moved with all that can be pushed and that it touches keeps the others: it bears
-    /// what it bore.
+    /// what it touched is not where it touches now. A body that moves together with all movable bodies that it touches keeps the contacts with them,
+    /// and bears the same loads.
     pub fn end_contacts(&self, kinds: &[BodyKind], pairs: &mut Pairs) {
         let is_movable = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
         let mut parted = Vec::new();

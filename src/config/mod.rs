@@ -93,8 +93,9 @@ pub struct SolverConfig {
     /// take more substeps where that is cheaper (nets).
     pub max_joint_gap_share: f32,
     /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where sweeps would leave a gap of more
-    /// than `max_joint_gap_share` at rest: where a joint bears many times the mass of its bodies. Measured with 8 substeps, a chain of 100
-    /// links with 1000 times the mass of a link at its end: gap 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
+    /// than `max_joint_gap_share` at rest: where a joint bears many times the mass of its bodies. A set in which
+    /// one joint is no ball joint is swept. Measured with 8 substeps, a chain of 100 links with 1000 times the mass of a link at its end: gap
+    /// 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
     pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,
@@ -107,7 +108,7 @@ pub struct SolverConfig {
     /// Whether free rotation of unequal moments of inertia is integrated (implicit midpoint).
     pub gyroscopic: bool,
     /// How far apart surfaces are when a contact is already made, relative to the smallest half extent of the thinner
-    /// shape. The distance that the bodies approach in one step is added.
+    /// shape. The distance that the bodies approach in one step is added, up to twice that half extent; before a half-space, all of it.
     pub speculative_margin: f32,
     /// A manifold is reused while its bodies moved relative to each other by less than this, relative to the smallest
     /// half extent of the thinner shape; 0 computes every manifold anew.

@@ -180,7 +180,7 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
         return vec![system_sweep(Rules::default(), problem)];
     }
-    // What a warm start applies is what happened since it last ran.
+    // A warm start applies the impulses since it last ran.
     if kernel == (Kernel::IntegrateVelocities { warm_start: true, from_start: false }) {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());

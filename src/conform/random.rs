@@ -7,8 +7,8 @@ use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use crate::problem::StepProblem;
 use crate::problem::softness::softness;
 use crate::problem::{
-    AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, Params,
-    PointRow, Substep, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, NO_LIMIT,
+    Params, PointRow, Substep, TorqueRow, TurningRow,
 };
 use crate::random::SplitMix64;
 
@@ -159,7 +159,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
     problem.axes.iter_mut().flat_map(|row| [&mut row.gap, &mut row.speed, &mut row.max_impulse]).for_each(scale);
-    problem.axes.iter_mut().filter(|row| row.range > 0.0).map(|row| &mut row.range).for_each(scale);
+    problem.axes.iter_mut().filter(|row| row.left > NO_LIMIT).map(|row| &mut row.left).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
@@ -330,12 +330,12 @@ fn axis_row(random: &mut Random) -> (AxisRow, f32) {
     row.direction = (random.rotation() * Vec3::X).to_array();
     row.is_linear = if random.happens(0.5) { 1.0 } else { 0.0 };
     row.gap = random.within(-0.2, 0.2);
-    row.range = -1.0;
+    row.left = NO_LIMIT;
     row.max_impulse = f32::MAX;
     row.length = if random.happens(0.3) { random.within(0.5, 2.0) } else { 0.0 };
     let impulse = random.within(-1.0, 1.0);
     match random.below(4) {
-        0 => row.range = random.within(0.0, 0.5),
+        0 => row.left = random.within(0.0, 0.5) - row.gap,
         1 => (row.speed, row.mass_scale, row.max_impulse) = (random.within(-2.0, 2.0), 1.0, random.within(0.1, 1.0)),
         2 => {
             row.impulse_scale = random.within(0.2, 1.0);

@@ -105,6 +105,9 @@ pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axi
     apply_axis_impulse(pair, &motion, impulse);
 }
 
+/// Rows that are no limits are further than this above their upper limit (m, rad): half of `NO_LIMIT`.
+const LEAST_LEFT: f64 = -5e17;
+
 /// Sweeps one axis. Kernel `solve_joints`.
 #[inline(always)]
 pub fn solve_axis<L: Lane>(
@@ -120,9 +123,9 @@ pub fn solve_axis<L: Lane>(
     let mass = reciprocal(axis_inverse_mass(pair, &motion));
 
     // Of two limits the nearer one acts: it pushes the body inwards.
-    let is_limit = axis.range.gt(L::constant(-0.5));
+    let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
     let place = axis.gap + motion.moved;
-    let left = axis.range - place;
+    let left = axis.left - motion.moved;
     let is_upper = L::and(is_limit, place.gt(left));
     let sign = L::select(one, L::constant(-1.0), is_upper);
     let gap = L::select(place, left, is_upper);

@@ -107,8 +107,8 @@ pub struct Axis<L> {
     pub is_linear: L,
     /// Where a is when the step begins.
     pub gap: L,
-    /// How far the upper limit is above the lower one; -1 without limits.
-    pub range: L,
+    /// How far it is below its upper limit when the step begins; `NO_LIMIT` of a row that is no limit.
+    pub left: L,
     /// The speed of its motor.
     pub speed: L,
     /// The largest impulse of a substep.
@@ -247,7 +247,7 @@ stored! {
     Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
     Joint as JointRow { Vec3: r_a, r_b, gap; [is_loose] }
     Axis as AxisRow {
-        Vec3: direction; [is_linear, gap, range, speed, max_impulse, rate, mass_scale, impulse_scale, length]
+        Vec3: direction; [is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length]
     }
     Momentum as MomentumRow { [t, factor, square] restarts }
 }

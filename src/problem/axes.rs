@@ -10,7 +10,9 @@
 //! has that determinant to the third order in a and that period to the second order in w h: a spring without damper keeps its energy. A row
 //! holds 1 - s as the share of the speed that is taken away, s as the share of the impulse that is given back, and r (docs/derivation.md).
 
-use super::rows::AxisRow;
+use std::f32::consts::{PI, TAU};
+
+use super::rows::{AxisRow, NO_LIMIT};
 use super::softness::softness;
 use crate::world::{Axis, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear};
 
@@ -20,11 +22,7 @@ const STIFFEST: f32 = 0.5;
 
 /// The axes of a joint that may have rows, by their numbers: 0 to 2 to shift along, 3 to 5 to turn about.
 fn axes_of(joint: &Joint) -> impl Iterator<Item = (usize, &Axis)> {
-    let linear = match &joint.linear {
-        _ if joint.holds_anchors() => &[],
-        Linear::Axes(axes) => &axes[..],
-        Linear::Distance(distance) => std::slice::from_ref(distance),
-    };
+    let linear = if joint.holds_anchors() { &[] } else { joint.linear_axes() };
     linear.iter().enumerate().chain((3..).zip(&joint.angular))
 }
 
@@ -36,23 +34,42 @@ pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
 }
 
-/// Writes the rows of a joint for substeps of `substep` seconds.
-pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, rows: &mut Vec<AxisRow>) {
+/// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.
+fn nearest(angle: f32, to: f32) -> f32 {
+    match angle - to {
+        apart if apart > PI => angle - TAU,
+        apart if apart < -PI => angle + TAU,
+        _ => angle,
+    }
+}
+
+/// Writes the rows of a joint for substeps of `substep` seconds. `limit_rate` is the share of the way beyond a limit that an axis with a drive
+/// goes back (1/s).
+pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rate: f32, rows: &mut Vec<AxisRow>) {
     let is_distance = matches!(joint.linear, Linear::Distance(_));
     for (i, is_drive) in kinds(joint) {
-        let position = motion.position[i];
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        // An angle that passed pi goes on beyond: a turn less is no other place.
+        let middle = match (is_drive, axis.drive, axis.bounds) {
+            (true, Drive::Spring { target, .. }, _) => target,
+            (false, _, Bounds::Between { min, max }) => 0.5 * (min + max),
+            _ => 0.0,
+        };
+        let position = if i < 3 { motion.position[i] } else { nearest(motion.position[i], middle) };
         let row = AxisRow {
             direction: motion.direction[i].to_array(),
             is_linear: if i < 3 { 1.0 } else { 0.0 },
             length: if is_distance && i == 0 && position > LEAST_DISTANCE { position } else { 0.0 },
-            range: -1.0,
+            left: NO_LIMIT,
             max_impulse: f32::MAX,
             ..AxisRow::default()
         };
         rows.push(if is_drive {
             driven(row, axis.drive, position, substep)
         } else {
+            // A soft limit would give way to the load of a drive, which a rigid one takes back in the same sweep.
+            let is_pushed = axis.drive != Drive::None && axis.bounds != Bounds::Locked;
+            let row = if is_pushed { AxisRow { rate: limit_rate, mass_scale: 1.0, ..row } } else { row };
             bounded(row, axis.bounds, position)
         });
     }
@@ -60,7 +77,9 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, rows: &mu
 
 fn bounded(row: AxisRow, bounds: Bounds, position: f32) -> AxisRow {
     match bounds {
-        Bounds::Between { min, max } if min < max => AxisRow { gap: position - min, range: max - min, ..row },
+        Bounds::Between { min, max } if min < max => {
+            AxisRow { gap: (position - min).min(-NO_LIMIT), left: (max - position).min(-NO_LIMIT), ..row }
+        }
         Bounds::Between { min, .. } => AxisRow { gap: position - min, ..row },
         Bounds::Locked | Bounds::Free => AxisRow { gap: position, ..row },
     }
@@ -86,7 +105,7 @@ fn largest(max_load: f32, h: f32) -> f32 {
 
 /// The speed that a spring gives by gap in a substep, and the share of its impulse that it gives back.
 fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
-    let omega = std::f32::consts::TAU * frequency;
+    let omega = TAU * frequency;
     if omega * h > STIFFEST {
         let soft = softness(frequency, damping_ratio, h, 0.0);
         return [soft.bias_rate * soft.mass_scale, soft.impulse_scale];

@@ -96,7 +96,7 @@ pub(super) fn mass_row(body: &Body) -> MassRow {
 /// Writes poses and velocities into the world, but for bodies that are asleep. Impulses stay in their rows, where the next step
 /// finds them.
 pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
-    let bodies = world.bodies.par_iter_mut().with_min_len(LEAST_BODIES).zip(&problem.bodies);
+    let bodies = world.bodies.as_mut_slice().par_iter_mut().with_min_len(LEAST_BODIES).zip(&problem.bodies);
     bodies.enumerate().for_each(|(i, (body, row))| {
         if body.kind == BodyKind::Fixed || asleep.get(i) == Some(&true) {
             return;

@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::axes;
 use super::joint_loads::borne_masses;
 use super::lent_inertia::{LentInertia, lend_inertia};
-use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, TorqueRow};
+use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
@@ -83,7 +83,10 @@ impl JointRows {
             format!("{lengths:?}, {impulses} rows of {count} joints")
         })?;
         let is_body = |&body: &u32| body == IMMOVABLE || (body as usize) < bodies;
-        let has_bodies = |joint: &Joint| joint.body_a < bodies && joint.body_b.is_none_or(|body| body < bodies);
+        let has_bodies = |joint: &Joint| {
+            let (a, b) = joint.indices();
+            a < bodies && b.is_none_or(|b| b < bodies)
+        };
         let are_bodies = self.edges.iter().all(|edge| is_body(&edge.a) && is_body(&edge.b));
         ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint is of a body beyond the last".into())?;
         let Coloring { order, offsets, .. } = &self.coloring;
@@ -109,8 +112,8 @@ impl JointRows {
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
-            let bodies = self.joints.iter().flat_map(|joint| [Some(joint.body_a), joint.body_b]);
-            bodies.flatten().map(|body| world.gravity_on(body))
+            let ends = self.joints.iter().map(Joint::indices);
+            ends.flat_map(|(a, b)| [Some(a), b]).flatten().map(|body| world.gravity_on(body))
         };
         if is_chosen && self.gravity.iter().copied().eq(felt()) {
             return;
@@ -176,7 +179,7 @@ impl JointRows {
             if !bears(&self.joints[joint as usize]) {
                 return 0.0;
             }
-            let Joint { body_a, body_b, .. } = self.joints[joint as usize];
+            let (body_a, body_b) = self.joints[joint as usize].indices();
             let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
             let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
             let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
@@ -205,12 +208,13 @@ impl JointRows {
         let from =
             |(joint, handle): (&Joint, &JointHandle)| place_of.get(handle).copied().filter(|&i| same_bodies(joint, i));
         let from: Vec<Option<usize>> = now.iter().zip(now.handles()).map(from).collect();
-        let movable = |b: usize| if world.bodies[b].kind == BodyKind::Dynamic { b as u32 } else { IMMOVABLE };
-        let edge = |(joint, from): (&Joint, &Option<usize>)| Edge {
-            a: movable(joint.body_a),
-            b: joint.body_b.map_or(IMMOVABLE, movable),
-            color: from.and_then(|i| self.edges[i].color),
-            rank: 0,
+        let edge = |(joint, from): (&Joint, &Option<usize>)| {
+            let (a, b) = joint.indices();
+            // A joint that holds nothing ties nothing that could move.
+            let is_end = |b: usize| world.bodies[b].kind == BodyKind::Dynamic && !joint.holds_nothing();
+            let end = |b: usize| if is_end(b) { b as u32 } else { IMMOVABLE };
+            let color = from.and_then(|i| self.edges[i].color);
+            Edge { a: end(a), b: b.map_or(IMMOVABLE, end), color, rank: 0 }
         };
         let edges: Vec<Edge> = now.iter().zip(&from).map(edge).collect();
         self.is_colored &= edges == self.edges;
@@ -257,12 +261,10 @@ impl JointRows {
             _ if world.bodies[body].is_driven() => body as u32,
             _ => IMMOVABLE,
         };
-        awake.map(move |(i, joint)| Interface {
-            a: end(joint.body_a),
-            b: joint.body_b.map_or(IMMOVABLE, end),
-            need: self.needs.get(i).copied().unwrap_or(0.0),
-            is_joint: true,
-            row: i as u32,
+        awake.map(move |(i, joint)| {
+            let (a, b) = joint.indices();
+            let need = self.needs.get(i).copied().unwrap_or(0.0);
+            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
         })
     }
 
@@ -272,7 +274,15 @@ impl JointRows {
     }
 
     /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class 0 (s).
-    pub fn write(&mut self, world: &World, asleep: &[bool], effort: &Effort, substep: f32, problem: &mut StepProblem) {
+    pub fn write(
+        &mut self,
+        world: &World,
+        asleep: &[bool],
+        config: &SolverConfig,
+        effort: &Effort,
+        substep: f32,
+        problem: &mut StepProblem,
+    ) {
         problem.joints.clear();
         problem.axes.clear();
         problem.joint_totals.clear();
@@ -286,17 +296,19 @@ impl JointRows {
         let rows = world.joints.iter().zip(impulses).zip(&mut self.shares);
         let axes = &mut problem.axes;
         problem.joints.extend(rows.map(|((joint, impulse), share_before)| {
+            let (body_a, body_b) = joint.indices();
             let [anchor_a, mut anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
             let is_movable = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
-            let share = effort.share(joint.body_b.filter(|&b| is_movable(b)).unwrap_or(joint.body_a));
+            let share = effort.share(body_b.filter(|&b| is_movable(b)).unwrap_or(body_a));
             let before = std::mem::replace(share_before, share);
             if before != share && before > 0.0 {
                 impulse.linear = impulse.linear.map(|x| x * (share / before));
             }
             let first_axis = axes.len();
             if !joint.is_ball() {
-                axes::write(joint, &world.joint_motion(joint), substep * share, axes);
+                let limit_rate = Substep::new(config, substep * share).joint.bias_rate;
+                axes::write(joint, &world.joint_motion(joint), substep * share, limit_rate, axes);
                 if before != share && before > 0.0 {
                     for impulse in &mut axis_impulses[first_axis..axes.len()] {
                         impulse.linear[0] *= share / before;
@@ -311,10 +323,10 @@ impl JointRows {
                 is_loose: if is_loose { 1.0 } else { 0.0 },
                 first_axis: first_axis as u32,
                 axis_count: (axes.len() - first_axis) as u32,
-                r_a: arm(joint.body_a, anchor_a),
-                body_a: joint.body_a as u32,
-                r_b: joint.body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
-                body_b: joint.body_b.map_or(world_row, |b| b as u32),
+                r_a: arm(body_a, anchor_a),
+                body_a: body_a as u32,
+                r_b: body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
+                body_b: body_b.map_or(world_row, |b| b as u32),
                 gap: (anchor_b - anchor_a).to_array(),
                 ..JointRow::default()
             }
@@ -349,11 +361,11 @@ fn first_axes(joints: &[Joint]) -> impl Iterator<Item = usize> {
 }
 
 /// Whether a joint of the world is swept. A joint holds bodies of one island, which are asleep together; one of two bodies that nothing moves
-/// has no block to solve.
+/// has no block to solve, and one that holds nothing has no row.
 pub(super) fn takes_part(world: &World, asleep: &[bool], joint: u32) -> bool {
     let joint = &world.joints[joint as usize];
+    let (a, b) = joint.indices();
     let rests = |body: usize| asleep.get(body) == Some(&true);
     let moves = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
-    (moves(joint.body_a) || joint.body_b.is_some_and(moves))
-        && !(rests(joint.body_a) || joint.body_b.is_some_and(rests))
+    !joint.holds_nothing() && (moves(a) || b.is_some_and(moves)) && !(rests(a) || b.is_some_and(rests))
 }

@@ -1,6 +1,6 @@
 //! The rows of a [`StepProblem`](super::StepProblem): plain memory, the same in Rust and WGSL.
 //!
-//! Every row is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/shaders.rs` compares the
+//! Every row is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/cpu/shaders.rs` compares the
 //! offset of every field by reflection.
 
 use bytemuck::{Pod, Zeroable};
@@ -233,6 +233,9 @@ pub struct JointRow {
 /// Most rows of axes of one joint: each of its six axes may have bounds and a drive.
 pub const MOST_AXES: usize = 12;
 
+/// [`AxisRow::left`] of rows that are no limits; limits this far away, and infinite ones, are never reached (m, rad).
+pub const NO_LIMIT: f32 = -1e18;
+
 /// One axis of a joint along which or about which body a is held, limited or driven against body b, 48 B. Its impulse, on a, is the first
 /// number of a row of `joint_impulses`; those rows follow the rows of all joints.
 #[repr(C)]
@@ -245,15 +248,16 @@ pub struct AxisRow {
     pub is_linear: f32,
     /// Where a is when the step begins: above its lower limit, or beyond the place where it is to be (m, rad).
     pub gap: f32,
-    /// How far the upper limit is above the lower one (m, rad); -1 without limits.
-    pub range: f32,
+    /// How far a is below its upper limit when the step begins (m, rad); [`NO_LIMIT`] of a row that is no limit.
+    pub left: f32,
     /// The speed of its motor (m/s, rad/s).
     pub speed: f32,
     /// The largest impulse of a substep (N s, N m s).
     pub max_impulse: f32,
-    /// Of a spring, the speed that it gives in a substep by gap (1/s).
+    /// Of a spring, and of bounds of an axis with a drive, the speed that it gives in a substep by gap (1/s).
     pub rate: f32,
-    /// Of a drive, the share of the speed that it takes away in a substep: 1 of a motor; of bounds 0.
+    /// Of a drive, the share of the speed that it takes away in a substep: 1 of a motor, and of bounds of an axis with a drive; of other bounds
+    /// 0.
     pub mass_scale: f32,
     /// Of a spring, the share of its impulse that is given back; else 0.
     pub impulse_scale: f32,

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! and w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²): the law
-//! that `tests/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
+//! that `tests/gpu/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
 
 use super::rows::{Softness, Substep};
 use crate::config::{SolverConfig, Stabilization};

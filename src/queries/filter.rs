@@ -59,7 +59,7 @@ impl<'a> Filter<'a> {
         Self { world, ..self }
     }
 
-    /// Leaves out a body, for instance the one that asks.
+    /// Leaves out a body, for instance the one that asks. A body that is gone or of another world leaves out none.
     pub fn except(self, body: BodyHandle) -> Self {
         Self { except: Some(body), ..self }
     }
@@ -76,6 +76,8 @@ impl<'a> Filter<'a> {
 
     /// Whether the query looks at a body of its world.
     pub(super) fn accepts(&self, handle: BodyHandle, body: &Body) -> bool {
-        self.except != Some(handle) && self.groups.meets(body.groups) && self.only.is_none_or(|only| only(handle, body))
+        !self.except.is_some_and(|except| except.is(handle))
+            && self.groups.meets(body.groups)
+            && self.only.is_none_or(|only| only(handle, body))
     }
 }

@@ -103,9 +103,10 @@ impl Structure {
             Some(*end)
         }));
         let mut falls = vec![false; bodies];
-        for joint in &world.joints {
-            falls[joint.body_a] = true;
-            joint.body_b.iter().for_each(|&body| falls[body] = true);
+        for joint in world.joints.iter().filter(|joint| !joint.holds_nothing()) {
+            let (a, b) = joint.indices();
+            falls[a] = true;
+            b.into_iter().for_each(|b| falls[b] = true);
         }
         let forces = vec![[0.0; 3]; points_of[bearings.len()] as usize];
         let has_friction = !matches!(config.friction_rule(), FrictionRule::None | FrictionRule::Slip);

@@ -37,7 +37,7 @@ pub(crate) trait Archive: Sized {
     /// Writes or reads what `walk` does. What has the same bytes as before takes a byte or two.
     fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
 
-    /// Does what `walk` does for each of so many things. What follows on the same bytes, and has them too, takes none.
+    /// Walks `count` things. A thing with the same bytes as the one before takes no space.
     fn runs(&mut self, count: usize, walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()>;
 
     /// Writes so many things in columns, or reads them: [`CHUNK`] neighbors at a time, on all threads. Returns what `walk` makes of each chunk.

@@ -82,7 +82,7 @@ pub(super) fn encode(numbers: &[Coded], bytes: &mut Vec<u8>) {
     for (code, length, symbol) in codes_of(used.iter().map(|&(symbol, _)| symbol).zip(lengths)) {
         codes[symbol as usize] = code | length << 16 | bits_below(symbol) << 24;
     }
-    // A number takes 41 bits at most. Eight bytes are written for each, of which the next one leaves those that are full.
+    // A number takes 41 bits at most. Each writes eight bytes, and the next one overwrites those that are not full.
     let mut at = bytes.len();
     bytes.resize(at + 6 * numbers.len() + 8, 0);
     let (mut waiting, mut count) = (0_u64, 0);

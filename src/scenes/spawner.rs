@@ -2,8 +2,8 @@
 
 use crate::world::Body;
 
-/// Brings bodies that are alike: one every so many steps, at the same place with the same velocity. It waits while a body overlaps that place which the
-/// new one would push and which is not fixed.
+/// Brings bodies that are alike: one every so many steps, at the same place with the same velocity. It waits while that place holds a body
+/// that is not fixed and that the new one would push.
 ///
 /// ```
 /// use drystone::{Body, Scene, Shape, World, scenes::{Leaves, Spawner}};
@@ -26,7 +26,7 @@ pub struct Spawner {
     pub every: u32,
     /// How many come in all; none for no end.
     pub count: Option<u32>,
-    /// Which of the worlds beside each other they come into.
+    /// Which of the worlds beside each other they come into; none come where there is no such world.
     pub world: usize,
 }
 

@@ -91,9 +91,9 @@ impl Spawners {
         });
         for ((spawner, brought), due) in self.spawners.iter().zip(&mut self.brought).zip(&mut self.due) {
             if *due <= steps && !is_done(spawner, *brought) && is_free(spawner, world) {
+                let Ok(body) = world.insert_in(spawner.world, spawner.body.clone()) else { continue };
                 *brought += 1;
                 *due = steps.saturating_add(spawner.every.max(1));
-                let body = world.insert_in(spawner.world, spawner.body.clone());
                 if spawner.leaves != Leaves::default() {
                     self.staying.push(Staying { body, leaves: spawner.leaves, came: steps });
                 }

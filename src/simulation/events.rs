@@ -232,7 +232,7 @@ pub(super) struct Met {
 
 crate::saved::fields!(Met { hit, left });
 
-/// The share of the speed of a hit from which on the rest of it is waited for.
+/// A hit waits for the rest of its impulse while more than this share of its speed is left.
 const UNFINISHED: f32 = 0.01;
 
 /// The events of the last step, and what they follow from.

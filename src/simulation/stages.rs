@@ -1,5 +1,7 @@
 //! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
 
+use rayon::prelude::*;
+
 use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
@@ -12,7 +14,7 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{MassProperties, Material, World};
+use crate::world::{Body, MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
@@ -34,6 +36,8 @@ pub(super) struct Stages {
     /// Points of the contacts that take part, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
+    /// Bodies that the last step itself left out of range, ascending: they touch nothing, and do not stop the next step.
+    pub astray: Vec<usize>,
     /// Whether rows came from bytes that were loaded, whose hash anyone can make, and did not all take part in a step since.
     pub is_foreign: bool,
 }
@@ -53,6 +57,7 @@ crate::saved::cloned!(Stages {
     plan_key,
     points,
     bytes_moved,
+    astray,
     is_foreign,
 });
 
@@ -126,6 +131,7 @@ impl Stages {
             plan_key: None,
             points: 0,
             bytes_moved: 0,
+            astray: Vec::new(),
             is_foreign: false,
         }
     }
@@ -148,9 +154,11 @@ impl Stages {
             plan_key: _,
             points: _,
             bytes_moved: _,
+            astray,
             is_foreign,
         } = self;
         *is_foreign = A::READS;
+        astray.walk(archive)?;
         key.walk(archive)?;
         if A::READS {
             key.config.check()?;
@@ -178,7 +186,9 @@ impl Stages {
     /// # Errors
     /// A body, a joint or a mass is not fit to be simulated.
     pub fn changes(&self, world: &World, config: &SolverConfig, dt: f32) -> Result<Changes> {
-        let bodies = self.detector.changed_bodies(world);
+        let is_astray = |i: usize| self.astray.binary_search(&i).is_ok();
+        let fits = |i: usize, body: &Body| body.check_motion().is_ok() || is_astray(i);
+        let bodies = self.detector.changed_bodies(world, fits);
         bodies.iter().try_for_each(|&i| world.check_body(i))?;
         let is_new = |i: usize| bodies.binary_search(&i).is_ok();
         let mut known = world.bodies.iter().zip(&self.key.surfaces).enumerate();
@@ -220,8 +230,9 @@ impl Stages {
         }
         if changes.joints {
             for joint in self.joints.follow(world, &mut self.problem) {
-                self.sleep.disturb(joint.body_a);
-                joint.body_b.iter().for_each(|&b| self.sleep.disturb(b));
+                let (a, b) = joint.indices();
+                self.sleep.disturb(a);
+                b.into_iter().for_each(|b| self.sleep.disturb(b));
             }
             self.detector.follow_joints(world);
         }
@@ -270,7 +281,7 @@ impl Stages {
             let mut found = detector.detect(world, config, dt, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step already.
-            while sleep.wake_touched(detector) {
+            while sleep.wake_touched(world, detector) {
                 let before = found;
                 found = detector.detect(world, config, dt, sleep.activity());
                 contacts.follow(world, detector);
@@ -308,7 +319,7 @@ impl Stages {
             contacts.sums = events.listen.sums();
             contacts.write(world, detector, config, effort, dt, problem);
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
-            joints.write(world, sleep.asleep(), effort, dt / config.substeps as f32, problem);
+            joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
@@ -381,6 +392,7 @@ impl Stages {
         self.note_events(world, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         self.detector.note_left(world);
+        self.astray = bodies_astray(world);
         if self.detector.has_sensors() || !self.events.inside().is_empty() {
             let overlaps = self.detector.sense(world, self.sleep.activity());
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
@@ -388,6 +400,13 @@ impl Stages {
         self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);
     }
+}
+
+/// The bodies whose pose, velocity or loads are out of range, ascending.
+fn bodies_astray(world: &World) -> Vec<usize> {
+    let is_astray = |i: &usize| world.bodies[*i].check_motion().is_err();
+    let all = (0..world.bodies.len()).into_par_iter().with_min_len(1024);
+    if all.clone().any(|i| is_astray(&i)) { all.filter(is_astray).collect() } else { Vec::new() }
 }
 
 /// A collider, by the index of its body and its own among those of its body.

@@ -1,16 +1,27 @@
 //! The bodies of a world, which come and go.
 
-use std::ops::{Deref, DerefMut, Index, IndexMut};
+use std::fmt;
+use std::ops::{Deref, Index, IndexMut};
 use std::slice;
 
 use glam::{Quat, Vec3};
 
-use super::body::Body;
-use crate::error::Result;
+use super::body::{Body, BodyKind};
+use super::tag::WorldTag;
+use crate::error::{Result, ensure, input};
 use crate::saved::{Archive, Columns, Saved};
 
 /// Names one body for as long as the body is in its world. The handle of a body that was removed names nothing from then on: the next body
 /// at the same index has another handle.
+///
+/// A world refuses the handles of a world that was made apart from it ([`World::new`](super::World::new)). Clones, forks and snapshots of a
+/// world take each other's handles. A world that was loaded, or whose bodies were collected from an iterator, has no identity: it takes any
+/// handle, and any world takes the handles that it gives. Handles compare by index and generation alone, so that handles of two
+/// worlds may be equal.
+///
+/// An index becomes the handle of the *first* body at that index, which is the body that [`World::add`](super::World::add) counted
+/// where none was removed
+/// before.
 ///
 /// ```
 /// use drystone::{Body, BodyHandle, World};
@@ -23,15 +34,36 @@ use crate::saved::{Archive, Columns, Saved};
 /// let other = world.insert(Body::fixed());
 /// assert!(other.index() == 0 && other != handle);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyHandle {
     index: u32,
     generation: u32,
+    tag: WorldTag,
 }
 
-crate::saved::fields!(BodyHandle { index, generation });
+crate::saved::fields!(BodyHandle { index, generation } scratch { tag });
+
+/// Without its world, whose number is another one in each process.
+impl fmt::Debug for BodyHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { index, generation, tag: _ } = self;
+        f.debug_struct("BodyHandle").field("index", index).field("generation", generation).finish()
+    }
+}
+
+/// The first body at an index, of any world.
+impl From<usize> for BodyHandle {
+    fn from(index: usize) -> Self {
+        Self { index: u32::try_from(index).unwrap_or(u32::MAX), generation: 0, tag: WorldTag::default() }
+    }
+}
 
 impl BodyHandle {
+    /// Whether both name the same body of the same world, as far as that is known.
+    pub(crate) fn is(self, other: Self) -> bool {
+        self == other && self.tag.fits(other.tag)
+    }
+
     /// The index of the body in [`World::bodies`](super::World::bodies).
     pub fn index(self) -> usize {
         self.index as usize
@@ -41,7 +73,8 @@ impl BodyHandle {
 /// The bodies of a world, or of several beside each other: a slice in which a body keeps its index until the body is removed.
 ///
 /// A removed body leaves a vacancy, a fixed body without shapes, which the next body of the same world fills. Indices depend on the
-/// order of the calls alone.
+/// order of the calls alone. Bodies can be changed one by one, and not sorted or swapped as a slice: handles would then name other bodies.
+/// [`World::check`](super::World::check) and the next step refuse a body that was written to a vacancy.
 ///
 /// ```
 /// use drystone::{Body, World, world::Bodies};
@@ -55,6 +88,17 @@ impl BodyHandle {
 /// assert_eq!((bodies.handle(0), bodies.handle(1)), (None, Some(b)));
 /// assert!(bodies.handles().eq([b]));
 /// assert_eq!(bodies.worlds(), [0, 0]);
+///
+/// world.bodies.iter_mut().for_each(|body| body.material.friction = 0.2);
+/// world.bodies.get_mut(1).expect("b").material.friction = 0.8;
+/// assert_eq!([0, 1].map(|i| world.bodies[i].material.friction), [0.2, 0.8]);
+/// ```
+///
+/// ```compile_fail
+/// # use drystone::{Body, World};
+/// # let mut world = World::new();
+/// # [(); 2].map(|()| world.add(Body::fixed()));
+/// world.bodies.swap(0, 1);
 /// ```
 #[derive(Debug, Default)]
 pub struct Bodies {
@@ -65,9 +109,10 @@ pub struct Bodies {
     worlds: Vec<u32>,
     /// Vacant indices, world by world; the last of them is filled first.
     pub(super) vacant: Vec<Vec<u32>>,
+    tag: WorldTag,
 }
 
-crate::saved::cloned!(Bodies { all, generations, worlds, vacant });
+crate::saved::cloned!(Bodies { all, generations, worlds, vacant, tag });
 
 /// The columns of poses and velocities: where bodies are, two of rotations, whether they move, and how.
 const PLACE: usize = 0;
@@ -81,7 +126,7 @@ impl Saved for Bodies {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { all, generations, worlds, vacant } = self;
+        let Self { all, generations, worlds, vacant, tag: _ } = self;
         let count = archive.count(all.len())?;
         if A::READS {
             all.resize(count, Body::fixed());
@@ -148,6 +193,11 @@ impl Motion {
 }
 
 impl Bodies {
+    /// None yet, of a world with this tag.
+    pub(super) fn of_world(tag: WorldTag) -> Self {
+        Self { tag, ..Self::default() }
+    }
+
     /// Puts a body into one of the worlds, or into the world after the last.
     pub(super) fn insert(&mut self, world: usize, body: Body) -> BodyHandle {
         if self.vacant.len() <= world {
@@ -157,12 +207,12 @@ impl Bodies {
             self.all.push(body);
             self.generations.push(0);
             self.worlds.push(world as u32);
-            return BodyHandle { index: self.all.len() as u32 - 1, generation: 0 };
+            return BodyHandle { index: self.all.len() as u32 - 1, generation: 0, tag: self.tag };
         };
         let generation = &mut self.generations[index as usize];
         *generation = generation.wrapping_add(1);
         self.all[index as usize] = body;
-        BodyHandle { index, generation: *generation }
+        BodyHandle { index, generation: *generation, tag: self.tag }
     }
 
     /// Takes a body out; none if it is gone.
@@ -201,13 +251,60 @@ impl Bodies {
 
     /// Whether the body is there.
     pub fn contains(&self, handle: BodyHandle) -> bool {
-        self.generations.get(handle.index()) == Some(&handle.generation)
+        self.generations.get(handle.index()) == Some(&handle.generation) && handle.tag.fits(self.tag)
+    }
+
+    /// The handle here of a body of `other`, whose bodies were appended behind the first so many; of none where it names none there.
+    pub(super) fn appended(&self, body: BodyHandle, first: usize, other: &Self) -> BodyHandle {
+        let generation = if other.contains(body) { body.generation } else { u32::MAX };
+        BodyHandle { index: body.index.saturating_add(first as u32), generation, tag: self.tag }
+    }
+
+    /// Refuses a handle that names no body here.
+    pub(super) fn check_handle(&self, handle: BodyHandle) -> Result<()> {
+        let (index, count) = (handle.index(), self.all.len());
+        if self.contains(handle) && !self.is_vacant(index) {
+            return Ok(());
+        }
+        Err(match self.all.get(index) {
+            _ if !handle.tag.fits(self.tag) => input!("names body {index} of another world"),
+            None => input!("names body {index}, beyond the last of {count}"),
+            Some(_) if self.is_vacant(index) => input!("names body {index}, which is gone"),
+            Some(other) => input!(
+                "names body {index}, which is gone: {:?} has its index (an index names the first body there, a handle any)",
+                other.name
+            ),
+        })
+    }
+
+    /// Refuses a body where none is.
+    pub(super) fn check_place(&self, index: usize) -> Result<()> {
+        let body = &self.all[index];
+        let is_empty = body.kind == BodyKind::Fixed && body.colliders.is_empty();
+        ensure(is_empty || !self.is_vacant(index), || {
+            "written to an index that is vacant: World::insert puts a body there".into()
+        })
+    }
+
+    /// A body by its index, to be changed; none beyond the last.
+    pub fn get_mut(&mut self, index: usize) -> Option<&mut Body> {
+        self.all.get_mut(index)
+    }
+
+    /// All bodies and vacancies, to be changed.
+    pub fn iter_mut(&mut self) -> slice::IterMut<'_, Body> {
+        self.all.iter_mut()
+    }
+
+    /// The same, for several threads.
+    pub(crate) fn as_mut_slice(&mut self) -> &mut [Body] {
+        &mut self.all
     }
 
     /// The handle of the body at an index; none if there is none.
     pub fn handle(&self, index: usize) -> Option<BodyHandle> {
         let generation = self.generations.get(index).copied().filter(|generation| generation % 2 == 0)?;
-        Some(BodyHandle { index: index as u32, generation })
+        Some(BodyHandle { index: index as u32, generation, tag: self.tag })
     }
 
     /// The handles of all bodies, ascending by index.
@@ -237,7 +334,7 @@ impl Bodies {
 
     /// Whether all indices are there that name one.
     pub(crate) fn are_consistent(&self) -> bool {
-        let Self { all, generations, worlds, vacant } = self;
+        let Self { all, generations, worlds, vacant, tag: _ } = self;
         let is_vacant = |&i: &u32| generations.get(i as usize).is_some_and(|generation| generation % 2 == 1);
         let fits = |&world: &u32| (world as usize) < vacant.len();
         generations.len() == all.len()
@@ -259,12 +356,6 @@ impl Deref for Bodies {
     }
 }
 
-impl DerefMut for Bodies {
-    fn deref_mut(&mut self) -> &mut [Body] {
-        &mut self.all
-    }
-}
-
 impl<I: slice::SliceIndex<[Body]>> Index<I> for Bodies {
     type Output = I::Output;
     fn index(&self, index: I) -> &I::Output {
@@ -272,8 +363,8 @@ impl<I: slice::SliceIndex<[Body]>> Index<I> for Bodies {
     }
 }
 
-impl<I: slice::SliceIndex<[Body]>> IndexMut<I> for Bodies {
-    fn index_mut(&mut self, index: I) -> &mut I::Output {
+impl IndexMut<usize> for Bodies {
+    fn index_mut(&mut self, index: usize) -> &mut Body {
         &mut self.all[index]
     }
 }

@@ -3,10 +3,10 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::groups::Groups;
-use super::limits::{MOST_SPEED, check_place, check_rotation, is_within};
+use super::limits::{MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::Shape;
-use crate::error::{Result, ensure};
+use crate::error::{Result, ensure, input};
 use crate::math::rotation;
 use crate::saved::{Archive, Saved};
 
@@ -166,16 +166,17 @@ pub struct Body {
     pub torque: Vec3,
     /// The share of its world's gravity that the body feels: 1 unless set, 0 floats, -1 rises as fast as others fall. Of dynamic bodies.
     pub gravity_scale: f32,
-    /// Mass, center of mass and inertia; zero unless dynamic. A simulation raises moments of inertia that are less than a 32nd of the mass
-    /// times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
+    /// Mass, center of mass and inertia; zero unless dynamic. They do not follow [`Self::colliders`] or [`Self::kind`] where
+    /// those are changed later: [`Self::update_mass`] makes them anew. A simulation raises moments of inertia that are
+    /// less than a 32nd of the mass times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
     pub mass: MassProperties,
     /// Surface.
     pub material: Material,
     /// Which bodies it meets.
     pub groups: Groups,
-    /// Shapes on the body; several make a compound.
+    /// Shapes on the body; several make a compound. The mass does not follow a change of them: call [`Self::update_mass`].
     pub colliders: Vec<Collider>,
-    density: f32,
+    weight: Weight,
     /// Force and torque of the next step alone.
     pub(super) applied_force: Vec3,
     pub(super) applied_torque: Vec3,
@@ -195,10 +196,44 @@ crate::saved::cloned!(Body {
     material,
     groups,
     colliders,
-    density,
+    weight,
     applied_force,
     applied_torque,
 });
+
+/// What the mass of a body follows from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Weight {
+    /// The shapes at a density (kg/m³).
+    Density(f32),
+    /// The shapes at a total mass (kg).
+    Total(f32),
+    /// The caller, whatever the shapes are.
+    Given,
+}
+
+impl Saved for Weight {
+    fn blank() -> Self {
+        Self::Given
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let (mut kind, mut number) = match *self {
+            Self::Density(density) => (0_u8, density),
+            Self::Total(mass) => (1, mass),
+            Self::Given => (2, 0.0),
+        };
+        kind.walk(archive)?;
+        number.walk(archive)?;
+        *self = match kind {
+            0 => Self::Density(number),
+            1 => Self::Total(number),
+            2 => Self::Given,
+            other => return Err(input!("the mass of a body of kind {other}")),
+        };
+        Ok(())
+    }
+}
 
 impl Saved for Body {
     fn blank() -> Self {
@@ -231,7 +266,7 @@ impl Body {
             material,
             groups,
             colliders,
-            density,
+            weight,
             applied_force,
             applied_torque,
         } = self;
@@ -245,7 +280,7 @@ impl Body {
         material.walk(archive)?;
         groups.walk(archive)?;
         colliders.walk(archive)?;
-        density.walk(archive)
+        weight.walk(archive)
     }
 
     /// A body of this kind, without shapes.
@@ -264,7 +299,7 @@ impl Body {
             material: Material::default(),
             groups: Groups::ALL,
             colliders: Vec::new(),
-            density: 1000.0,
+            weight: Weight::Density(1000.0),
             applied_force: Vec3::ZERO,
             applied_torque: Vec3::ZERO,
         }
@@ -285,7 +320,15 @@ impl Body {
         Self::new(BodyKind::Dynamic)
     }
 
-    /// Adds a shape at the body's origin.
+    /// Adds a shape at the body's origin, and its mass. This and the following methods may be called in any order; of [`Self::density`],
+    /// [`Self::total_mass`] and [`Self::mass_properties`] the last one counts.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape};
+    ///
+    /// let ball = || Shape::ball(0.5);
+    /// assert_eq!(Body::dynamic().total_mass(2.0).shape(ball()).mass, Body::dynamic().shape(ball()).total_mass(2.0).mass);
+    /// ```
     pub fn shape(self, shape: Shape) -> Self {
         self.shape_at(shape, Vec3::ZERO, Quat::IDENTITY)
     }
@@ -336,19 +379,20 @@ impl Body {
         self.colliders.iter().filter(|c| !c.sensor)
     }
 
-    /// Mass from density (kg/m³).
-    pub fn density(mut self, density: f32) -> Self {
-        self.density = density;
-        self.update_mass();
-        self
+    /// Mass from density (kg/m³), above 0.
+    pub fn density(self, density: f32) -> Self {
+        self.weighing(Weight::Density(density))
     }
 
-    /// Total mass (kg); inertia of the shapes, scaled to it.
-    pub fn total_mass(mut self, mass: f32) -> Self {
-        self.density = 1.0;
+    /// Total mass (kg), within [`MassProperties::MASSES`]; inertia of the shapes, scaled to it.
+    pub fn total_mass(self, mass: f32) -> Self {
+        self.weighing(Weight::Total(mass))
+    }
+
+    fn weighing(mut self, weight: Weight) -> Self {
+        self.weight = weight;
         self.update_mass();
-        let density = mass / self.mass.mass;
-        self.density(density)
+        self
     }
 
     /// Mass, center and inertia as given, instead of those of the shapes.
@@ -363,7 +407,7 @@ impl Body {
     /// ```
     pub fn mass_properties(mut self, mass: MassProperties) -> Self {
         self.mass = mass;
-        self
+        self.weighing(Weight::Given)
     }
 
     /// Origin of the body's frame (m).
@@ -415,12 +459,48 @@ impl Body {
         self
     }
 
-    fn update_mass(&mut self) {
+    /// Makes mass, center and inertia anew from the shapes as they are now, by the density or the total mass that was given: for
+    /// a body whose [`colliders`](Self::colliders) or [`kind`](Self::kind) were changed. It does nothing where
+    /// [`Self::mass_properties`] gave them, and to bodies that are not dynamic.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape};
+    ///
+    /// let mut crate_ = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
+    /// crate_.colliders[0].shape = Shape::cuboid(0.5, 1.0, 0.5);
+    /// crate_.update_mass();
+    /// assert_eq!(crate_.mass.mass, 2000.0);
+    /// ```
+    pub fn update_mass(&mut self) {
         if self.kind != BodyKind::Dynamic {
             return;
         }
         let solids: Vec<&Collider> = self.solids().filter(|c| c.shape.has_volume()).collect();
-        self.mass = MassProperties::of_solids(&solids, self.density);
+        let at = |density: f32| MassProperties::of_solids(&solids, density);
+        self.mass = match self.weight {
+            Weight::Density(density) => at(density),
+            Weight::Total(mass) if !solids.is_empty() => at(mass / at(1.0).mass),
+            Weight::Total(_) => MassProperties::IMMOVABLE,
+            Weight::Given => return,
+        };
+    }
+
+    /// Refuses a mass that no dynamic body can have, by what it follows from.
+    fn check_mass(&self) -> Result<()> {
+        self.mass.check().map_err(|error| match self.weight {
+            Weight::Given => error,
+            _ if self.mass.mass == 0.0 && self.solids().next().is_none() => {
+                input!("mass = 0 kg: a dynamic body needs a shape that is no sensor, or mass_properties")
+            }
+            Weight::Density(density) if !(density > 0.0 && density.is_finite()) => {
+                input!("density = {density} kg/m³: must be a number above 0")
+            }
+            Weight::Total(mass) if !MassProperties::MASSES.contains(&mass) => {
+                input!("mass = {mass:e} kg, by total_mass: must be 1e-15 to 1e15")
+            }
+            _ if self.mass.mass == 0.0 => input!("{error}; Body::update_mass takes that of the shapes"),
+            _ => error,
+        })
     }
 
     /// Whether another body differs from this one in nothing but pose, velocity, forces and torques.
@@ -439,12 +519,12 @@ impl Body {
             material,
             groups,
             colliders: _,
-            density,
+            weight,
             applied_force: _,
             applied_torque: _,
         } = self;
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
-            && (material, groups, density) == (&other.material, &other.groups, &other.density)
+            && (material, groups, weight) == (&other.material, &other.groups, &other.weight)
             && self.has_same_colliders(other)
     }
 
@@ -561,7 +641,8 @@ impl Body {
         (self.applied_force, self.applied_torque) = (Vec3::ZERO, Vec3::ZERO);
     }
 
-    /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds.
+    /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds, more than 0. The next step refuses one
+    /// that is out of range.
     pub fn move_to(&mut self, position: Vec3, rotation: Quat, dt: f32) {
         let center = position + rotation * self.mass.center;
         self.linear_velocity = (center - self.center_of_mass()) / dt;
@@ -599,18 +680,30 @@ impl Body {
         self.check_surface()
     }
 
-    fn check_motion(&self) -> Result<()> {
+    /// Refuses a pose, a velocity, a force, a torque or a share of gravity out of range.
+    pub(crate) fn check_motion(&self) -> Result<()> {
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)?;
         for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
             let message = || format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size");
             ensure(is_within(v, MOST_SPEED), message)?;
         }
-        for (name, load) in [("force", self.whole_force()), ("torque", self.whole_torque())] {
-            ensure(load.is_finite(), || format!("{name} = {load}: must be finite"))?;
+        let loads = [self.whole_force(), self.whole_torque()];
+        let accelerations = if loads != [Vec3::ZERO; 2] && self.kind == BodyKind::Dynamic && self.mass.mass > 0.0 {
+            [loads[0] / self.mass.mass, self.mass.world_inverse_inertia(self.rotation) * loads[1]]
+        } else {
+            // Nothing where a load is a number.
+            loads.map(|load| 0.0 * load)
+        };
+        for ((name, load), acceleration) in ["force", "torque"].into_iter().zip(loads).zip(accelerations) {
+            let message =
+                || format!("{name} = {load}: must accelerate the body by at most {MOST_GRAVITY:e} along every axis");
+            ensure(is_within(acceleration, MOST_GRAVITY), message)?;
         }
         let scale = self.gravity_scale;
-        ensure(scale.is_finite(), || format!("gravity_scale = {scale}: must be finite"))
+        ensure(scale.abs() <= MOST_GRAVITY, || {
+            format!("gravity_scale = {scale}: must be at most {MOST_GRAVITY:e} in size")
+        })
     }
 
     fn check_shapes(&self) -> Result<()> {
@@ -631,7 +724,7 @@ impl Body {
         let is_friction = friction >= 0.0 && friction.is_finite();
         ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
         ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
-        if self.kind == BodyKind::Dynamic { self.mass.check() } else { self.mass.check_frame() }
+        if self.kind == BodyKind::Dynamic { self.check_mass() } else { self.mass.check_frame() }
     }
 
     /// Whether pose and velocity are finite.

@@ -2,6 +2,7 @@
 
 use glam::{Quat, Vec3};
 
+use super::bodies::BodyHandle;
 use super::joint_axis::{Axis, Bounds};
 use crate::error::Result;
 use crate::math::rotation;
@@ -13,8 +14,8 @@ use crate::saved::{Archive, Saved};
 /// [`fixed`](Self::fixed), [`rope`](Self::rope), [`rod`](Self::rod), [`elastic`](Self::elastic) or [`generic`](Self::generic). Limits, motors and
 /// springs then belong to the axes.
 ///
-/// Positions and speeds of a joint are those of body a as body b sees it, and so are targets of motors and springs. The axes of a joint turn
-/// with body b.
+/// Positions and speeds of a joint are those of body a in the frame of body b: a motor with a positive speed moves a forward along the axis.
+/// With the bodies swapped, limits and targets change their signs. The axes of a joint turn with body b.
 ///
 /// ```
 /// use drystone::{Body, Joint, Shape, World};
@@ -51,10 +52,10 @@ use crate::saved::{Archive, Saved};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    /// Index of one body.
-    pub body_a: usize,
-    /// Index of the other; none for the world.
-    pub body_b: Option<usize>,
+    /// One body.
+    pub body_a: BodyHandle,
+    /// The other; none for the world.
+    pub body_b: Option<BodyHandle>,
     /// The point in a's frame (m).
     pub anchor_a: Vec3,
     /// The point in b's frame, or in the world (m).
@@ -65,7 +66,8 @@ pub struct Joint {
     pub frame_b: Quat,
     /// Where the anchor of a may be.
     pub linear: Linear,
-    /// How a may turn: about the first axis, then the other two.
+    /// How a may turn. The first angle is the twist about the first axis, from -pi to pi. The other two are the components, along the
+    /// second and third axis, of the rotation vector that takes the first axis of b to that of a.
     pub angular: [Axis; 3],
     /// Whether the two bodies still collide with each other.
     pub collide: bool,
@@ -124,16 +126,23 @@ crate::saved::fields!(Joint {
     break_force,
 });
 
+/// The frames of a joint whose axis was given no direction.
+pub(super) const NO_FRAME: Quat = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+
+/// The bounds of a fixed joint that was given limits, a motor or a spring.
+pub(super) const NOWHERE: Bounds = Bounds::Between { min: f32::INFINITY, max: f32::NEG_INFINITY };
+
 impl Joint {
-    /// Ties two bodies together by a ball joint. They then do not collide.
-    pub fn new(body_a: usize, anchor_a: Vec3, body_b: usize, anchor_b: Vec3) -> Self {
-        Self { body_b: Some(body_b), ..Self::to_world(body_a, anchor_a, anchor_b) }
+    /// Ties two bodies together by a ball joint. They then do not collide. An index names the first body that was put there: give a handle
+    /// where bodies are removed.
+    pub fn new(body_a: impl Into<BodyHandle>, anchor_a: Vec3, body_b: impl Into<BodyHandle>, anchor_b: Vec3) -> Self {
+        Self { body_b: Some(body_b.into()), ..Self::to_world(body_a, anchor_a, anchor_b) }
     }
 
     /// Ties a body to a point of the world by a ball joint.
-    pub fn to_world(body_a: usize, anchor_a: Vec3, point: Vec3) -> Self {
+    pub fn to_world(body_a: impl Into<BodyHandle>, anchor_a: Vec3, point: Vec3) -> Self {
         Self {
-            body_a,
+            body_a: body_a.into(),
             body_b: None,
             anchor_a,
             anchor_b: point,
@@ -146,7 +155,8 @@ impl Joint {
         }
     }
 
-    /// Body a may only turn, about an axis that has this direction in the frames of both bodies. The direction need not have unit length.
+    /// Body a may only turn, about an axis that has this direction in the frames of both bodies. The direction need not have unit length, but
+    /// [`World::check`](crate::World::check) refuses one without length.
     pub fn hinge(self, direction: Vec3) -> Self {
         self.along(direction).generic([Axis::LOCKED; 3], [Axis::FREE, Axis::LOCKED, Axis::LOCKED])
     }
@@ -181,18 +191,20 @@ impl Joint {
         Self { linear: Linear::Distance(distance), angular: [Axis::FREE; 3], ..self }
     }
 
-    /// Any axes: three to shift along, three to turn about.
+    /// Any axes: three to shift along, three to turn about. With all six of them free the joint holds nothing, and only keeps its two bodies
+    /// from colliding.
     pub fn generic(self, linear: [Axis; 3], angular: [Axis; 3]) -> Self {
         Self { linear: Linear::Axes(linear), angular, ..self }
     }
 
-    /// Lets the first axis of the joint have this direction in the frames of both bodies.
+    /// Sets the direction of the first axis, the same in the frames of both bodies. [`World::check`](crate::World::check) refuses a direction
+    /// without length.
     pub fn along(self, direction: Vec3) -> Self {
-        let frame = rotation::arc(Vec3::X, direction.normalize_or(Vec3::X));
+        let frame = direction.try_normalize().map_or(NO_FRAME, |direction| rotation::arc(Vec3::X, direction));
         Self { frame_a: frame, frame_b: frame, ..self }
     }
 
-    /// Lets all angles be zero where the bodies have these rotations; that of b is the identity for the world.
+    /// Sets the rotations of the two bodies at which all angles are zero. For the world, give the identity as that of b.
     pub fn zero_at(self, rotation_a: Quat, rotation_b: Quat) -> Self {
         Self {
             frame_a: rotation::unit(rotation::product(
@@ -203,13 +215,14 @@ impl Joint {
         }
     }
 
-    /// Limits the first axis that is not locked, or the distance.
+    /// Limits the first axis that is not locked, or the distance: see [`Bounds::Between`]. Of a ball joint that is the angle about its first
+    /// axis. [`World::check`](crate::World::check) refuses limits, a motor or a spring on a fixed joint.
     pub fn limited(mut self, min: f32, max: f32) -> Self {
         self.on_first(|axis| Axis { bounds: Bounds::Between { min, max }, ..axis });
         self
     }
 
-    /// Gives a motor to the first axis that is not locked, or to the distance: see [`Axis::motor`].
+    /// Gives a motor to the first axis that is not locked, or to the distance: see [`Axis::motor`]. The motor pushes no axis beyond its limits.
     pub fn motor(mut self, speed: f32, max_load: f32) -> Self {
         self.on_first(|axis| axis.motor(speed, max_load));
         self
@@ -230,10 +243,25 @@ impl Joint {
         linear.iter_mut().chain(&mut self.angular).find(|axis| axis.bounds != Bounds::Locked)
     }
 
+    /// Changes the first axis. A fixed joint has none, and gets bounds that nothing can keep, for [`Self::check_axes`] to refuse.
     fn on_first(&mut self, change: impl Fn(Axis) -> Axis) {
-        if let Some(axis) = self.first_axis() {
-            *axis = change(*axis);
+        match self.first_axis() {
+            Some(axis) => *axis = change(*axis),
+            None => self.angular[0].bounds = NOWHERE,
         }
+    }
+
+    /// The axes to shift along, or the distance alone.
+    pub(crate) fn linear_axes(&self) -> &[Axis] {
+        match &self.linear {
+            Linear::Axes(axes) => axes,
+            Linear::Distance(distance) => std::slice::from_ref(distance),
+        }
+    }
+
+    /// Whether it leaves every movement to its bodies, and only keeps them from colliding.
+    pub(crate) fn holds_nothing(&self) -> bool {
+        self.linear_axes().iter().chain(&self.angular).all(|axis| *axis == Axis::FREE)
     }
 
     /// Whether the anchors coincide.
@@ -247,8 +275,14 @@ impl Joint {
     }
 
     /// Whether this is one of its bodies.
-    pub fn holds(&self, body: usize) -> bool {
-        self.body_a == body || self.body_b == Some(body)
+    pub fn holds(&self, body: impl Into<BodyHandle>) -> bool {
+        let body = body.into();
+        self.body_a.is(body) || self.body_b.is_some_and(|b| b.is(body))
+    }
+
+    /// The indices of its bodies.
+    pub(crate) fn indices(&self) -> (usize, Option<usize>) {
+        (self.body_a.index(), self.body_b.map(BodyHandle::index))
     }
 
     /// Lets the joint break at a force (N): see [`Self::break_force`].

@@ -37,9 +37,9 @@ pub enum Bounds {
     Locked,
     /// Between two places, which may be the same. Angles are -pi to pi: a joint does not count turns.
     Between {
-        /// The least.
+        /// The least (m, rad); for a place or a distance it may be -infinity, without a lower limit.
         min: f32,
-        /// The most.
+        /// The most (m, rad); for a place or a distance it may be infinity, without an upper limit.
         max: f32,
     },
 }
@@ -69,7 +69,8 @@ pub enum Drive {
     Spring {
         /// Where it is at rest (m, rad).
         target: f32,
-        /// How often a second the bodies would swing about the target without damper and without anything else that holds them (Hz).
+        /// How often a second the bodies would swing about the target without damper, turning about their centers of mass and shifting
+        /// freely (Hz). A hinge away from a center has more inertia to turn and swings slower.
         frequency: f32,
         /// 0 without damping, 1 where it no longer swings.
         damping_ratio: f32,
@@ -84,17 +85,17 @@ impl Axis {
     /// Held at zero.
     pub const LOCKED: Self = Self { bounds: Bounds::Locked, drive: Drive::None };
 
-    /// Free between two places.
+    /// Free between two places: see [`Bounds::Between`].
     pub const fn limited(min: f32, max: f32) -> Self {
         Self { bounds: Bounds::Between { min, max }, drive: Drive::None }
     }
 
-    /// Driven at `speed` (m/s, rad/s) by up to `max_load` (N, N m). With a speed of 0 it is dry friction.
+    /// Driven at `speed` (m/s, rad/s) by up to `max_load` (N, N m). With a speed of 0 it is dry friction. Limits of the axis hold against any load.
     pub const fn motor(self, speed: f32, max_load: f32) -> Self {
         Self { drive: Drive::Motor { speed, max_load }, ..self }
     }
 
-    /// Pulled to `target` (m, rad) by a spring and damper with up to `max_load` (N, N m).
+    /// Pulled to `target` (m, rad) by a spring and damper with up to `max_load` (N, N m). An angle is pulled the shorter way around.
     pub const fn spring(self, target: f32, frequency: f32, damping_ratio: f32, max_load: f32) -> Self {
         Self { drive: Drive::Spring { target, frequency, damping_ratio, max_load }, ..self }
     }

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::{Quat, Vec3};
 
 use super::World;
-use super::joint::{Joint, Linear};
+use super::joint::{Joint, Linear, NO_FRAME, NOWHERE};
 use super::joint_axis::{Axis, Bounds, Drive};
 use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
 use crate::error::{Result, ensure};
@@ -41,7 +41,7 @@ pub struct JointMotion {
 pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
 
 impl World {
-    /// Where the axes of a joint stand, and how fast they move.
+    /// Where the axes of a joint stand, and how fast they move; NaN where a body of the joint is gone.
     ///
     /// ```
     /// # use drystone::{Body, Joint, Shape, World, glam::Vec3};
@@ -52,8 +52,11 @@ impl World {
     /// ```
     pub fn joint_motion(&self, joint: &Joint) -> JointMotion {
         let [anchor_a, anchor_b] = self.anchors(joint);
-        let a = &self.bodies[joint.body_a];
-        let b = joint.body_b.map(|b| &self.bodies[b]);
+        let b = joint.body_b.map(|b| self.body(b));
+        let (Some(a), Some(b)) = (self.body(joint.body_a), b.map_or(Some(None), |b| b.map(Some))) else {
+            let (none, nowhere) = ([f32::NAN; 6], [Vec3::NAN; 6]);
+            return JointMotion { position: none, speed: none, direction: nowhere, anchor_gap: f32::NAN };
+        };
         let offset = anchor_a - anchor_b;
         let frame_b = product(b.map_or(Quat::IDENTITY, |b| b.rotation), joint.frame_b);
         let relative = unit(product(frame_b.inverse(), product(a.rotation, joint.frame_a)));
@@ -98,11 +101,7 @@ impl JointMotion {
             Bounds::Locked => *position,
             Bounds::Between { min, max } => position - position.max(min).min(max),
         };
-        let axes = match &joint.linear {
-            Linear::Axes(axes) => &axes[..],
-            Linear::Distance(distance) => std::slice::from_ref(distance),
-        };
-        axes.iter().zip(&self.position).map(outside).map(|x| x * x).sum::<f32>().sqrt()
+        joint.linear_axes().iter().zip(&self.position).map(outside).map(|x| x * x).sum::<f32>().sqrt()
     }
 }
 
@@ -121,8 +120,15 @@ fn angles(q: Quat) -> [f32; 3] {
 impl Joint {
     /// Refuses frames that are no rotations, and limits and drives out of range.
     pub(crate) fn check_axes(&self) -> Result<()> {
+        let message =
+            || "its axis has no direction: hinge, slider and along take a vector with a finite length above 0".into();
+        ensure(self.frame_b != NO_FRAME, message)?;
         check_rotation("frame_a", self.frame_a)?;
         check_rotation("frame_b", self.frame_b)?;
+        let message = || {
+            "all of its axes are locked: limits, motors and springs need a free one, as hinge, slider, rope or generic give".into()
+        };
+        ensure(self.angular[0].bounds != NOWHERE, message)?;
         match &self.linear {
             Linear::Axes(axes) => axes.iter().try_for_each(|axis| axis.check("linear", -MOST_LENGTH, MOST_LENGTH))?,
             Linear::Distance(distance) => {
@@ -138,9 +144,21 @@ impl Joint {
 impl Axis {
     fn check(&self, name: &str, least: f32, most: f32) -> Result<()> {
         if let Bounds::Between { min, max } = self.bounds {
-            let is_range = least <= min && min <= max && max <= most;
+            let [is_angle, ascend] = [most == PI, min <= max];
+            let message = || {
+                format!(
+                    "{name}: limits {min} and {max}: must be within -pi and pi, as a joint counts no turns: leave the axis free, count turns and \
+                     stop it by motor(0.0, max_load)"
+                )
+            };
+            ensure(!(is_angle && ascend) || least <= min && max <= most, message)?;
+            let is_bound = |bound: f32, none: f32| (least..=most).contains(&bound) || !is_angle && bound == none;
+            let is_range = ascend && is_bound(min, f32::NEG_INFINITY) && is_bound(max, f32::INFINITY);
             ensure(is_range, || format!("{name}: limits {min} and {max}: must ascend, within {least} and {most}"))?;
         }
+        let message =
+            || format!("{name}: a locked axis has a motor or a spring, which cannot move it: free or limit the axis");
+        ensure(self.bounds != Bounds::Locked || self.drive == Drive::None, message)?;
         let max_load = match self.drive {
             Drive::None => return Ok(()),
             Drive::Motor { speed, max_load } => {

@@ -1,11 +1,13 @@
 //! The joints of a world, which come and go.
 
-use std::ops::{Deref, DerefMut};
+use std::fmt;
+use std::ops::{Deref, Index, IndexMut};
 use std::slice;
 
 use super::joint::Joint;
+use super::tag::WorldTag;
 
-/// Names one joint for as long as the joint is in its world.
+/// Names one joint for as long as the joint is in its world. Another world refuses it as it does a [`BodyHandle`](super::BodyHandle).
 ///
 /// ```
 /// use drystone::{Body, Joint, JointHandle, World, glam::Vec3};
@@ -17,16 +19,26 @@ use super::joint::Joint;
 /// world.remove_joint(handle);
 /// assert!(world.joint(handle).is_none());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JointHandle {
     number: u32,
     generation: u32,
+    tag: WorldTag,
 }
 
-crate::saved::fields!(JointHandle { number, generation });
+/// Without its world, as that of a [`BodyHandle`](super::BodyHandle).
+impl fmt::Debug for JointHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { number, generation, tag: _ } = self;
+        f.debug_struct("JointHandle").field("number", number).field("generation", generation).finish()
+    }
+}
+
+crate::saved::fields!(JointHandle { number, generation } scratch { tag });
 
 /// The joints of a world: a slice in the order in which they were inserted. The index of a joint falls by one with each joint before it that
-/// is removed; its handle stays.
+/// is removed; its handle stays. Joints can be changed one by one, and not sorted or swapped as a slice: handles would then name
+/// other joints.
 ///
 /// ```
 /// use drystone::{Body, Joint, World, glam::Vec3, world::Joints};
@@ -38,6 +50,7 @@ crate::saved::fields!(JointHandle { number, generation });
 /// assert_eq!(joints.handles(), [a, b]);
 /// joints.retain(|joint| joint.anchor_b.y > 1.5);
 /// assert_eq!((joints.index(a), joints.index(b)), (None, Some(0)));
+/// joints.iter_mut().for_each(|joint| joint.break_force = 50.0);
 /// joints.clear();
 /// assert!(joints.is_empty());
 /// ```
@@ -50,11 +63,18 @@ pub struct Joints {
     numbers: Vec<(u32, Option<u32>)>,
     /// Numbers without a joint; the last is given first.
     free: Vec<u32>,
+    tag: WorldTag,
 }
 
-crate::saved::state!(Joints { all, handles, numbers, free });
+crate::saved::fields!(Joints { all, handles, numbers, free } scratch { tag });
+crate::saved::cloned!(Joints { all, handles, numbers, free, tag });
 
 impl Joints {
+    /// None yet, of a world with this tag.
+    pub(super) fn of_world(tag: WorldTag) -> Self {
+        Self { tag, ..Self::default() }
+    }
+
     /// Adds a joint behind the others.
     pub(super) fn insert(&mut self, joint: Joint) -> JointHandle {
         let number = self.free.pop().unwrap_or_else(|| {
@@ -63,7 +83,7 @@ impl Joints {
         });
         let (generation, index) = &mut self.numbers[number as usize];
         *index = Some(self.all.len() as u32);
-        let handle = JointHandle { number, generation: *generation };
+        let handle = JointHandle { number, generation: *generation, tag: self.tag };
         self.all.push(joint);
         self.handles.push(handle);
         handle
@@ -80,7 +100,7 @@ impl Joints {
 
     /// Whether every joint has its number.
     pub(crate) fn are_consistent(&self) -> bool {
-        let Self { all, handles, numbers, free } = self;
+        let Self { all, handles, numbers, free, tag: _ } = self;
         let is_free = |&number: &u32| numbers.get(number as usize).is_some_and(|number| number.1.is_none());
         handles.len() == all.len()
             && handles.iter().enumerate().all(|(i, &handle)| self.index(handle) == Some(i))
@@ -115,7 +135,12 @@ impl Joints {
     /// The index of a joint; none if it is gone.
     pub fn index(&self, handle: JointHandle) -> Option<usize> {
         let &(generation, index) = self.numbers.get(handle.number as usize)?;
-        index.filter(|_| generation == handle.generation).map(|index| index as usize)
+        index.filter(|_| generation == handle.generation && handle.tag.fits(self.tag)).map(|index| index as usize)
+    }
+
+    /// All joints, to be changed.
+    pub fn iter_mut(&mut self) -> slice::IterMut<'_, Joint> {
+        self.all.iter_mut()
     }
 
     /// The handle of each joint.
@@ -131,9 +156,16 @@ impl Deref for Joints {
     }
 }
 
-impl DerefMut for Joints {
-    fn deref_mut(&mut self) -> &mut [Joint] {
-        &mut self.all
+impl<I: slice::SliceIndex<[Joint]>> Index<I> for Joints {
+    type Output = I::Output;
+    fn index(&self, index: I) -> &I::Output {
+        &self.all[index]
+    }
+}
+
+impl IndexMut<usize> for Joints {
+    fn index_mut(&mut self, index: usize) -> &mut Joint {
+        &mut self.all[index]
     }
 }
 
@@ -142,5 +174,13 @@ impl<'a> IntoIterator for &'a Joints {
     type IntoIter = slice::Iter<'a, Joint>;
     fn into_iter(self) -> Self::IntoIter {
         self.all.iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a mut Joints {
+    type Item = &'a mut Joint;
+    type IntoIter = slice::IterMut<'a, Joint>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.all.iter_mut()
     }
 }

@@ -7,9 +7,9 @@ use crate::math::rotation::squared_length;
 
 /// Largest coordinate and size (m): its cube is still a number in single precision.
 pub const MOST_LENGTH: f32 = 1e9;
-/// Largest speed at the start (m/s), (rad/s).
+/// Largest speed that a caller gives (m/s), (rad/s).
 pub const MOST_SPEED: f32 = 1e9;
-/// Largest acceleration of gravity along an axis (m/s²).
+/// Largest acceleration along an axis, of gravity (m/s²) and by the force (m/s²) and the torque (rad/s²) on a body.
 pub const MOST_GRAVITY: f32 = 1e9;
 
 /// Whether every coordinate of a point is a number of at most [`MOST_LENGTH`].

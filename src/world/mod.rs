@@ -14,6 +14,7 @@ mod mass;
 mod shape;
 mod shape_parts;
 mod surface;
+mod tag;
 
 pub use bodies::{Bodies, BodyHandle};
 pub use body::{Body, BodyKind, Collider, Material};
@@ -34,6 +35,7 @@ use glam::Vec3;
 
 use crate::error::{Result, ensure};
 use limits::{is_place, is_within};
+use tag::WorldTag;
 
 /// A set of rigid bodies.
 ///
@@ -72,7 +74,7 @@ use limits::{is_place, is_within};
 ///
 /// // A second world beside the first, whose bodies never meet those of the first.
 /// world.beside(&World::new());
-/// let other = world.insert_in(1, Body::fixed());
+/// let other = world.insert_in(1, Body::fixed())?;
 /// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other.index()]));
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -99,8 +101,8 @@ impl Default for World {
 impl World {
     /// An empty world with gravity 9.81 m/s² along -Y.
     pub fn new() -> Self {
-        let gravity = Vec3::new(0.0, -9.81, 0.0);
-        Self { gravity, own_gravity: Vec::new(), bodies: Bodies::default(), joints: Joints::default() }
+        let (gravity, tag) = (Vec3::new(0.0, -9.81, 0.0), WorldTag::next());
+        Self { gravity, own_gravity: Vec::new(), bodies: Bodies::of_world(tag), joints: Joints::of_world(tag) }
     }
 
     /// Gravity in one of the worlds beside each other (m/s²).
@@ -110,15 +112,16 @@ impl World {
 
     /// Acceleration of a body by gravity (m/s²): that of its world times its [`Body::gravity_scale`], and zero unless it is dynamic.
     pub fn gravity_on(&self, body: usize) -> Vec3 {
-        let Body { kind, gravity_scale, .. } = self.bodies[body];
-        if kind == BodyKind::Dynamic {
-            self.gravity_of(self.bodies.worlds()[body] as usize) * gravity_scale
-        } else {
-            Vec3::ZERO
+        match self.bodies.get(body) {
+            Some(&Body { kind: BodyKind::Dynamic, gravity_scale, .. }) => {
+                self.gravity_of(self.bodies.worlds()[body] as usize) * gravity_scale
+            }
+            _ => Vec3::ZERO,
         }
     }
 
-    /// Adds a body to the last world and returns its index, as [`World::insert`] does its handle.
+    /// Adds a body to the last world and returns its index, as [`World::insert`] does its handle. Where bodies are removed, an
+    /// index does not tell a body from the next one in its place.
     pub fn add(&mut self, body: Body) -> usize {
         self.insert(body).index()
     }
@@ -130,20 +133,19 @@ impl World {
 
     /// Adds a body to one of the worlds that stand [beside](World::beside) each other.
     ///
-    /// # Panics
+    /// # Errors
     /// There is no world of this number.
-    pub fn insert_in(&mut self, world: usize, body: Body) -> BodyHandle {
+    pub fn insert_in(&mut self, world: usize, body: Body) -> Result<BodyHandle> {
         let worlds = self.world_count();
-        assert!(world < worlds, "world {world} is none of {worlds}");
-        self.bodies.insert(world, body)
+        ensure(world < worlds, || format!("world {world}: the worlds beside each other are 0 to {}", worlds - 1))?;
+        Ok(self.bodies.insert(world, body))
     }
 
     /// Takes a body out, with all joints that hold it; none if it is gone already.
     pub fn remove(&mut self, body: BodyHandle) -> Option<Body> {
         let removed = self.bodies.remove(body)?;
-        let index = body.index();
-        if self.joints.iter().any(|joint| joint.holds(index)) {
-            self.joints.retain(|joint| !joint.holds(index));
+        if self.joints.iter().any(|joint| joint.holds(body)) {
+            self.joints.retain(|joint| !joint.holds(body));
         }
         Some(removed)
     }
@@ -159,25 +161,25 @@ impl World {
     }
 
     /// Adds a joint and returns its index, as [`World::insert_joint`] does its handle.
-    ///
-    /// # Panics
-    /// The joint names a body that the world does not have.
     pub fn join(&mut self, joint: Joint) -> usize {
         self.insert_joint(joint);
         self.joints.len() - 1
     }
 
-    /// Adds a joint.
+    /// Adds a joint. [`World::check`] and the next step refuse one that cannot be simulated: of a body that is gone, for instance.
     ///
-    /// # Panics
-    /// The joint names a body that the world does not have.
+    /// ```
+    /// use drystone::{Body, Joint, Shape, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let [a, b] = [0.0, 2.0].map(|x| world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0)));
+    /// world.remove(a);
+    /// let rope = world.insert_joint(Joint::new(b, Vec3::ZERO, a, Vec3::ZERO).rope(3.0));
+    /// assert_eq!(world.check().expect_err("a is gone").to_string(), "joint 0: names body 0, which is gone");
+    /// world.remove_joint(rope);
+    /// assert!(world.check().is_ok());
+    /// ```
     pub fn insert_joint(&mut self, joint: Joint) -> JointHandle {
-        let is_there = |body: usize| !self.bodies.is_vacant(body);
-        let bodies = self.bodies.len();
-        assert!(
-            is_there(joint.body_a) && joint.body_b.is_none_or(is_there),
-            "a joint names a body that is gone, or beyond the last of {bodies}"
-        );
         self.joints.insert(joint)
     }
 
@@ -216,7 +218,8 @@ impl World {
         }
         self.bodies.append(&other.bodies);
         for joint in &other.joints {
-            let (body_a, body_b) = (first + joint.body_a, joint.body_b.map(|b| first + b));
+            let place = |body: BodyHandle| self.bodies.appended(body, first, &other.bodies);
+            let (body_a, body_b) = (place(joint.body_a), joint.body_b.map(place));
             self.joints.insert(Joint { body_a, body_b, ..*joint });
         }
     }
@@ -234,9 +237,10 @@ impl World {
         worlds
     }
 
-    /// Where the two anchors of a joint are in the world (m).
+    /// Where the two anchors of a joint are in the world (m); NaN on a body that is gone.
     pub fn anchors(&self, joint: &Joint) -> [Vec3; 2] {
-        let on_body = |b: usize, anchor: Vec3| self.bodies[b].position + self.bodies[b].rotation * anchor;
+        let on_body =
+            |b: BodyHandle, anchor: Vec3| self.body(b).map_or(Vec3::NAN, |b| b.position + b.rotation * anchor);
         let on_a = on_body(joint.body_a, joint.anchor_a);
         [on_a, joint.body_b.map_or(joint.anchor_b, |b| on_body(b, joint.anchor_b))]
     }
@@ -248,14 +252,22 @@ impl World {
 
     /// Refuses a world that cannot be simulated: numbers that are not finite or out of range, shapes without extent, dynamic bodies
     /// without mass or with a mass out of [`MassProperties::MASSES`], moving bodies with shapes that only fixed bodies can have,
-    /// joints to bodies that do not exist.
+    /// joints to bodies that do not exist, joints that tie a fixed body to another one or to the world, joints whose axis has no direction,
+    /// and limits, motors and springs where every axis is locked. A body may become fixed later, with all of its joints.
     ///
     /// # Errors
     /// One line that names the body and its shape, or the joint.
     pub fn check(&self) -> Result<()> {
         self.check_gravity()?;
-        self.check_bodies(Body::check)?;
-        self.check_joints()
+        (0..self.bodies.len()).try_for_each(|i| self.check_body(i))?;
+        self.check_joints()?;
+        self.joints.iter().enumerate().try_for_each(|(i, joint)| {
+            let (a, b) = joint.indices();
+            let is_fixed = |body: usize| self.bodies[body].kind == BodyKind::Fixed;
+            let ties_something = !is_fixed(a) || b.is_some_and(|b| !is_fixed(b));
+            let other = || b.map_or_else(|| "the world".into(), |b| self.name_of(b));
+            ensure(ties_something, || format!("joint {i}: ties {} to {}, and both are fixed", self.name_of(a), other()))
+        })
     }
 
     /// Raises the moments of inertia that no sweep can work with: [`MassProperties::MOST_LEVERAGE`].
@@ -273,12 +285,13 @@ impl World {
 
     /// Refuses masses and materials that cannot be simulated.
     pub(crate) fn check_surfaces(&self) -> Result<()> {
-        self.check_bodies(Body::check_surface)
+        self.bodies.iter().enumerate().try_for_each(|(i, body)| check_one(i, body, Body::check_surface))
     }
 
     /// Refuses a body that cannot be simulated, by its index.
     pub(crate) fn check_body(&self, i: usize) -> Result<()> {
-        self.bodies.get(i).map_or(Ok(()), |body| check_one(i, body, Body::check))
+        let check = |body: &Body| self.bodies.check_place(i).and_then(|()| Body::check(body));
+        self.bodies.get(i).map_or(Ok(()), |body| check_one(i, body, check))
     }
 
     /// How messages name a body; by its number alone if there is none.
@@ -286,19 +299,14 @@ impl World {
         self.bodies.get(i).map_or_else(|| format!("body {i}"), |body| name_of(i, body))
     }
 
-    fn check_bodies(&self, check: fn(&Body) -> Result<()>) -> Result<()> {
-        self.bodies.iter().enumerate().try_for_each(|(i, body)| check_one(i, body, check))
-    }
-
     /// Refuses joints to bodies that do not exist, and anchors out of range.
     pub(crate) fn check_joints(&self) -> Result<()> {
-        let bodies = self.bodies.len();
         for (i, joint) in self.joints.iter().enumerate() {
-            let exists = |body: usize| !self.bodies.is_vacant(body);
-            let exist = exists(joint.body_a) && joint.body_b.is_none_or(exists);
-            ensure(exist, || format!("joint {i}: names a body that is gone, or beyond the last of {bodies}"))?;
+            let bodies = [Some(joint.body_a), joint.body_b];
+            let exist = bodies.into_iter().flatten().try_for_each(|body| self.bodies.check_handle(body));
+            exist.map_err(|e| e.within(format_args!("joint {i}")))?;
             let differ = joint.body_b != Some(joint.body_a);
-            ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a))?;
+            ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a.index()))?;
             let breaks = joint.break_force;
             ensure(breaks > 0.0, || format!("joint {i}: break_force = {breaks}: must be above 0 N"))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
@@ -348,7 +356,7 @@ impl World {
 }
 
 /// Refuses a body for which `check` does, in a line that names it.
-fn check_one(i: usize, body: &Body, check: fn(&Body) -> Result<()>) -> Result<()> {
+fn check_one(i: usize, body: &Body, check: impl Fn(&Body) -> Result<()>) -> Result<()> {
     check(body).map_err(|e| e.within(name_of(i, body)))
 }
 

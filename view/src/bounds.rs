@@ -3,10 +3,14 @@
 use glam::Vec3;
 
 use crate::poses::{Poses, anchors, poses};
-use drystone::{BodyKind, World};
+use drystone::{BodyHandle, BodyKind, World};
 
 /// Room on each side of a body, as a share of its size.
 const MARGIN: f32 = 0.25;
+/// Times the radius of a scene, beyond which a body that left the others counts as gone.
+pub(crate) const FAR: f32 = 4.0;
+/// One in so many bodies may be gone.
+const GONE: usize = 10;
 
 /// A box along the world's axes: lower and upper corner (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,20 +52,26 @@ impl Bounds {
 
     /// Bounds of everything that moves in a world, with a margin, of sensors, and of the anchors of joints.
     pub fn of(world: &World) -> Self {
-        Self::at(world, &poses(world))
+        Self::at(world, &poses(world), f32::INFINITY)
     }
 
-    /// The same with the bodies at `poses`.
-    pub fn at(world: &World, poses: &Poses) -> Self {
-        Self::with_margin(world, poses, MARGIN)
+    /// The same with the bodies at `poses`, without those few that flew off from a scene of this radius (m).
+    pub fn at(world: &World, poses: &Poses, radius: f32) -> Self {
+        Self::with_margin(world, poses, MARGIN, radius)
     }
 
-    /// The same without a margin: what lies outside on the side of the eye only hides it.
+    /// The same as [`Self::of`] without a margin: what lies outside on the side of the eye only hides it.
     pub fn tight(world: &World) -> Self {
-        Self::with_margin(world, &poses(world), 0.0)
+        Self::with_margin(world, &poses(world), 0.0, f32::INFINITY)
     }
 
-    fn with_margin(world: &World, poses: &Poses, margin: f32) -> Self {
+    /// These bounds as far as they are within `room` of `other` on each side (m), joined with it.
+    pub(crate) fn near(self, other: Self, room: f32) -> Self {
+        let kept = Self { low: self.low.max(other.low - room), high: self.high.min(other.high + room) };
+        if kept.low.cmple(kept.high).all() { kept.join(other) } else { other }
+    }
+
+    fn with_margin(world: &World, poses: &Poses, margin: f32, radius: f32) -> Self {
         let around = world.bodies.iter().zip(poses).map(|(body, &(position, rotation))| {
             let shown = body.colliders.iter().filter(|c| body.kind != BodyKind::Fixed || c.sensor);
             let bounds = shown.map(|c| c.bounds(position, rotation));
@@ -69,7 +79,78 @@ impl Bounds {
             let room = margin * (body.high - body.low);
             Self { low: body.low - room, high: body.high + room }
         });
-        let anchors = world.joints.iter().flat_map(|joint| anchors(joint, poses));
-        around.chain(anchors.map(|at| Self::around(at, 0.0))).fold(Self::EMPTY, Self::join)
+        let mut around: Vec<Self> = around.collect();
+        leave_out_gone(&mut around, FAR * radius);
+        let is_gone = |handle: BodyHandle| {
+            let body = handle.index();
+            world.bodies[body].kind != BodyKind::Fixed && !around[body].low.is_finite()
+        };
+        let joints = world.joints.iter().filter(|j| !is_gone(j.body_a) && !j.body_b.is_some_and(is_gone));
+        let anchors = joints.flat_map(|joint| anchors(joint, poses)).map(|at| Self::around(at, 0.0));
+        around.iter().copied().chain(anchors).fold(Self::EMPTY, Self::join)
+    }
+}
+
+/// Empties the boxes that are further than `far` from the middle one (m), where these are few.
+fn leave_out_gone(boxes: &mut [Bounds], far: f32) {
+    let mut centers: Vec<Vec3> = boxes.iter().filter(|b| b.low.is_finite()).map(Bounds::center).collect();
+    let (half, few) = (centers.len() / 2, centers.len() / GONE);
+    if few == 0 || far == f32::INFINITY {
+        return;
+    }
+    let middle = Vec3::from_array([0, 1, 2].map(|k| {
+        let (_, center, _) = centers.select_nth_unstable_by(half, |a, b| a[k].total_cmp(&b[k]));
+        center[k]
+    }));
+    let is_gone = |b: &&mut Bounds| b.low.is_finite() && b.center().distance(middle) > far;
+    if boxes.iter_mut().filter(is_gone).count() <= few {
+        boxes.iter_mut().filter(is_gone).for_each(|b| *b = Bounds::EMPTY);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drystone::{Body, Joint, Shape};
+
+    /// A row of `count` cubes, 1 m apart, the last of them `away` (m) from its place and on a rope to its place.
+    fn row(count: usize, away: f32) -> World {
+        let mut world = World::new();
+        for i in 0..count {
+            let x = i as f32 + if i + 1 == count { away } else { 0.0 };
+            world.add(Body::dynamic().shape(Shape::cuboid(0.4, 0.4, 0.4)).position(x, 0.0, 0.0));
+        }
+        world.join(Joint::to_world(count - 1, Vec3::ZERO, Vec3::X * (count as f32 - 1.0)).rope(1e9));
+        world
+    }
+
+    fn length(world: &World, radius: f32) -> f32 {
+        let bounds = Bounds::at(world, &poses(world), radius);
+        bounds.high.x - bounds.low.x
+    }
+
+    #[test]
+    fn one_of_many_that_flew_off_is_left_out_with_its_joints() {
+        let radius = Bounds::of(&row(20, 0.0)).radius();
+        assert!(length(&row(20, 1e4), radius) < 20.0);
+        // Not as far as four radii, and one of few.
+        assert!(length(&row(20, 25.0), radius) > 40.0);
+        assert!(length(&row(9, 1e4), radius) > 1e4);
+        assert!(length(&row(20, 1e4), f32::INFINITY) > 1e4);
+        let mut scattered = row(20, 1e4);
+        scattered.bodies.iter_mut().step_by(4).for_each(|body| body.position.y = 1e4);
+        let bounds = Bounds::at(&scattered, &poses(&scattered), radius);
+        assert!(bounds.high.y > 9e3 && bounds.high.x > 9e3, "six of twenty are no few");
+    }
+
+    #[test]
+    fn bounds_that_move_leave_those_behind_that_are_too_far() {
+        let at = |x: f32| Bounds::around(Vec3::X * x, 1.0);
+        let way = at(0.0).near(at(5.0), 10.0);
+        assert_eq!((way.low.x, way.high.x), (-1.0, 6.0));
+        let way = way.near(at(14.0), 10.0);
+        assert_eq!((way.low.x, way.high.x), (3.0, 15.0));
+        assert_eq!(way.near(at(-100.0), 10.0), at(-100.0));
+        assert_eq!(Bounds::EMPTY.near(at(3.0), 10.0), at(3.0));
     }
 }

@@ -70,7 +70,8 @@ impl Film {
     }
 
     pub fn bounds(&self) -> Bounds {
-        let of = |frame: &Moment| Bounds::at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses);
+        let radius = Bounds::of(&self.scene.world).radius();
+        let of = |frame: &Moment| Bounds::at(frame.world.as_ref().unwrap_or(&self.scene.world), &frame.poses, radius);
         self.frames.iter().fold(Bounds::EMPTY, |all, frame| all.join(of(frame)))
     }
 

@@ -11,6 +11,7 @@ mod camera;
 #[cfg(not(target_family = "wasm"))]
 mod canvas;
 mod colors;
+mod eye;
 #[cfg(not(target_family = "wasm"))]
 mod film;
 mod labyrinth;
@@ -29,6 +30,7 @@ pub use camera::Camera;
 #[cfg(not(target_family = "wasm"))]
 pub use canvas::{Canvas, Picture};
 pub use colors::{ColorBy, Rgba, batch_color};
+pub use eye::Eye;
 #[cfg(not(target_family = "wasm"))]
 pub use film::{Film, Look, Moment, draw_game, evenly};
 pub use labyrinth::Labyrinth;

@@ -5,9 +5,10 @@ use std::time::Duration;
 use glam::Vec3;
 use web_time::Instant;
 
-use crate::bounds::Bounds;
+use crate::bounds::{Bounds, FAR};
 use crate::colors::ColorBy;
 use crate::overlay::Overlay;
+use crate::poses::poses;
 use crate::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
@@ -60,7 +61,10 @@ pub struct Live {
     pub(crate) replay: Option<Replay>,
     /// Where the pointer is.
     pub(crate) pointer: Option<Pointer>,
-    pub(crate) bounds: Bounds,
+    /// Of the scene as it began.
+    pub(crate) built: Bounds,
+    /// Of the bodies, and of the last part of the way that they took.
+    pub(crate) way: Bounds,
     pub(crate) light_end: f32,
 }
 
@@ -131,8 +135,10 @@ impl Live {
     }
 
     fn of(scene: Scene, simulation: Simulation, color: ColorBy) -> Self {
+        let bounds = Bounds::of(&scene.world);
         Self {
-            bounds: Bounds::of(&scene.world),
+            built: bounds,
+            way: bounds,
             exact: false,
             choice: BackendChoice::default(),
             simulation,
@@ -209,6 +215,7 @@ impl Live {
         self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
         self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
+        self.look_anew();
         Ok(())
     }
 
@@ -223,6 +230,7 @@ impl Live {
             self.simulation.restore(snapshot);
             self.spawners.clone_from(spawners);
             (self.steps, self.owed, self.grabbed) = (*steps, 0.0, None);
+            self.look_anew();
         }
     }
 
@@ -232,19 +240,33 @@ impl Live {
             let step = (f64::from(self.steps) + seconds / f64::from(self.scene.dt)).round().max(0.0);
             replay.seek_async(&mut self.simulation, step as u32).await?;
             (self.steps, self.owed) = (replay.step_number(), 0.0);
+            self.look_anew();
         }
         Ok(())
+    }
+
+    /// Forgets the way that the bodies took: a camera frames them where they are.
+    pub fn look_anew(&mut self) {
+        self.way = Bounds::EMPTY;
+        self.look();
+    }
+
+    /// Notes where the bodies are.
+    fn look(&mut self) {
+        let (world, radius) = (&self.simulation.world, self.built.radius());
+        let now = Bounds::at(world, &poses(world), radius);
+        self.way = self.way.near(now, FAR * radius);
     }
 
     /// Throws a cube from the eye to where the pointer is.
     pub fn throw(&mut self) {
         let Some(Pointer { origin, direction, .. }) = self.pointer.filter(|_| self.replay.is_none()) else { return };
-        let size = 0.02 * self.bounds.radius();
+        let size = 0.02 * self.built.radius();
         let cube = Body::dynamic().named("thrown").shape(Shape::cuboid(size, size, size));
         let [x, y, z] = (origin + 4.0 * size * direction).to_array();
         self.simulation
             .world
-            .insert(cube.position(x, y, z).velocity(THROW * self.bounds.radius() * direction, Vec3::ZERO));
+            .insert(cube.position(x, y, z).velocity(THROW * self.built.radius() * direction, Vec3::ZERO));
     }
 
     /// The dynamic body under the pointer, through other bodies if need be, and how far from the eye (m).
@@ -349,6 +371,7 @@ impl Live {
     pub fn after_step(&mut self, stats: StepStats) {
         self.stats = stats;
         self.steps += 1;
+        self.look();
         for (mean, (_, time)) in self.stage_ms.iter_mut().zip(self.stats.times.stages()) {
             *mean += 0.1 * (time.as_secs_f64() * 1e3 - *mean);
         }

@@ -20,9 +20,7 @@ impl Show for Live {
     }
 
     fn bounds(&self) -> Bounds {
-        // The bounds follow the bodies, unless one of them is far away.
-        let now = self.bounds.join(Bounds::of(self.world()));
-        if now.radius() < 4.0 * self.bounds.radius() { now } else { self.bounds }
+        self.way
     }
 
     fn container(&self) -> Option<Bounds> {
@@ -44,7 +42,7 @@ impl Show for Live {
     }
 
     fn lines(&mut self) -> Vec<LineEnd> {
-        let size = 0.02 * self.bounds.radius();
+        let size = 0.02 * self.built.radius();
         let overlay = Overlay { joints: self.overlay.joints || self.grabbed.is_some(), ..self.overlay };
         lines(&mut self.simulation, overlay, size)
     }
@@ -65,6 +63,7 @@ impl Show for Live {
             Key::Character(' ') => self.paused = !self.paused,
             Key::Character('n') => self.order(Order::Step),
             Key::Character('r') => self.order(Order::Restart),
+            Key::Character('f') => self.look_anew(),
             Key::Character('b') => self.throw(),
             Key::Character('x') | Key::Delete => self.delete(),
             Key::Character('s') => self.keep(),

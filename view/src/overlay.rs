@@ -37,8 +37,8 @@ pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
         if let Linear::Distance(_) = j.linear {
             return line(ends);
         }
-        let ((position, rotation), [_, on_b]) = (poses[j.body_a], ends);
-        let body = &world.bodies[j.body_a];
+        let ((position, rotation), [_, on_b]) = (poses[j.body_a.index()], ends);
+        let body = &world.bodies[j.body_a.index()];
         let is_inside = |(low, high): (Vec3, Vec3)| low.cmple(on_b).all() && on_b.cmple(high).all();
         if j.body_b.is_some() || body.colliders.iter().any(|c| is_inside(c.bounds(position, rotation))) {
             return None;
@@ -70,9 +70,9 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
     if overlay.joints {
         for joint in &world.joints {
             let [on_a, on_b] = world.anchors(joint);
-            line(world.bodies[joint.body_a].center_of_mass(), on_a, JOINT);
+            line(world.bodies[joint.body_a.index()].center_of_mass(), on_a, JOINT);
             if let Some(b) = joint.body_b {
-                line(world.bodies[b].center_of_mass(), on_b, JOINT);
+                line(world.bodies[b.index()].center_of_mass(), on_b, JOINT);
             }
             line(on_a, on_b, GAP);
         }

@@ -1,6 +1,6 @@
 //! Where the bodies of a world are.
 
-use drystone::{Joint, World};
+use drystone::{BodyHandle, Joint, World};
 use glam::{Quat, Vec3};
 
 /// Position (m) and rotation of each body of a world.
@@ -13,6 +13,6 @@ pub fn poses(world: &World) -> Vec<(Vec3, Quat)> {
 
 /// Where the anchors of a joint are, that of a first, with the bodies at `poses`.
 pub(crate) fn anchors(joint: &Joint, poses: &Poses) -> [Vec3; 2] {
-    let on = |body: usize, anchor: Vec3| poses[body].0 + poses[body].1 * anchor;
+    let on = |body: BodyHandle, anchor: Vec3| poses[body.index()].0 + poses[body.index()].1 * anchor;
     [on(joint.body_a, joint.anchor_a), joint.body_b.map_or(joint.anchor_b, |b| on(b, joint.anchor_b))]
 }

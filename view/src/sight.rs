@@ -52,13 +52,13 @@ impl Sight {
         Self::of(surface, &adapter, device, queue, size)
     }
 
-    /// A canvas of a browser, of width and height `size` (pixels of the device): by WebGPU, and where the browser has none by WebGL2
-    /// (feature `webgl`).
+    /// A canvas of a browser, of width and height `size` (pixels of the device): by WebGPU, and by WebGL2 (feature `webgl`) where
+    /// the browser has no WebGPU or `webgpu` is false. A canvas that WebGPU drew on gives no WebGL2 any more: that takes another canvas.
     ///
     /// # Errors
     /// The browser draws by neither.
     #[cfg(target_family = "wasm")]
-    pub async fn on_canvas(canvas: wgpu::SurfaceTarget<'static>, size: (u32, u32)) -> Result<Self> {
+    pub async fn on_canvas(canvas: wgpu::SurfaceTarget<'static>, size: (u32, u32), webgpu: bool) -> Result<Self> {
         let neither = |e: &dyn std::fmt::Display| {
             let by = if cfg!(feature = "webgl") { "neither by WebGPU nor by WebGL2" } else { "not by WebGPU" };
             Error::Adapter(format!("this browser draws {by}: {e}"))
@@ -66,8 +66,9 @@ impl Sight {
         if !cfg!(feature = "webgl") && !wgpu::util::is_browser_webgpu_supported().await {
             return Err(neither(&"there is no adapter"));
         }
+        let backends = if webgpu { wgpu::Backends::BROWSER_WEBGPU | wgpu::Backends::GL } else { wgpu::Backends::GL };
         let instance = wgpu::util::new_instance_with_webgpu_detection(wgpu::InstanceDescriptor {
-            backends: wgpu::Backends::BROWSER_WEBGPU | wgpu::Backends::GL,
+            backends,
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         })

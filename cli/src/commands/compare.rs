@@ -6,7 +6,7 @@ use super::output::{print, print_json};
 use super::progress::Progress;
 use super::scene::{SceneArgs, WorldsArgs};
 use super::words;
-use drystone::backend::gpu::adapters;
+use crate::adapter;
 use drystone::backend::{BackendChoice, choose};
 use drystone::stages::compare::compare;
 use drystone::{Error, Result};
@@ -35,7 +35,7 @@ impl CompareArgs {
         };
         let (scene, config) = self.scene.load_awake(&self.worlds)?;
         self.scene.set_threads(BackendChoice::Auto);
-        let exact = self.exact || (!self.plain && adapters().first().is_some_and(|a| a.takes_spirv));
+        let exact = self.exact || (!self.plain && adapter::best().is_some_and(|a| a.takes_spirv));
         let bodies = scene.world.dynamic_count();
         let mut named = [String::new(), String::new()];
         let mut open = |which: usize| {

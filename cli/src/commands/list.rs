@@ -1,11 +1,10 @@
-//! `drystone scenes` and `drystone adapters`.
+//! `drystone scenes` and `drystone settings`.
 
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::output::{plain_table, print, print_json};
+use super::output::{print, print_json};
 use super::words;
-use drystone::backend::gpu::{AdapterSummary, adapters};
 use drystone::preset::Preset;
 use drystone::scenes::{CATALOGUE, Entry, Parameter, schema};
 use drystone::{Result, SolverConfig};
@@ -90,35 +89,4 @@ fn words(schema: &Value, property: &Value) -> String {
     let values = definition(schema, property).and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array()));
     let words: Vec<_> = values.into_iter().flatten().filter_map(|w| w["const"].as_str().or(w.as_str())).collect();
     if words.is_empty() { String::new() } else { format!(" One of {}.", words.join(", ")) }
-}
-
-#[derive(Args)]
-pub struct AdaptersArgs {
-    /// Print one JSON object.
-    #[arg(long)]
-    json: bool,
-}
-
-impl AdaptersArgs {
-    pub fn run(&self) -> Result<()> {
-        let found = adapters();
-        if self.json {
-            let adapter = |a: &AdapterSummary| {
-                json!({"name": a.name, "api": a.api, "driver": a.driver, "kind": a.kind,
-                    "hardware": a.hardware, "takes_spirv": a.takes_spirv, "buffer_limit": a.buffer_limit})
-            };
-            return print_json(&json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
-        }
-        if found.is_empty() {
-            return print("none; everything runs on the CPU");
-        }
-        let mut table = plain_table();
-        table.set_header(["name", "api", "kind", "driver", "exact mode", "largest buffer"]);
-        for a in found {
-            let exact = if a.takes_spirv { "by SPIR-V" } else { "by integers" };
-            let buffer = format!("{} MiB", a.buffer_limit >> 20);
-            table.add_row([a.name, a.api, a.kind.into(), a.driver, exact.into(), buffer]);
-        }
-        print(table)
-    }
 }

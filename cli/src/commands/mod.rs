@@ -1,7 +1,10 @@
 //! The command line: each command parses, makes one library call and prints.
 
+#[cfg(feature = "gpu")]
+mod adapters;
 mod bench;
 mod compare;
+#[cfg(feature = "gpu")]
 mod conform;
 #[cfg(feature = "fclib")]
 mod export;
@@ -48,7 +51,11 @@ enum Command {
     /// Run a scene on two backends and show how far apart they are.
     Compare(compare::CompareArgs),
     /// Check an adapter and its driver: kernels, scenes, limits, long plans, lost devices.
+    #[cfg(feature = "gpu")]
     Conform(conform::ConformArgs),
+    /// Check an adapter and its driver (in builds with the feature gpu).
+    #[cfg(not(feature = "gpu"))]
+    Conform(NotBuilt),
     /// Solve a contact problem and show how its error falls with the sweeps.
     Solve(solve::SolveArgs),
     /// Run a scene in a window.
@@ -83,10 +90,14 @@ enum Command {
     /// List the settings of the solver, as a file for --config.
     Settings(list::SettingsArgs),
     /// List the adapters that can run the shaders.
-    Adapters(list::AdaptersArgs),
+    #[cfg(feature = "gpu")]
+    Adapters(adapters::AdaptersArgs),
+    /// List the adapters that can run the shaders (in builds with the feature gpu).
+    #[cfg(not(feature = "gpu"))]
+    Adapters(NotBuilt),
 }
 
-/// A command that needs the feature `view`.
+/// A command that needs the feature `view` or `gpu`.
 #[cfg(not(feature = "view"))]
 #[derive(clap::Args)]
 struct NotBuilt {
@@ -97,7 +108,7 @@ struct NotBuilt {
 #[cfg(not(feature = "view"))]
 impl NotBuilt {
     fn run(&self) -> drystone::Result<()> {
-        let needed = "pictures and windows need a build with them: `cargo install --path cli --features view`";
+        let needed = "GPUs, pictures and windows need a build with them: `cargo install --path cli --features view`";
         Err(drystone::Error::input(needed))
     }
 }
@@ -145,7 +156,10 @@ impl Command {
     /// Whether all checks passed; commands that check nothing pass.
     fn run(&self) -> drystone::Result<bool> {
         match self {
+            #[cfg(feature = "gpu")]
             Self::Conform(args) => return args.run(),
+            #[cfg(not(feature = "gpu"))]
+            Self::Conform(args) => args.run(),
             Self::Run(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Solve(args) => args.run(),

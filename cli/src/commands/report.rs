@@ -6,10 +6,10 @@ use clap::{Args, Subcommand};
 
 use super::output::{print, say};
 use super::progress::{PERCENT, Progress};
+use crate::adapter;
 use crate::files;
 use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
 use crate::report::{RUNS, Shard, Solvers, convergence, performance, problems, rules, solvers};
-use drystone::backend::gpu::adapters;
 use drystone::{Error, Result};
 
 #[derive(Args)]
@@ -171,7 +171,7 @@ impl SurveyArgs {
         if !self.merge.is_empty() {
             return survey.merge(&self.merge, self.threads(), &mut |line| say(line));
         }
-        let adapter = adapters().into_iter().next().map(|a| a.to_string());
+        let adapter = adapter::best().map(|adapter| adapter.name);
         let bar = Progress::new(PERCENT, 1, false);
         let report = survey.run(&Origin::here(adapter), &mut |what, done, total| {
             bar.set_message(what);

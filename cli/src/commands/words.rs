@@ -5,6 +5,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::Method;
+#[cfg(feature = "gpu")]
 use drystone::conform::Group;
 use drystone::preset::Preset;
 use drystone::solver::Order;
@@ -31,6 +32,7 @@ impl Named for Preset {
     ];
 }
 
+#[cfg(feature = "gpu")]
 impl Named for Group {
     const WORDS: &'static [(&'static str, &'static str)] = &[
         ("kernels", "Every kernel on random problems, against its double in Rust"),

@@ -66,7 +66,7 @@ impl Checks {
     /// Passes if every number of a world is finite.
     fn finite(&mut self, what: &str, world: &World) {
         let broken = u8::from(world.first_non_finite().is_some());
-        self.at_most(format!("{what}bodies that are no numbers"), broken.into(), 0.0);
+        self.at_most(format!("{what}bodies at NaN or infinity"), broken.into(), 0.0);
     }
 
     /// Passes if every body is in place.
@@ -230,5 +230,14 @@ mod tests {
         let setup = Setup { config: SolverConfig::default().with(|c| c.push_limit = 0.1), open: &open };
         let outcome = setup.outcome(world, 300).expect("a run");
         assert!(outcome.at_rest < 1e-3 && (0.15..0.2).contains(&outcome.deepest), "{outcome:?}");
+    }
+
+    #[test]
+    fn one_body_out_of_place_fails() {
+        for (fallen, passed) in [(0.0, true), (1.0, false)] {
+            let mut checks = Checks::default();
+            checks.stands(&Outcome { fallen, drift: 0.0, rms: 0.0, deepest: 0.0, at_rest: 0.0 }, "a tower");
+            assert_eq!(passes(&checks.0), passed);
+        }
     }
 }

@@ -5,6 +5,7 @@ pub mod comparison;
 mod convergence;
 pub mod hard_cases;
 pub mod hard_rows;
+#[cfg(feature = "gpu")]
 pub mod junit;
 pub mod number;
 mod performance;

@@ -3,7 +3,7 @@
 use std::fmt::{self, Debug, Write};
 use std::hash::Hasher;
 
-use drystone::{Joint, Scene};
+use drystone::{BodyHandle, Joint, Scene};
 use fnv::FnvHasher;
 
 /// Feeds text to a hasher.
@@ -22,13 +22,18 @@ struct Content<'a>(&'a Joint);
 impl Debug for Content<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(joint) = *self;
+        let mut content = f.debug_struct("Joint");
+        content.field("body_a", &joint.body_a.index()).field("body_b", &joint.body_b.map(BodyHandle::index));
+        content.field("anchor_a", &joint.anchor_a).field("anchor_b", &joint.anchor_b);
         if !joint.is_ball() {
-            return joint.fmt(f);
+            content.field("frame_a", &joint.frame_a).field("frame_b", &joint.frame_b);
+            content.field("linear", &joint.linear).field("angular", &joint.angular);
         }
-        let mut ball = f.debug_struct("Joint");
-        ball.field("body_a", &joint.body_a).field("body_b", &joint.body_b);
-        ball.field("anchor_a", &joint.anchor_a).field("anchor_b", &joint.anchor_b);
-        ball.field("collide", &joint.collide).finish()
+        content.field("collide", &joint.collide);
+        if !joint.is_ball() {
+            content.field("break_force", &joint.break_force);
+        }
+        content.finish()
     }
 }
 

@@ -118,7 +118,7 @@ impl Rain {
             _ => Shape::cuboid(a, b, c),
         };
         let turn = Quat::from_xyzw(self.within(1.0), self.within(1.0), self.within(1.0), 1.5).normalize();
-        // The nine places in turn: what came to the same one before has fallen by a meter.
+        // The nine places in turn: the body that came to the same place before has fallen by a meter.
         let place = |k: u32| 0.8 * ((k % 3) as f32 - 1.0);
         self.came = (self.came + 1) % 9;
         Body::dynamic().shape(shape).position(place(self.came), 3.0, place(self.came / 3)).rotation(turn)
@@ -145,7 +145,7 @@ impl Rain {
         if let Some([a, b]) = before.and_then(|before| Some([world.body(before)?, world.body(new)?])) {
             let middle = a.position.midpoint(b.position);
             let anchor = |body: &Body| body.rotation.inverse() * (middle - body.position);
-            let joint = Joint::new(before.expect("a body").index(), anchor(a), new.index(), anchor(b));
+            let joint = Joint::new(before.expect("a body"), anchor(a), new, anchor(b));
             world.join(joint);
         }
         self.here.push_back(new);

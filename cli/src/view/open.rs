@@ -12,7 +12,7 @@ use winit::window::Window;
 
 use super::panel::Panel;
 use drystone::{Error, Result};
-use drystone_view::{Camera, Key, Next, Pointer, Sight};
+use drystone_view::{Eye, Key, Next, Pointer, Sight};
 
 pub(super) fn no_display() -> Error {
     let without =
@@ -31,7 +31,7 @@ enum Drag {
 pub(super) struct Open {
     pub(super) window: Arc<Window>,
     sight: Sight,
-    pub(super) camera: Camera,
+    pub(super) eye: Eye,
     pub(super) ui: egui_winit::State,
     ui_renderer: egui_wgpu::Renderer,
     panel: bool,
@@ -57,7 +57,7 @@ impl Open {
         let ui_renderer =
             egui_wgpu::Renderer::new(sight.device(), sight.format(), egui_wgpu::RendererOptions::default());
         Ok(Self {
-            camera: show.camera(sight.aspect()),
+            eye: Eye::new(show, sight.aspect()),
             window,
             sight,
             ui,
@@ -80,19 +80,20 @@ impl Open {
         Vec2::new(width as f32, height as f32)
     }
 
-    /// Sets the camera of `show` for the part of the window beside the panel.
-    fn frame_scene(&mut self, show: &dyn Panel) {
+    /// Frames what moves in the part of the window beside the panel.
+    fn follow(&mut self, show: &dyn Panel) {
         let [width, height] = self.size().to_array();
         // The panel counts for at most half of the window.
         let panel = if self.panel { self.panel_width.min(0.5 * width) } else { 0.0 };
-        self.camera = show.camera((width - panel) / height);
-        self.camera.pan(Vec2::new(-0.5 * panel / height, 0.0));
+        self.eye.follow(show, width / height, panel / height);
     }
 
     pub(super) fn key(&mut self, key: Key, down: bool, show: &mut dyn Panel) {
         show.point(&self.pointer());
         match key {
-            Key::Character('f') if down => self.frame_scene(show),
+            Key::Character('f') if down => self.eye.go_along(),
+            // A cube flies away, and a body that is missing moves the middle.
+            Key::Character('b' | 'x') | Key::Delete if down => self.eye.stay(),
             Key::Character('h') if down => self.panel = !self.panel,
             _ => {}
         }
@@ -100,7 +101,7 @@ impl Open {
 
     fn pointer(&self) -> Pointer {
         let at = Vec2::new(self.mouse.x as f32, self.mouse.y as f32) / self.size() * 2.0 - 1.0;
-        Pointer::through(&self.camera, at * Vec2::new(1.0, -1.0), self.sight.aspect())
+        Pointer::through(&self.eye.camera, at * Vec2::new(1.0, -1.0), self.sight.aspect())
     }
 
     pub(super) fn button(&mut self, button: MouseButton, down: bool, show: &mut dyn Panel) {
@@ -108,7 +109,10 @@ impl Open {
             show.release();
         }
         self.drag = match (button, down) {
-            (MouseButton::Left, true) if show.grab(&self.pointer()) => Drag::Body,
+            (MouseButton::Left, true) if show.grab(&self.pointer()) => {
+                self.eye.stay();
+                Drag::Body
+            }
             (MouseButton::Left | MouseButton::Right, true) => Drag::Orbit,
             (MouseButton::Middle, true) => Drag::Pan,
             _ => Drag::Nothing,
@@ -121,8 +125,8 @@ impl Open {
         self.mouse = to;
         match self.drag {
             Drag::Body => show.drag(&self.pointer()),
-            Drag::Orbit => self.camera.orbit(by),
-            Drag::Pan => self.camera.pan(by),
+            Drag::Orbit => self.eye.orbit(by),
+            Drag::Pan => self.eye.pan(by),
             Drag::Nothing => {}
         }
     }
@@ -142,7 +146,8 @@ impl Open {
             Next::Later => return Ok(true),
             Next::Gone => return Ok(false),
         };
-        self.sight.paint(&frame, show, &self.camera);
+        self.follow(show);
+        self.sight.paint(&frame, show, &self.eye.camera);
         self.draw_panel(&frame.view, show);
         self.window.pre_present_notify();
         self.sight.present(frame);
@@ -165,8 +170,8 @@ impl Open {
             }
         });
         // The first frame gives the width of the panel.
-        if width > 0.0 && std::mem::replace(&mut self.panel_width, width) == 0.0 {
-            self.frame_scene(show);
+        if width > 0.0 {
+            self.panel_width = width;
         }
         self.ui.handle_platform_output(&self.window, output.platform_output);
         let triangles = context.tessellate(output.shapes, output.pixels_per_point);

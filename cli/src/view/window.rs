@@ -61,7 +61,7 @@ impl ApplicationHandler for App {
                 open.button(button, state == ElementState::Pressed, &mut *self.show);
             }
             WindowEvent::CursorMoved { position, .. } => open.moved(position, &mut *self.show),
-            WindowEvent::MouseWheel { delta, .. } if !taken => open.camera.zoom(match delta {
+            WindowEvent::MouseWheel { delta, .. } if !taken => open.eye.zoom(match delta {
                 MouseScrollDelta::LineDelta(_, lines) => lines,
                 MouseScrollDelta::PixelDelta(pixels) => pixels.y as f32 / 40.0,
             }),

@@ -293,11 +293,11 @@ impl<L: Lanes> AxisRows<L> for GroupRows<'_> {
     }
     #[inline(always)]
     fn axis(&self, k: usize) -> Axis<L> {
-        let [x, y, z, is_linear, gap, range, speed, max_impulse] = loaded!(&self.points.arms[k + 1]; 0 1 2 3 4 5 6 7);
+        let [x, y, z, is_linear, gap, left, speed, max_impulse] = loaded!(&self.points.arms[k + 1]; 0 1 2 3 4 5 6 7);
         let [mass_scale, impulse_scale, length] = loaded!(&self.points.others[k + 1]; 0 1 2);
         let rate = L::load(&self.points.tangent_masses[k + 1]);
         let direction = vec3(x, y, z);
-        Axis { direction, is_linear, gap, range, speed, max_impulse, rate, mass_scale, impulse_scale, length }
+        Axis { direction, is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length }
     }
     #[inline(always)]
     fn impulse(&self, k: usize) -> L {

@@ -90,7 +90,7 @@ pub(super) fn shader_module(device: &wgpu::Device, reflected: &Reflected) -> Res
     // are bound. They are valid: naga wrote them from a module that it validated, and `without_contraction` adds decorations only.
     // Indices stay inside: those of a problem's rows and a pass's colors name rows that are there, which `CheckedStep` keeps; and
     // `exact_spirv` lets naga bound every index by the length of its buffer, whatever the rows say, which
-    // `tests/shaders.rs` keeps. `Pipelines::prepare` makes the layout of the bindings from the same module.
+    // `tests/cpu/shaders.rs` keeps. `Pipelines::prepare` makes the layout of the bindings from the same module.
     Ok(unsafe { device.create_shader_module_passthrough(descriptor) })
 }
 

@@ -65,7 +65,13 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
         Some(force) => positive("break_force", [*force])?[0],
         None => f32::INFINITY,
     };
-    let joint = Joint { body_b: b, collide: *collide, break_force, ..Joint::to_world(a, anchor_a, anchor_b) };
+    let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
+    let joint = Joint {
+        body_b: b.map(&handle),
+        collide: *collide,
+        break_force,
+        ..Joint::to_world(handle(a), anchor_a, anchor_b)
+    };
     // Frames that agree as the bodies stand.
     let in_world = |frame: Quat| {
         let on = |body: usize| turn::unit(turn::product(world.bodies[body].rotation.inverse(), frame));
@@ -122,7 +128,10 @@ fn read_axis(
     let bounds = match limits {
         Some(_) if locked => return Err(input!("{name}locked and {name}limits: give one of them")),
         Some(limits) => {
-            let [min, max] = finite(format!("{name}limits"), *limits)?;
+            // An absent limit is infinite, and no number of a file is.
+            let given = limits.map(|limit| if limit.is_infinite() { 0.0 } else { limit });
+            let given = finite(format!("{name}limits"), given)?;
+            let [min, max] = [0, 1].map(|i| if limits[i].is_infinite() { limits[i] as f32 } else { given[i] });
             Bounds::Between { min, max }
         }
         None if locked => Bounds::Locked,

@@ -1,7 +1,7 @@
 //! The types of a scene file: version 1 of the format, and the source of its JSON Schema.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::world::{BodyKind, Groups};
 
@@ -83,7 +83,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spawner")]
 pub struct SpawnerFile {
-    /// The body as it comes, with when it leaves.
+    /// The body as it comes; it may say when it leaves.
     pub body: BodyFile,
     /// Steps before the first comes.
     #[serde(default)]
@@ -300,6 +300,13 @@ pub struct JointFile {
     pub kind: JointKind,
 }
 
+/// Reads limits, of which null is an infinite one: JSON has no infinity, and an infinite number is written as null.
+fn limits_or_null<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<[f64; 2]>, D::Error> {
+    let limits = Option::<[Option<f64>; 2]>::deserialize(reader)
+        .map_err(|e| serde::de::Error::custom(format_args!("limits: {e}")))?;
+    Ok(limits.map(|[min, max]| [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)]))
+}
+
 /// What a joint leaves free. Angles are zero as the bodies stand.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
@@ -315,7 +322,8 @@ pub enum JointKind {
         /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
         axis: [f64; 3],
         /// Least and largest angle (rad), -pi to pi.
-        #[serde(skip_serializing_if = "Option::is_none")]
+        #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
         /// A motor about the axis (rad/s, N m), instead of a spring.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -328,8 +336,9 @@ pub enum JointKind {
     Slider {
         /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
         axis: [f64; 3],
-        /// Least and largest place (m).
-        #[serde(skip_serializing_if = "Option::is_none")]
+        /// Least and largest place (m); null for no limit on that side.
+        #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
         /// A motor along the axis (m/s, N), instead of a spring.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -340,8 +349,9 @@ pub enum JointKind {
     },
     /// All but the distance of the points: a rope, a rod or a spring.
     Distance {
-        /// Least and largest distance (m), the same of a rod.
-        #[serde(skip_serializing_if = "Option::is_none")]
+        /// Least and largest distance (m), the same of a rod; null for no limit on that side.
+        #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
         /// A winch (m/s, N), instead of a spring.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -374,8 +384,9 @@ pub struct AxisFile {
     /// Whether it is held at zero; limits are then not given.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub locked: bool,
-    /// Least and largest place (m) or angle (rad).
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Least and largest place (m) or angle (rad); null for no limit on that side of a place.
+    #[serde(deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<[Option<f64>; 2]>")]
     pub limits: Option<[f64; 2]>,
     /// A motor, instead of a spring.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -22,6 +22,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
             world.bodies[i].name
         ));
     }
+    world.check_joints()?;
     let mut index_of = vec![usize::MAX; world.bodies.len()];
     let mut bodies = Vec::new();
     for handle in world.bodies.handles() {
@@ -135,7 +136,11 @@ fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
         },
     };
     Ok(JointFile {
-        bodies: [Some(joint.body_a), joint.body_b].into_iter().flatten().map(|b| BodyRef::Index(index_of[b])).collect(),
+        bodies: [Some(joint.body_a), joint.body_b]
+            .into_iter()
+            .flatten()
+            .map(|b| BodyRef::Index(index_of[b.index()]))
+            .collect(),
         anchor: None,
         anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
         collide: joint.collide,

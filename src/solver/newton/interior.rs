@@ -50,14 +50,14 @@ struct Point {
 }
 
 impl Interior {
-    /// The start: every contact pushes, and parts with the mean of the free velocities. A careful one takes more steps, and comes
-    /// through where the way is blocked for others.
+    /// The start: every contact pushes as hard as any other, and parts as fast, so that all products are equal however the masses
+    /// differ. A careful one takes more steps, and comes through where the way is blocked for others.
     pub fn new(system: &impl System, careful: bool) -> Self {
         let cones = system.cones();
-        let free = cones.iter().map(|c| c.q.length_squared()).sum::<f64>();
-        let speed = (free / cones.len() as f64).sqrt();
+        let mean = |of: fn(&Cone) -> f64| cones.iter().map(of).sum::<f64>() / cones.len() as f64;
+        let (rho, speed) = (mean(|c| c.rho), mean(|c| c.q.length_squared()).sqrt());
         let scale: Vec<_> = cones.iter().map(|c| DVec3::new(if c.mu > 0.0 { c.mu } else { 1.0 }, 1.0, 1.0)).collect();
-        let r: Vec<_> = cones.iter().map(|c| DVec3::X * (c.rho * speed)).collect();
+        let r = vec![DVec3::X * (rho * speed); cones.len()];
         let z = scale.iter().map(|t| DVec3::X * (speed / t.x)).collect();
         let mut start = Self { r, z, scale, u: Vec::new(), error: f64::INFINITY, careful };
         start.measure(system);

@@ -2,8 +2,9 @@
 //!
 //! Sweeps need thousands of passes where a heavy body stands on light ones, or many bodies on each other. A step of Newton's method
 //! solves a sparse linear system instead ([`System`]: six unknowns a body, or three a contact where a problem is given without
-//! bodies), and tens of steps come to 1e-8 however badly conditioned the problem is. docs/derivation.md, section 10, has the method;
-//! docs/convergence.md compares it with the solvers of Siconos.
+//! bodies), and tens of steps come to 1e-8 on towers of every mass ratio. Where the central path turns back, as it does in some towers
+//! of planks, Newton's method ends above 1e-8, and sweeps go on from there. docs/derivation.md, section 10, has the method;
+//! docs/convergence.md compares it with the solvers of Siconos, and docs/contacts-format.md says which problems stay unsolved.
 
 mod blocks;
 mod bodies;
@@ -120,7 +121,7 @@ pub struct Outcome {
 
 impl Outcome {
     fn keep(&mut self, impulses: &[DVec3], e_vel: f64) {
-        // The first, and what is less; a NaN never is.
+        // The first error and every smaller one. A NaN is never smaller.
         if e_vel < self.e_vel {
             (self.e_vel, self.impulses) = (e_vel, impulses.to_vec());
         }

@@ -1,8 +1,8 @@
 //! The scenes of the report, and drystone's settings.
 
 use super::contender::{Contender, Drystone, Extent};
+use crate::adapter;
 use crate::settings;
-use drystone::backend::gpu::adapters;
 use drystone::{Result, Scene, SolverConfig};
 
 /// The scenes of a full and of a brief report that have at most 1,000 bodies.
@@ -126,7 +126,7 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
     if !brief {
         points.push(("reference", String::new()));
     }
-    match adapters().first().filter(|_| !brief) {
+    match adapter::best().filter(|_| !brief) {
         Some(adapter) if adapter.hardware => {
             points.extend(substeps(scene, extent).map(|n| ("gpu", format!("substeps={n}"))));
         }

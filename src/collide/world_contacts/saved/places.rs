@@ -82,7 +82,7 @@ pub(super) fn walk_places_then<A: Archive>(
     Ok(())
 }
 
-/// Writes a place or reads it, which is one of those `known` of its body or joins them. 0 and 1 say that it is new, without and with its center
+/// Writes or reads a place. The place is one of the body's `known` ones or joins them. 0 and 1 say that it is new, without and with its center
 /// in the origin; higher numbers, how far back it is.
 fn walk_place(place: &mut Placed, known: &mut Vec<Placed>, now: Option<&Body>, columns: &mut Columns) -> Result<()> {
     let is_same = |own: &Placed| bytemuck::bytes_of(own) == bytemuck::bytes_of(place);
