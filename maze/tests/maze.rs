@@ -25,6 +25,10 @@ tests! {
     }
 }
 
+fn main() -> std::process::ExitCode {
+    common::harness::run([tests()])
+}
+
 fn reference() -> Box<dyn Backend> {
     Box::new(Reference::<f32>::new())
 }

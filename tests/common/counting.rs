@@ -1,18 +1,24 @@
-//! Counts what the program asks of the system for memory.
+//! Counts what the threads of a pool ask of the system for memory. Other tests may run beside.
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Counts what is asked of the system.
 struct Counting;
 
-static ASKED: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    /// The counter of the pool that this thread belongs to.
+    static ASKED: Cell<Option<&'static AtomicUsize>> = const { Cell::new(None) };
+}
 
 // SAFETY: does what `System` does.
 #[allow(unsafe_code)]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
+        if let Ok(Some(asked)) = ASKED.try_with(Cell::get) {
+            asked.fetch_add(1, Ordering::Relaxed);
+        }
         unsafe { System.alloc(layout) }
     }
 
@@ -24,7 +30,14 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// The calls for memory so far.
+/// Runs `work` in a pool of `threads` threads whose calls for memory are counted.
+pub fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    let asked: &'static AtomicUsize = Box::leak(Box::default());
+    let counted = move |_| ASKED.set(Some(asked));
+    rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(counted).build().expect("a pool").install(work)
+}
+
+/// The calls for memory so far of the pool that this thread belongs to.
 pub fn asked() -> usize {
-    ASKED.load(Ordering::Relaxed)
+    ASKED.get().expect("a thread of a pool whose calls are counted").load(Ordering::Relaxed)
 }

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 use std::process::ExitCode;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use drystone::{Backend, Cpu, Reference};
 use libtest_mimic::{Arguments, Trial};
@@ -12,6 +13,12 @@ use super::Open;
 use super::gpu::{self, Need};
 
 static ARGUMENTS: OnceLock<Arguments> = OnceLock::new();
+
+/// The argument with which `./tests/run` asks for the time of each test.
+const REPORT_TIME: &str = "--report-time";
+
+/// How long the tests took that ended.
+static TIMES: Mutex<Vec<(Duration, String)>> = Mutex::new(Vec::new());
 
 /// Whether this harness runs the tests of this binary.
 pub fn runs() -> bool {
@@ -34,8 +41,8 @@ impl Test {
     }
 }
 
-/// A test that fails unless its needs are met, whatever it does itself.
-fn test(name: &str, needs: &'static [Need], run: impl FnOnce() + Send + 'static) -> Test {
+/// A test that fails unless its needs are met, whatever it does itself. `module` begins with the name of the binary.
+fn test(module: &str, name: &str, needs: &'static [Need], run: impl FnOnce() + Send + 'static) -> Test {
     let value = |name| std::env::var(name).unwrap_or_default();
     let (adapter, without) = (value("DRYSTONE_ADAPTER"), value("DRYSTONE_WITHOUT"));
     let left_out = |need: &Need| {
@@ -45,65 +52,93 @@ fn test(name: &str, needs: &'static [Need], run: impl FnOnce() + Send + 'static)
         })
     };
     let left_out = needs.iter().find_map(left_out);
+    let name = module.split_once("::").map_or_else(|| name.to_owned(), |(_, module)| format!("{module}::{name}"));
+    let timed = name.clone();
     let run = move || {
+        let begin = Instant::now();
         needs.iter().for_each(|need| need.assert_met());
         run();
+        TIMES.lock().unwrap_or_else(PoisonError::into_inner).push((begin.elapsed(), timed));
         Ok(())
     };
     Test(Trial::test(name, run).with_ignored_flag(left_out.is_some()), left_out)
 }
 
 /// A test that needs no GPU.
-pub fn no_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[], run)]
+pub fn no_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[], run)]
 }
 
 /// A test that needs an adapter.
-pub fn any_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[Need::Adapter], run)]
+pub fn any_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[Need::Adapter], run)]
 }
 
 /// A test that needs an adapter with exact mode.
-pub fn exact_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[Need::Exact], run)]
+pub fn exact_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[Need::Exact], run)]
 }
 
 /// A test that needs an adapter with a clock.
-pub fn timed_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[Need::Clock], run)]
+pub fn timed_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[Need::Clock], run)]
 }
 
 /// A test that needs an adapter with exact mode and a clock.
-pub fn exact_and_timed_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[Need::Exact, Need::Clock], run)]
+pub fn exact_and_timed_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[Need::Exact, Need::Clock], run)]
 }
 
 /// A test on the contact problems of others, which is left out where `DRYSTONE_PROBLEMS` names no folder of them.
-pub fn given_problems(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[], run).if_problems_are_given()]
+pub fn given_problems(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[], run).if_problems_are_given()]
 }
 
 /// The same, and it needs an adapter.
-pub fn given_problems_and_any_gpu(name: &str, run: fn()) -> Vec<Test> {
-    vec![test(name, &[Need::Adapter], run).if_problems_are_given()]
+pub fn given_problems_and_any_gpu(module: &str, name: &str, run: fn()) -> Vec<Test> {
+    vec![test(module, name, &[Need::Adapter], run).if_problems_are_given()]
 }
 
-/// Three tests: on the reference, on the lanes of the CPU, and on the GPU.
-pub fn every_backend(name: &str, run: fn(Open)) -> Vec<Test> {
+/// Two tests: on the lanes of the CPU, and on the GPU. The lanes have the bits of the reference, as the tests of `lanes`, `determinism` and
+/// `golden` hold.
+pub fn every_backend(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
     let on = |backend: &str, needs: &'static [Need], open: Open| {
-        test(&format!("{backend}::{name}"), needs, move || run(open))
+        test(module, &format!("{name}::{backend}"), needs, move || run(open))
     };
-    vec![
-        on("reference", &[], || Box::new(Reference::<f32>::new()) as Box<dyn Backend>),
-        on("cpu", &[], || Box::new(Cpu::new())),
-        on("gpu", &[Need::Adapter], || Box::new(gpu::plain())),
-    ]
+    vec![on("cpu", &[], || Box::new(Cpu::new())), on("gpu", &[Need::Adapter], || Box::new(gpu::plain()))]
+}
+
+/// The same, and a third on the reference.
+pub fn every_backend_and_the_reference(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
+    let reference = || Box::new(Reference::<f32>::new()) as Box<dyn Backend>;
+    let on_reference = test(module, &format!("{name}::reference"), &[], move || run(reference));
+    std::iter::once(on_reference).chain(every_backend(module, name, run)).collect()
+}
+
+/// Options of a test binary that take a value.
+const WITH_VALUE: [&str; 6] = ["--test-threads", "--logfile", "--skip", "--color", "--format", "-Z"];
+
+/// The arguments as `libtest_mimic` takes them, and the names to look for: cargo's own harness takes several, this one none or one.
+fn split(given: impl Iterator<Item = String>) -> (Vec<String>, Vec<String>) {
+    let (mut options, mut names) = (Vec::new(), Vec::new());
+    for argument in given.filter(|argument| argument != REPORT_TIME) {
+        let is_value = options.last().is_some_and(|last: &String| WITH_VALUE.contains(&last.as_str()));
+        if options.is_empty() || is_value || argument.starts_with('-') { &mut options } else { &mut names }
+            .push(argument);
+    }
+    (options, names)
 }
 
 /// Runs the tests that the command line asks for.
-pub fn run(tests: Vec<Vec<Test>>) -> ExitCode {
-    let arguments = ARGUMENTS.get_or_init(Arguments::from_args);
-    let (trials, reasons): (Vec<_>, Vec<_>) = tests.into_iter().flatten().map(|Test(trial, why)| (trial, why)).unzip();
+pub fn run(tests: impl IntoIterator<Item = Vec<Test>>) -> ExitCode {
+    let (options, names) = split(std::env::args());
+    let arguments = ARGUMENTS.get_or_init(|| Arguments::from_iter(options));
+    let is_named = |test: &Test| {
+        let name = test.0.name();
+        names.is_empty() || names.iter().any(|part| if arguments.exact { name == part } else { name.contains(part) })
+    };
+    let tests = tests.into_iter().flatten().filter(is_named);
+    let (trials, reasons): (Vec<_>, Vec<_>) = tests.map(|Test(trial, why)| (trial, why)).unzip();
     if !arguments.list && !arguments.ignored && !arguments.include_ignored {
         let asked: Vec<_> =
             trials.iter().zip(&reasons).filter(|(trial, _)| !arguments.is_filtered_out(trial)).collect();
@@ -115,15 +150,23 @@ pub fn run(tests: Vec<Vec<Test>>) -> ExitCode {
             }
         }
     }
-    libtest_mimic::run(arguments, trials).exit_code()
+    let conclusion = libtest_mimic::run(arguments, trials);
+    gpu::close();
+    if std::env::args().any(|argument| argument == REPORT_TIME) {
+        for (time, name) in TIMES.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            println!("test {name} ... took <{:.3}s>", time.as_secs_f64());
+        }
+    }
+    conclusion.exit_code()
 }
 
-/// The tests of a binary with `harness = false`, by what they need.
+/// The tests of a module in a binary with `harness = false`, by what they need.
 #[allow(unused_macros)]
 macro_rules! tests {
     ($($need:ident { $($name:path,)* })*) => {
-        fn main() -> std::process::ExitCode {
-            crate::common::harness::run(vec![$($(crate::common::harness::$need(stringify!($name), $name)),*),*])
+        pub(crate) fn tests() -> Vec<$crate::common::harness::Test> {
+            let own = module_path!();
+            [$($($crate::common::harness::$need(own, stringify!($name), $name)),*),*].into_iter().flatten().collect()
         }
     };
 }

@@ -54,7 +54,7 @@ fn every_instruction_set_has_the_golden_hashes() {
         let name = cpu.adapter();
         assert_golden(&name, &rows_on(Box::new(cpu), 1));
     }
-    // What the processor lacks is said by `the_sets_that_are_tried_are_those_that_the_processor_has`, in tests/lanes.rs.
+    // What the processor lacks is said by `the_sets_that_are_tried_are_those_that_the_processor_has`, in tests/cpu/lanes.rs.
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn the_last_bit_of_a_setting_and_of_a_place_change_the_hash() {
     assert_ne!(
         same,
         pile(|_, world| {
-            let x = &mut world.bodies.last_mut().expect("a box").position.x;
+            let x = &mut world.bodies.iter_mut().next_back().expect("a box").position.x;
             *x = x.next_up();
         })
     );

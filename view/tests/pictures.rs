@@ -25,6 +25,10 @@ tests! {
     }
 }
 
+fn main() -> std::process::ExitCode {
+    common::harness::run([tests()])
+}
+
 const SIZE: (u32, u32) = (192, 128);
 /// The default angles of `drystone render`.
 const LOOK: Look = Look { yaw: 30.0_f32.to_radians(), pitch: 25.0_f32.to_radians() };
@@ -96,7 +100,7 @@ fn a_body_casts_a_shadow_on_the_ground() {
     };
     let ball = scene("sphere-plane", &["height=1"]);
     let mut far_up = ball.clone();
-    far_up.world.bodies.last_mut().expect("a ball").position.y = 1e3;
+    far_up.world.bodies.iter_mut().next_back().expect("a ball").position.y = 1e3;
     let (near, far) = (shaded(&ball), shaded(&far_up));
     assert!(near > 100 && far == 0, "{near} pixels are in shadow, {far} below a ball that is far up");
 }

@@ -66,8 +66,8 @@ fn come_and_go(simulation: &mut Simulation, step: u32) {
         let body = Body::dynamic().shape(shape).position(x, 3.0, 0.1).velocity(Vec3::new(0.0, -2.0, 0.3), Vec3::X);
         let body = world.insert(body);
         if step.is_multiple_of(18) {
-            let other = world.bodies.handles().nth(3).expect("boxes are left").index();
-            world.insert_joint(Joint::new(body.index(), Vec3::Y, other, Vec3::Y).rope(4.0));
+            let other = world.bodies.handles().nth(3).expect("boxes are left");
+            world.insert_joint(Joint::new(body, Vec3::Y, other, Vec3::Y).rope(4.0));
         }
     }
     if step % 10 == 9 {

@@ -1,0 +1,23 @@
+//! The command as a process, on the processor.
+
+/// What several modules share.
+#[path = "../../../tests/common"]
+mod common {
+    pub mod contacts;
+}
+
+mod cli;
+mod ends;
+mod fclib;
+mod hard;
+mod memory;
+mod play;
+mod readme;
+mod replay;
+mod report;
+mod rolling_plate;
+mod run_report;
+mod settings;
+mod shards;
+mod soak;
+mod solve;

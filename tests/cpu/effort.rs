@@ -1,0 +1,413 @@
+//! Each island takes the substeps that its loads ask for, and no other island pays.
+
+use crate::common::efforts;
+use drystone::config::{Method, Stabilization};
+use drystone::glam::{Quat, Vec3};
+use drystone::metrics::{in_place, rms_speed};
+use drystone::stages::backend::CheckedStep;
+use drystone::stages::compare::compare;
+use drystone::{
+    Backend, Body, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World,
+};
+
+const DT: f32 = 1.0 / 60.0;
+
+fn find(name: &str, parameters: &[&str]) -> Scene {
+    Scene::find(name, &parameters.iter().map(|p| (*p).to_owned()).collect::<Vec<_>>())
+        .expect("a scene of the catalogue")
+}
+
+fn started(scene: &Scene, config: SolverConfig) -> Simulation {
+    Simulation::new(scene.world.clone(), config.without_sleep(), Box::new(Cpu::new())).expect("a good scene")
+}
+
+fn run(simulation: &mut Simulation, steps: u32) {
+    (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
+}
+
+fn out_of_place(scene: &Scene, simulation: &Simulation) -> usize {
+    let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
+    both.filter(|(before, after)| before.kind == BodyKind::Dynamic && !in_place(before, after)).count()
+}
+
+fn most_substeps(simulation: &Simulation) -> u32 {
+    (0..simulation.world.bodies.len()).map(|body| simulation.substeps_of(body)).max().expect("a body")
+}
+
+/// The limit of the push is one of speed: a spring that it held to a force let every load above 1e4 times the mass sink through.
+#[test]
+fn a_cube_bears_one_of_a_million_times_its_mass() {
+    for (ratio, least) in [("top_ratio=1e5", 256), ("top_ratio=1e6", 1024)] {
+        let scene = find("tower", &["n=2", ratio]);
+        let mut simulation = started(&scene, SolverConfig::default());
+        run(&mut simulation, 600);
+        assert_eq!(out_of_place(&scene, &simulation), 0, "{ratio}");
+        assert!((least..=1024).contains(&most_substeps(&simulation)), "{ratio}: {}", most_substeps(&simulation));
+        let deepest = simulation.penetration().max;
+        assert!(deepest < 3e-3, "{ratio}: {deepest} m");
+    }
+}
+
+/// Walls hold a cube by 5 cm on either side: no number of substeps lessens that overlap. The cube took 1,024 substeps for ever.
+#[test]
+fn what_walls_hold_takes_no_more_substeps_than_help() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let wall = |x: f32| Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0);
+    let cube = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
+    world.add(wall(-0.65));
+    let right = world.insert(wall(0.65));
+    let mut simulation =
+        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world");
+    let mut most = [0; 10];
+    for step in 0..600 {
+        run(&mut simulation, 1);
+        most[step / 60] = most[step / 60].max(simulation.substeps_of(cube));
+    }
+    assert!(simulation.penetration().max > 0.04, "the walls hold it");
+    assert!(most[0] <= 128 && most[9] == 8, "{most:?}");
+    // The cube is free, and bears a thousand times its mass as any other does.
+    simulation.world.remove(right);
+    run(&mut simulation, 60);
+    let at = simulation.world.bodies[cube].position;
+    let load = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).density(1e6).position(at.x, at.y + 0.4, at.z);
+    simulation.world.insert(load.velocity(1e-9 * Vec3::NEG_Y, Vec3::ZERO));
+    run(&mut simulation, 240);
+    assert!(simulation.substeps_of(cube) >= 32, "{}", simulation.substeps_of(cube));
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 0.5e-3, "{deepest} m");
+}
+
+/// Flat bodies sag by a share of their thickness: coins slide apart where cubes of the same load stand.
+#[test]
+fn sixty_coins_stand() {
+    let scene = find("coins", &[]);
+    let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+    run(&mut fixed, 1200);
+    assert!(out_of_place(&scene, &fixed) > 0, "coins stand with 8 substeps");
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 1200);
+    assert_eq!(out_of_place(&scene, &simulation), 0);
+    assert!((32..=64).contains(&most_substeps(&simulation)), "{}", most_substeps(&simulation));
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 0.05e-3, "{deepest} m");
+}
+
+/// The joints of a net are many for their bodies, and none takes load from another.
+#[test]
+fn a_net_under_a_heavy_ball_keeps_its_joints_closed() {
+    let scene = find("joint-grid", &["n=16", "ratio=300"]);
+    let largest_gap = |config: SolverConfig| {
+        let mut simulation = started(&scene, config);
+        (0..360).fold(0.0_f32, |gap, _| {
+            simulation.step(DT).expect("a step");
+            gap.max(simulation.world.joint_gap())
+        })
+    };
+    let fixed = largest_gap(SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+    assert!(fixed > 10e-3, "{fixed} m with 8 substeps");
+    let gap = largest_gap(SolverConfig::default());
+    assert!(gap < 1e-3, "{gap} m");
+}
+
+/// Towers that fall with 8 substeps stand at the default, and their cubes overlap by half a millimeter at most.
+#[test]
+fn heavy_tops_stand_with_the_substeps_that_they_need() {
+    for (name, parameters, least) in [
+        ("tower", vec!["n=10", "top_ratio=1000"], 32),
+        ("tower", vec!["n=20", "top_ratio=1000"], 64),
+        ("tower", vec!["n=30", "top_ratio=100"], 16),
+        ("mass-ratio", vec!["n=20", "ratio=1000"], 64),
+    ] {
+        let mut scene = find(name, &parameters);
+        // Bodies that move begin without impulses, so that the load comes on at once.
+        for body in scene.world.bodies.iter_mut().filter(|b| b.kind == BodyKind::Dynamic) {
+            body.linear_velocity = 1e-9 * Vec3::NEG_Y;
+        }
+        let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+        run(&mut fixed, 1200);
+        assert!(out_of_place(&scene, &fixed) > 0, "{name} {parameters:?} stands with 8 substeps");
+        let mut simulation = started(&scene, SolverConfig::default());
+        run(&mut simulation, 1200);
+        let substeps = most_substeps(&simulation);
+        assert!((least..=4 * least).contains(&substeps), "{name} {parameters:?}: {substeps} substeps");
+        assert_eq!(out_of_place(&scene, &simulation), 0, "{name} {parameters:?}");
+        let deepest = simulation.penetration().max;
+        assert!(deepest < 0.5e-3, "{name} {parameters:?}: {deepest} m");
+    }
+}
+
+/// An island without need takes the same steps, to the last bit, whatever the substeps of another island are.
+#[test]
+fn an_island_without_need_keeps_its_substeps() {
+    let scene = efforts::islands();
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 120);
+    let substeps = |wanted: fn(&Body) -> bool| -> Vec<u32> {
+        let bodies =
+            simulation.world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic && wanted(b));
+        let mut all: Vec<u32> = bodies.map(|(i, _)| simulation.substeps_of(i)).collect();
+        all.dedup();
+        all
+    };
+    assert_eq!(substeps(|b| b.position.x < 15.0), [8], "the pile");
+    assert_eq!(substeps(|b| (19.0..25.0).contains(&b.position.x)), [32], "the tower under 1000 times");
+    assert_eq!(substeps(|b| (29.0..35.0).contains(&b.position.x)), [16], "the tower under 60 times");
+    assert_eq!(substeps(|b| (35.0..65.0).contains(&b.position.x)), [8], "what hangs free");
+    let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
+    run(&mut fixed, 120);
+    for (a, b) in simulation.world.bodies.iter().zip(&fixed.world.bodies).filter(|(a, _)| a.position.x < 15.0) {
+        assert_eq!((a.position, a.rotation, a.linear_velocity), (b.position, b.rotation, b.linear_velocity));
+    }
+}
+
+#[test]
+fn several_efforts_have_the_bits_of_the_reference_on_all_lanes_and_threads() {
+    let scene = efforts::islands();
+    for (threads, size) in [(1, usize::MAX), (1, 0), (3, 0), (3, usize::MAX)] {
+        for which in 0..Cpu::each().count() {
+            let lanes = || Box::new(Cpu::each().nth(which).expect("counted").dividing_above(size)) as Box<dyn Backend>;
+            let mut open = |i: usize| Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { lanes() });
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let found = pool
+                .install(|| compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 40, || ()))
+                .expect("both run");
+            assert!(found.first.is_none(), "{threads} threads, {size}: {:?}", found.first);
+            assert!(found.steps.iter().all(|d| d.bodies == 0));
+        }
+    }
+}
+
+/// Boxes that fall on each other become heaps of their own, which meet: the bits are those of the reference all the while.
+#[test]
+fn a_heap_has_the_bits_of_the_reference() {
+    let scene = find("pile", &["n=60"]);
+    let lanes = || Box::new(Cpu::new()) as Box<dyn Backend>;
+    let mut open = |i: usize| Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { lanes() });
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 120, || ()).expect("both run");
+    assert!(found.first.is_none(), "{:?}", found.first);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 120);
+    assert!(simulation.problem().masses.iter().any(|mass| mass.heap > 0.0), "no heap");
+}
+
+/// A system of joints takes the substeps of the island of its bodies, and each chain stays together with its own.
+#[test]
+fn joints_that_are_solved_at_once_belong_to_the_block_of_their_bodies() {
+    let scene = efforts::islands();
+    let mut simulation = started(&scene, SolverConfig::default());
+    for step in 0..240 {
+        let stats = simulation.step(DT).expect("a step").clone();
+        let problem = simulation.problem();
+        assert_eq!((problem.systems.len(), stats.direct_joints), (2, 62), "step {step}");
+        let systems = problem.blocks.iter().map(|block| problem.rows_of(&block.colors()[4]));
+        let of_systems: Vec<u32> = systems.clone().flatten().copied().collect();
+        assert_eq!(of_systems, [0, 1], "step {step}");
+        // The chain whose end lies begins with 32 substeps, and needs less later.
+        if step < 50 {
+            assert!(systems.filter(|own| !own.is_empty()).count() == 2, "step {step}: one block has both");
+        }
+        let gap = simulation.world.joint_gap();
+        assert!(gap < 1e-3, "step {step}: {gap} m");
+    }
+}
+
+/// A class changes without a jolt: a load comes on, stays and is taken away.
+#[test]
+fn an_island_goes_up_with_a_load_and_down_after_it() {
+    let mut scene = find("stack", &["n=6"]);
+    let load = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(3e5).position(9.0, 0.5, 0.0);
+    let load = scene.world.add(load);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 120);
+    assert_eq!(most_substeps(&simulation), 8);
+    let fastest = |simulation: &Simulation| rms_speed(&simulation.world);
+    simulation.world.bodies[load].position = drystone::glam::Vec3::new(0.0, 6.5, 0.0);
+    run(&mut simulation, 20);
+    assert!(most_substeps(&simulation) >= 16, "{} substeps under the load", most_substeps(&simulation));
+    run(&mut simulation, 280);
+    let at_rest = fastest(&simulation);
+    assert!(at_rest < 5e-3, "{at_rest} m/s under the load");
+    let under_load = most_substeps(&simulation);
+    run(&mut simulation, 300);
+    assert_eq!(most_substeps(&simulation), under_load, "a load at rest keeps the class");
+    let mut fixed = started(&scene, SolverConfig::default().with(|c| c.substeps = under_load));
+    fixed.world.clone_from(&simulation.world);
+    run(&mut fixed, 300);
+    let swiftest = |simulation: &mut Simulation| {
+        simulation.world.bodies[load].position = drystone::glam::Vec3::new(9.0, 0.5, 0.0);
+        let speeds = (0..600).map(|_| {
+            run(simulation, 1);
+            rms_speed(&simulation.world)
+        });
+        speeds.fold(0.0, f64::max)
+    };
+    let (own, of_fixed) = (swiftest(&mut simulation), swiftest(&mut fixed));
+    assert_eq!(most_substeps(&simulation), 8, "the load is gone");
+    assert!(own < 1.2 * of_fixed, "{own} m/s after the load was taken away, {of_fixed} with {under_load} substeps");
+    assert_eq!(out_of_place(&find("stack", &["n=6"]), &simulation), 0);
+}
+
+/// Towers of five cubes side by side, the top of the first 1000 times as heavy as the others, on a plate of this speed (m/s).
+fn on_a_plate(speed: f32) -> Scene {
+    let mut scene = find("tower", &["n=1"]);
+    scene.world.bodies = Default::default();
+    let plate = Body::kinematic().shape(Shape::cuboid(9.0, 0.5, 3.0)).position(0.0, -0.5, 0.0);
+    scene.world.add(plate.velocity(speed * Vec3::X, Vec3::ZERO));
+    for (x, top) in [(-3.0, 1e6), (3.0, 1e3)] {
+        for i in 0..5 {
+            let density = if i == 4 { top } else { 1e3 };
+            let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(density);
+            scene.world.add(cube.position(x, 0.5 + i as f32, 0.0).restitution(0.5));
+        }
+    }
+    scene
+}
+
+#[test]
+fn a_plate_that_moves_ties_what_lies_on_it() {
+    for (speed, tied) in [(0.0, false), (0.01, true)] {
+        let mut simulation = started(&on_a_plate(speed), SolverConfig::default());
+        run(&mut simulation, 10);
+        let [plate, heavy, light] = [0, 1, 10].map(|body| simulation.substeps_of(body));
+        assert!(heavy >= 32, "{heavy} substeps");
+        assert_eq!(light, if tied { heavy } else { 8 }, "{speed} m/s");
+        assert!(!tied || plate == heavy, "{plate} and not {heavy} substeps of the plate");
+    }
+}
+
+/// A rod that hangs from a plate which moves follows the plate's substeps, on lanes as on the reference.
+#[test]
+fn a_plate_that_moves_ties_what_hangs_from_it() {
+    let mut scene = on_a_plate(0.01);
+    let at = scene.world.bodies[0].position + Vec3::new(0.0, -3.0, 0.0);
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z);
+    let rod = scene.world.add(rod);
+    scene.world.join(Joint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 10);
+    assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(0));
+    assert!(simulation.substeps_of(rod) >= 32 && simulation.world.joint_gap() < 1e-3);
+    let mut open = |i: usize| {
+        Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<dyn Backend> } else { Box::new(Cpu::new()) })
+    };
+    let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 20, || ()).expect("both run");
+    assert!(found.first.is_none(), "{:?}", found.first);
+}
+
+/// Bodies and constraints of islands of several classes, tied by joints too, are of the same blocks.
+#[test]
+fn several_efforts_keep_what_backends_rely_on() {
+    let mut scene = efforts::islands();
+    let top = scene.world.bodies.iter().position(|b| b.position.x == 20.0 && b.position.y > 5.0).expect("a top");
+    let at = scene.world.bodies[top].position + Vec3::Y;
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y + 0.3, at.z);
+    let rod = scene.world.add(rod);
+    scene.world.join(Joint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    for step in 0..5 {
+        run(&mut simulation, 1);
+        let passes = simulation.plan().passes.clone();
+        let mut problem = simulation.problem().clone();
+        assert_eq!(problem.blocks.len(), 3);
+        let checked = CheckedStep::new(&mut problem, &passes);
+        assert!(checked.is_ok(), "step {step}: {checked:?}");
+    }
+}
+
+/// The classes of statics act from the first step, as far as the settings allow.
+#[test]
+fn settings_limit_the_classes_of_islands() {
+    let scene = on_a_plate(0.0);
+    let substeps = |change: fn(&mut SolverConfig)| {
+        let mut simulation = started(&scene, SolverConfig::default().with(change));
+        run(&mut simulation, 1);
+        most_substeps(&simulation)
+    };
+    assert!(substeps(|_| ()) >= 32);
+    assert_eq!(substeps(|c| c.max_substeps = 16), 16);
+    assert_eq!(substeps(|c| c.tolerance = 1e-3), 8);
+    assert_eq!(substeps(|c| c.method = Method::Accelerated), 8);
+    assert_eq!(substeps(|c| (c.stabilization, c.relax) = (Stabilization::Baumgarte, 0)), 8);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 1);
+    simulation.set_config(SolverConfig::default().with(|c| c.max_substeps = 16)).expect("a setting");
+    run(&mut simulation, 1);
+    assert!(most_substeps(&simulation) <= 16, "{} substeps", most_substeps(&simulation));
+}
+
+/// The first step of an island of some class is that of settings with as many substeps, to the last bit.
+#[test]
+fn the_rows_of_an_island_are_those_of_its_substeps() {
+    let mut scene = on_a_plate(0.0);
+    scene.world.bodies = scene.world.bodies.iter().take(6).cloned().collect();
+    scene.world.bodies.iter_mut().skip(1).for_each(|body| body.linear_velocity.y = -1.0);
+    let next = |config: SolverConfig| started(&scene, config).next_problem(DT).expect("a step").0;
+    let ours = next(SolverConfig::default());
+    let substeps = ours.blocks[0].substeps;
+    assert!(substeps >= 32, "{substeps} substeps");
+    let fixed = |substeps| next(SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps)));
+    let (theirs, others) = (fixed(substeps), fixed(8));
+    let approaches = |p: &StepProblem| p.points.iter().map(|p| p.approach_velocity).collect::<Vec<_>>();
+    assert_eq!(ours.blocks, theirs.blocks);
+    assert_eq!(ours.points, theirs.points);
+    assert_ne!(approaches(&ours), approaches(&others));
+    let share = 8.0 / substeps as f32;
+    assert!(ours.contacts.iter().all(|contact| contact.substep_share == share), "{:?}", ours.contacts);
+}
+
+/// A joint bears the same force before and after its island has another class.
+#[test]
+fn the_impulse_of_a_joint_follows_the_class() {
+    let mut scene = on_a_plate(0.0);
+    scene.world.bodies = scene.world.bodies.iter().take(6).cloned().collect();
+    let at = scene.world.bodies[5].position + Vec3::Y;
+    let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z + 2.0);
+    let rod = scene.world.add(rod);
+    scene.world.join(Joint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 60);
+    let (before, substeps) = (simulation.joint_impulses()[0], most_substeps(&simulation));
+    assert!(substeps >= 32 && before.length() > 0.0, "{substeps} substeps, {before} N s");
+    simulation.set_config(SolverConfig::default().without_sleep().with(|c| c.max_substeps = 8)).expect("a setting");
+    let (next, _) = simulation.next_problem(DT).expect("a step");
+    assert_eq!(next.blocks[0].substeps, 8);
+    assert_eq!(Vec3::from_array(next.joint_impulses[0].linear), before * (substeps / 8) as f32);
+}
+
+/// Boxes on several others have no preload: with it 150 boxes creep at 0.06 mm/s.
+#[test]
+fn a_heap_comes_to_rest() {
+    let scene = find("pile", &["n=150"]);
+    let mut simulation = started(&scene, SolverConfig::default());
+    run(&mut simulation, 450);
+    let heap = simulation.problem().masses.iter().filter(|mass| mass.heap > 0.0).count();
+    assert!(heap >= 100, "{heap} bodies of a heap");
+    // The preload is gone but for what decays.
+    let preloads = simulation.manifolds().map(|m| m.preload.abs()).fold(0.0, f32::max);
+    assert!(preloads < 1e-4, "{preloads} m");
+    let (speed, overlap) = (rms_speed(&simulation.world), simulation.penetration().mean);
+    assert!(speed < 1e-5 && overlap < 0.3e-3, "{speed} m/s, {overlap} m");
+}
+
+/// A sledge stands on a floor and in a wall, and so does a knob on it until it comes out first: three contacts are a heap, and two are none. The
+/// springs of the wall are stiffer then. Preloads took up most of the overlap, as if it bore a load: the sledge stopped inside of the wall.
+#[test]
+fn what_is_on_its_way_out_of_a_wall_comes_out_where_its_heap_ends() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::X)));
+    let knob = Shape::cuboid(0.1, 0.1, 0.1);
+    let sledge = Body::dynamic().shape(Shape::cuboid(1.0, 0.1, 0.5)).position(-3.0, 0.1, 0.0);
+    let sledge = world.add(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
+    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+    let is_in_heap = |simulation: &Simulation| simulation.problem().masses[sledge].heap > 0.0;
+    run(&mut simulation, 40);
+    assert!(is_in_heap(&simulation));
+    run(&mut simulation, 20);
+    let deepest = simulation.penetration().max;
+    assert!(!is_in_heap(&simulation) && deepest > 0.5, "{deepest} m");
+    run(&mut simulation, 60);
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 1e-3, "{deepest} m");
+}

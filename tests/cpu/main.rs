@@ -1,0 +1,51 @@
+//! Tests that need a processor and nothing else.
+
+/// What several modules share.
+#[path = "../common"]
+mod common {
+    pub mod contacts;
+    pub mod counting;
+    pub mod efforts;
+    #[cfg(feature = "serde")]
+    pub mod settings;
+
+    #[cfg(feature = "gpu")]
+    pub use drystone::stages::conform::{passes as kernels, random};
+}
+
+mod allocations;
+mod changes;
+#[cfg(feature = "serde")]
+mod checked;
+mod compare;
+mod contacts;
+mod derivation;
+mod determinism;
+mod drops;
+mod effort;
+mod forged;
+mod graph;
+mod inertia;
+#[cfg(feature = "serde")]
+mod lanes;
+mod newton;
+mod oracle;
+mod plan;
+#[cfg(feature = "gpu")]
+mod queries;
+mod recording;
+mod residuals;
+mod rest;
+mod rollback;
+mod rolling;
+mod rules;
+mod saved;
+#[cfg(feature = "gpu")]
+mod shaders;
+mod short_substeps;
+mod sleep;
+mod slots;
+mod symmetry;
+mod thin_bars;
+mod world;
+mod worlds;

@@ -1,0 +1,51 @@
+//! Runs the examples that print what happens.
+
+#[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/queries.rs"]
+mod queries;
+#[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/server_loop.rs"]
+mod server_loop;
+#[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/spawn_and_remove.rs"]
+mod spawn_and_remove;
+
+fn lines(run: impl FnOnce(&mut dyn FnMut(String)) -> drystone::Result<()>) -> Vec<String> {
+    let mut lines = Vec::new();
+    run(&mut |line| lines.push(line)).expect("the example runs");
+    lines.iter().for_each(|line| println!("{line}"));
+    lines
+}
+
+#[test]
+fn the_example_of_queries_prints_where_bodies_are() {
+    let lines = lines(|print| queries::run(print));
+    let expected = [
+        "-2 m: 0.80 m high, ball",
+        "0 m: 0.00 m high, floor",
+        "2 m: 3.00 m high, crate 2",
+        "the walker gets 1.10 m far, to crate 0",
+        "0.60 m to ball",
+    ];
+    assert_eq!(lines[..5], expected);
+    assert_eq!(lines.iter().filter(|line| line.starts_with("the blast pushes crate")).count(), 2, "{lines:?}");
+}
+
+#[test]
+fn the_fountain_uses_the_places_of_its_balls_again() {
+    let lines = lines(|print| spawn_and_remove::run(print));
+    assert_eq!(lines.len(), 5);
+    assert!(lines[..4].iter().all(|line| line.contains(" in 12") && !line.contains("at 0.")), "{lines:?}");
+    assert_eq!(lines[4], "gone: true, place used again: true");
+}
+
+#[test]
+fn the_server_sends_the_same_states_whatever_the_rounds() {
+    let (all, first) = (lines(|send| server_loop::run(180, send)), lines(|send| server_loop::run(90, send)));
+    assert_eq!((all.len(), first.len()), (6, 3));
+    assert_eq!(all[..3], first);
+    assert!(all.iter().zip(1..).all(|(line, k)| line.starts_with(&format!("{{\"step\":{},", 30 * k))), "{all:?}");
+    assert!(all.iter().all(|line| line.matches("\"player\":").count() == 2));
+    let players = |line: &str| line.split_once("players").map(|parts| parts.1.to_owned()).expect("players");
+    assert!(all[..4].windows(2).all(|pair| players(&pair[0]) != players(&pair[1])), "nothing moves");
+}

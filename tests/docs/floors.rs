@@ -1,0 +1,126 @@
+//! The house has floors: a module names only modules of its own floor or of lower ones.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The modules of the library on each floor, the ground floor first.
+const LIBRARY: &[&[&str]] = &[
+    &["math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
+    &["world", "config", "preset"],
+    &["collide", "graph"],
+    &["effort", "queries", "load", "scenes"],
+    &["problem", "contacts"],
+    &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
+    &["backend", "solver"],
+    &["simulation"],
+    &["compare", "recording"],
+    &["conform"],
+    &["stages"],
+];
+
+/// The modules of the maze game, above the library.
+const MAZE: &[&[&str]] = &[&["map", "script"], &["board"], &["game"], &["pilot"]];
+
+/// The modules of pictures, above the library and the maze game.
+const VIEW: &[&[&str]] = &[
+    &["poses"],
+    &["bounds", "colors"],
+    &["camera"],
+    &["mesh", "overlay", "pipeline"],
+    &["renderer"],
+    &["canvas"],
+    &["show"],
+    &["eye", "labyrinth", "live", "sight"],
+    &["film", "live_show"],
+];
+
+/// The modules of the command, above all others.
+const COMMAND: &[&[&str]] =
+    &[&["adapter", "files", "settings"], &["hard"], &["report", "soak"], &["view"], &["commands"]];
+
+const LIB: &str = include_str!("../../src/lib.rs");
+
+/// The packages: the folder of each, the text of its root, its floors.
+const PACKAGES: [(&str, &str, &[&[&str]]); 4] = [
+    ("src", LIB, LIBRARY),
+    ("maze/src", include_str!("../../maze/src/lib.rs"), MAZE),
+    ("view/src", include_str!("../../view/src/lib.rs"), VIEW),
+    ("cli/src", include_str!("../../cli/src/lib.rs"), COMMAND),
+];
+
+fn floor(floors: &[&[&str]], module: &str) -> Option<usize> {
+    floors.iter().position(|modules| modules.contains(&module))
+}
+
+fn identifier(text: &str) -> &str {
+    &text[..text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len())]
+}
+
+/// What the crate's root gives on under a shorter name, and the module that it comes from.
+fn re_exports() -> BTreeMap<&'static str, &'static str> {
+    let lines = LIB.split(';').filter_map(|statement| statement.trim_start().strip_prefix("pub use "));
+    let names = |line: &'static str| {
+        let last = line.rsplit("::").next().unwrap_or(line);
+        last.split(|c: char| !c.is_alphanumeric()).filter(|name| !name.is_empty()).map(move |n| (n, identifier(line)))
+    };
+    lines.flat_map(names).collect()
+}
+
+/// The modules of its own package that the code of `text` names, whatever its comments say.
+fn named_modules(text: &str) -> Vec<&str> {
+    let code = text.lines().map(|line| line.split("//").next().unwrap_or(line));
+    let names = code.flat_map(|line| line.split("crate::").skip(1).map(identifier));
+    let exports = re_exports();
+    names.map(|name| exports.get(name).copied().unwrap_or(name)).collect()
+}
+
+/// Each module that `text`, a file of `module`, names against the rule.
+fn too_high(floors: &[&[&str]], module: &str, text: &str) -> Vec<String> {
+    let own = floor(floors, module).unwrap_or_else(|| panic!("{module} is on no floor"));
+    let named = named_modules(text).into_iter().filter(|name| floor(floors, name).is_none_or(|f| f > own));
+    named.map(|name| format!("{module} names {name}")).collect()
+}
+
+fn source_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    entries.flat_map(|path| if path.is_dir() { source_files(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn a_module_names_only_modules_of_its_own_floor_or_lower_ones() {
+    let mut wrong = Vec::new();
+    for (folder, _, floors) in PACKAGES {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        for path in source_files(&root).into_iter().filter(|path| path.extension().is_some_and(|e| e == "rs")) {
+            let inside = path.strip_prefix(&root).expect("found there");
+            let module = inside.iter().next().expect("a name").to_string_lossy();
+            let module = module.trim_end_matches(".rs");
+            if !["lib", "main"].contains(&module) {
+                wrong.extend(too_high(floors, module, &std::fs::read_to_string(&path).expect("a text")));
+            }
+        }
+    }
+    assert_eq!(wrong, [""; 0]);
+}
+
+#[test]
+fn every_module_is_on_one_floor() {
+    for (_, root, floors) in PACKAGES {
+        let lines = root.lines().map(|line| line.strip_prefix("pub ").unwrap_or(line));
+        let mut modules: Vec<_> = lines.filter_map(|line| line.strip_prefix("mod ")).map(identifier).collect();
+        let mut housed = floors.concat();
+        modules.sort_unstable();
+        housed.sort_unstable();
+        assert_eq!(housed, modules);
+    }
+}
+
+#[test]
+fn a_module_that_names_a_higher_one_is_found() {
+    let too_high = |module, text| too_high(LIBRARY, module, text);
+    assert_eq!(too_high("graph", "use crate::simulation::Simulation;"), ["graph names simulation"]);
+    assert_eq!(too_high("graph", "fn f() -> crate::Simulation {}"), ["graph names simulation"]);
+    assert_eq!(too_high("math", "use crate::{world::World, error::Error};").len(), 1);
+    assert_eq!(too_high("graph", "/// As in [`Simulation`](crate::simulation::Simulation)."), [""; 0]);
+    assert_eq!(too_high("simulation", "use crate::graph::Edge; use crate::Error;"), [""; 0]);
+}

@@ -1,0 +1,488 @@
+//! Joints of all kinds against closed forms.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+use drystone::glam::{Quat, Vec3};
+use drystone::{Axis, Body, Joint, Linear, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
+
+use crate::common::Open;
+
+const G: f32 = 9.81;
+const DT: f32 = 1.0 / 240.0;
+
+tests! {
+    no_gpu {
+        impulses_of_axes_follow_their_joint_and_its_substeps,
+    }
+    every_backend {
+        a_damped_spring_loses_the_share_that_its_ratio_says,
+        a_drive_pushes_no_axis_beyond_its_limit,
+        a_fixed_cantilever_keeps_its_angle,
+        a_generic_joint_moves_as_the_kind_that_it_describes,
+        a_hinge_swings_with_the_period_of_a_physical_pendulum,
+        a_joint_whose_axes_are_all_free_holds_nothing,
+        a_limit_stands_where_it_is_however_far_the_other_one_is,
+        a_limited_hinge_stops_at_its_limits,
+        a_motor_is_no_stronger_than_its_largest_torque,
+        a_motor_reaches_its_speed,
+        a_rod_keeps_its_length,
+        a_rope_is_slack_and_then_holds,
+        a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine,
+        a_slider_slides_as_on_an_incline_and_stops_at_its_limit,
+        a_spring_past_pi_pulls_back_the_shorter_way,
+        a_spring_swings_with_its_frequency,
+        a_turning_spring_bears_a_load_at_the_angle_that_its_stiffness_says,
+        bodies_on_a_sliding_joint_keep_their_momentum,
+    }
+}
+
+fn simulate(world: World, open: Open) -> Simulation {
+    Simulation::new(world, SolverConfig::default().without_sleep(), open()).unwrap()
+}
+
+fn steps(simulation: &mut Simulation, seconds: f32, mut each: impl FnMut(f32, &World)) {
+    for step in 1..=(seconds / DT).round() as u32 {
+        simulation.step(DT).unwrap();
+        each(step as f32 * DT, &simulation.world);
+    }
+}
+
+fn angle(world: &World) -> f32 {
+    world.joint_motion(&world.joints[0]).position[3]
+}
+
+fn place(world: &World) -> f32 {
+    world.joint_motion(&world.joints[0]).position[0]
+}
+
+/// The mean time between two passages of zero in the same direction (s).
+fn period(samples: &[(f32, f32)]) -> f32 {
+    let up = samples.windows(2).filter(|pair| pair[0].1 < 0.0 && pair[1].1 >= 0.0);
+    let times: Vec<f32> = up.map(|p| p[0].0 + DT * p[0].1 / (p[0].1 - p[1].1)).collect();
+    assert!(times.len() > 2, "{} passages", times.len());
+    (times[times.len() - 1] - times[0]) / (times.len() - 1) as f32
+}
+
+/// A rod of 1 m and 2 kg that hangs from a hinge about Z, turned by an angle. The hinge is `aside` of the rod: its locks bear a moment.
+fn hung_rod(turned: f32, aside: f32) -> (World, Joint) {
+    let mut world = World::new();
+    let turn = Quat::from_rotation_z(turned);
+    let anchor = Vec3::new(0.0, 0.5, aside);
+    let center = turn * -anchor;
+    let rod = Body::dynamic().shape(Shape::cuboid(0.02, 0.5, 0.02)).total_mass(2.0).rotation(turn);
+    let rod = world.add(rod.position(center.x, center.y, center.z));
+    (world, Joint::to_world(rod, anchor, Vec3::ZERO).hinge(Vec3::Z))
+}
+
+fn a_hinge_swings_with_the_period_of_a_physical_pendulum(open: Open) {
+    for amplitude in [0.05, 1.0] {
+        let (mut world, hinge) = hung_rod(amplitude, 0.3);
+        world.join(hinge);
+        let mut simulation = simulate(world, open);
+        let mut samples = Vec::new();
+        let mut tilt: f32 = 0.0;
+        steps(&mut simulation, 8.0, |t, world| {
+            samples.push((t, angle(world)));
+            tilt = tilt.max((world.bodies[0].rotation * Vec3::Z).distance(Vec3::Z));
+        });
+        let inertia = (1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25;
+        let large = 1.0 + amplitude.powi(2) / 16.0 + 11.0 * amplitude.powi(4) / 3072.0;
+        let exact = TAU * (inertia / (0.5 * G)).sqrt() * large;
+        let measured = period(&samples);
+        assert!((measured / exact - 1.0).abs() < 2e-3, "{amplitude}: {measured} s, exact {exact} s");
+        // The weight of 2 kg at 0.3 m pulls the axis of the hinge down.
+        assert!(tilt < 2e-3, "{tilt}");
+        assert!(simulation.world.joint_gap() < 1e-3);
+    }
+}
+
+fn a_limited_hinge_stops_at_its_limits(open: Open) {
+    let (mut world, hinge) = hung_rod(1.2, 0.0);
+    world.join(hinge.limited(-0.4, 1.3));
+    let mut simulation = simulate(world, open);
+    let (mut least, mut most) = (0.0_f32, 0.0_f32);
+    steps(&mut simulation, 1.0, |_, world| (least, most) = (least.min(angle(world)), most.max(angle(world))));
+    assert!((-0.405..-0.395).contains(&least), "{least}");
+    let rod = &mut simulation.world.bodies[0];
+    rod.angular_velocity = Vec3::new(0.0, 0.0, 9.0);
+    rod.linear_velocity = rod.angular_velocity.cross(rod.position);
+    steps(&mut simulation, 1.0, |_, world| most = most.max(angle(world)));
+    assert!((1.295..1.305).contains(&most), "{most}");
+    // It does not bounce, and rests at the lower limit if that is above the lowest place.
+    simulation.world.joints[0] = simulation.world.joints[0].limited(0.3, 1.3);
+    steps(&mut simulation, 4.0, |_, _| {});
+    assert!((angle(&simulation.world) - 0.3).abs() < 1e-3, "{}", angle(&simulation.world));
+    let torque = simulation.joint_angular_impulses()[0].z.abs() / (DT / simulation.config().substeps as f32);
+    let exact = 2.0 * G * 0.5 * 0.3_f32.sin();
+    assert!((torque / exact - 1.0).abs() < 0.02, "{torque} N m, exact {exact}");
+}
+
+fn a_motor_reaches_its_speed(open: Open) {
+    let (mut world, hinge) = hung_rod(0.0, 0.0);
+    world.join(hinge.motor(3.0, 40.0));
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 0.5, |_, _| {});
+    let (mut slowest, mut fastest, begin) = (f32::MAX, 0.0_f32, angle(&simulation.world));
+    let mut turned = 0.0;
+    let mut before = begin;
+    steps(&mut simulation, 3.0, |_, world| {
+        let speed = world.bodies[0].angular_velocity.z;
+        (slowest, fastest) = (slowest.min(speed), fastest.max(speed));
+        turned += (angle(world) - before + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+        before = angle(world);
+    });
+    assert!(slowest > 2.999 && fastest < 3.001, "{slowest} to {fastest} rad/s");
+    assert!((turned - 9.0).abs() < 0.01, "{turned} rad");
+}
+
+/// Slowly lifted until the weight holds against the torque.
+fn a_motor_is_no_stronger_than_its_largest_torque(open: Open) {
+    let torque = 5.0;
+    let (mut world, hinge) = hung_rod(0.3, 0.0);
+    world.join(hinge.motor(0.05, torque));
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 9.0, |_, _| {});
+    let (mut sum, mut count) = (0.0, 0);
+    steps(&mut simulation, 6.0, |_, world| (sum, count) = (sum + angle(world), count + 1));
+    let (stalled, exact) = (sum / count as f32, (torque / (2.0 * G * 0.5)).asin());
+    assert!((stalled - exact).abs() < 5e-3, "{stalled} rad, exact {exact}");
+    // Half of what it has lifted is too heavy for half of the torque.
+    simulation.world.joints[0] = simulation.world.joints[0].motor(0.05, 0.0);
+    steps(&mut simulation, 1.0, |_, _| {});
+    assert!(angle(&simulation.world) < 0.3);
+}
+
+fn a_slider_slides_as_on_an_incline_and_stops_at_its_limit(open: Open) {
+    let slope = 0.5_f32;
+    let mut world = World::new();
+    let down = Vec3::new(slope.cos(), -slope.sin(), 0.0);
+    let cart = world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)));
+    // The anchor is aside of the center: locks of angles bear a moment.
+    let anchor = Vec3::new(0.0, 0.1, 0.2);
+    world.join(Joint::to_world(cart, anchor, anchor).slider(down).limited(-0.5, 2.0));
+    let mut simulation = simulate(world, open);
+    let along = 0.5 * G * slope.sin();
+    steps(&mut simulation, 0.8, |t, world| {
+        let (place, exact) = (place(world), along * t * t);
+        // Velocities stand half a substep ahead.
+        assert!((place - exact).abs() < 1e-3 + 0.002 * exact, "{t} s: {place} m, exact {exact}");
+        let aside = world.bodies[0].position - down * world.bodies[0].position.dot(down);
+        assert!(aside.length() < 1e-3, "{aside}");
+    });
+    let mut most: f32 = 0.0;
+    steps(&mut simulation, 1.0, |_, world| most = most.max(place(world)));
+    assert!((1.999..2.002).contains(&most), "{most}");
+    let speed = simulation.world.bodies[0].linear_velocity.length();
+    assert!(speed < 1e-3, "{speed} m/s at the limit");
+    assert!(simulation.world.bodies[0].rotation.angle_between(Quat::IDENTITY) < 1e-3);
+}
+
+/// A ball of 3 kg on a spring below the origin, 0.1 m above its place at rest.
+fn hung_ball(frequency: f32, damping_ratio: f32, open: Open) -> (Simulation, f32) {
+    let mut world = World::new();
+    let sag = G / (TAU * frequency).powi(2);
+    let ball = Body::dynamic().shape(Shape::ball(0.1)).total_mass(3.0);
+    let ball = world.add(ball.position(0.0, -1.0 - sag + 0.1, 0.0));
+    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).elastic(1.0, frequency, damping_ratio));
+    (simulate(world, open), 1.0 + sag)
+}
+
+fn a_spring_swings_with_its_frequency(open: Open) {
+    for frequency in [1.0, 4.0] {
+        let (mut simulation, rest) = hung_ball(frequency, 0.0, open);
+        let mut samples = Vec::new();
+        steps(&mut simulation, 6.0, |t, world| samples.push((t, rest - place(world))));
+        let measured = period(&samples);
+        assert!((measured * frequency - 1.0).abs() < 1e-3, "{frequency} Hz: {measured} s");
+        // Without a damper it keeps its energy.
+        let late = samples[samples.len() / 2..].iter().map(|s| s.1).fold(0.0, f32::max);
+        assert!((late / 0.1 - 1.0).abs() < 0.02, "{frequency} Hz: {late} m");
+    }
+}
+
+fn a_damped_spring_loses_the_share_that_its_ratio_says(open: Open) {
+    let (frequency, ratio) = (2.0, 0.1_f32);
+    let (mut simulation, rest) = hung_ball(frequency, ratio, open);
+    let mut samples = Vec::new();
+    steps(&mut simulation, 3.0, |t, world| samples.push((t, rest - place(world))));
+    let turns = (1.0 - ratio * ratio).sqrt();
+    let peak = |from: f32, to: f32| {
+        samples.iter().filter(|s| (from..to).contains(&(s.0 * frequency * turns))).map(|s| s.1).fold(0.0, f32::max)
+    };
+    let (first, third) = (peak(0.5, 1.5), peak(2.5, 3.5));
+    let exact = (-2.0 * TAU * ratio / turns).exp();
+    assert!((third / first / exact - 1.0).abs() < 0.02, "{} of the swing is left, exact {exact}", third / first);
+}
+
+fn a_rope_is_slack_and_then_holds(open: Open) {
+    let mut world = World::new();
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.2, 0.0));
+    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rope(1.0));
+    let mut simulation = simulate(world, open);
+    let mut longest: f32 = 0.0;
+    steps(&mut simulation, 4.0, |t, world| {
+        if t < 0.35 {
+            let exact = -0.2 - 0.5 * G * t * t;
+            assert!((world.bodies[0].position.y - exact).abs() < 0.01, "{t} s: {}", world.bodies[0].position);
+        }
+        longest = longest.max(place(world));
+    });
+    assert!((0.999..1.002).contains(&longest), "{longest}");
+}
+
+/// Its period is that of a mathematical pendulum: the rod pulls at the center of the ball.
+fn a_rod_keeps_its_length(open: Open) {
+    let mut world = World::new();
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.4, 0.0));
+    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rod(0.5));
+    let mut simulation = simulate(world, open);
+    let mut samples = Vec::new();
+    steps(&mut simulation, 8.0, |t, world| {
+        samples.push((t, world.bodies[0].position.x));
+        assert!((place(world) - 0.5).abs() < 1e-3, "{t} s: {} m", place(world));
+    });
+    let amplitude = 0.6_f32.asin();
+    let large = 1.0 + amplitude.powi(2) / 16.0 + 11.0 * amplitude.powi(4) / 3072.0;
+    let exact = TAU * (0.5 / G).sqrt() * large;
+    let measured = period(&samples);
+    assert!((measured / exact - 1.0).abs() < 2e-3, "{measured} s, exact {exact} s");
+}
+
+/// Two beams of 1 m, one fixed to the world and the other to its end.
+fn a_fixed_cantilever_keeps_its_angle(open: Open) {
+    let mut world = World::new();
+    let beam = |x: f32| Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.1)).total_mass(10.0).position(x, 0.0, 0.0);
+    let (near, far) = (world.add(beam(0.5)), world.add(beam(1.5)));
+    let end = 0.5 * Vec3::X;
+    world.join(Joint::to_world(near, -end, Vec3::ZERO).fixed());
+    world.join(Joint::new(far, -end, near, end).fixed());
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 3.0, |_, _| {});
+    for (body, place) in [(near, 0.5), (far, 1.5)] {
+        let body = &simulation.world.bodies[body];
+        let turned = body.rotation.angle_between(Quat::IDENTITY);
+        assert!(turned < 2e-3, "{turned} rad");
+        assert!(body.position.distance(place * Vec3::X) < 3e-3, "{}", body.position);
+    }
+    // The wall bears the weight of both at 1 m.
+    let moment = simulation.joint_angular_impulses()[0].length() / (DT / simulation.config().substeps as f32);
+    assert!((moment / (20.0 * G) - 1.0).abs() < 0.02, "{moment} N m");
+}
+
+fn a_turning_spring_bears_a_load_at_the_angle_that_its_stiffness_says(open: Open) {
+    let (frequency, inertia) = (3.0, 2.0 * ((1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25));
+    let (mut world, hinge) = hung_rod(FRAC_PI_2, 0.0);
+    world.join(hinge.spring(FRAC_PI_2, frequency, 1.0));
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 3.0, |_, _| {});
+    // Alone the spring sees the inertia of the rod about its center, and the ball joint adds the rest: see the effective mass of an axis.
+    let about_center = 2.0 * (1.0 + 0.04_f32.powi(2)) / 12.0;
+    let stiffness = about_center * (TAU * frequency).powi(2);
+    let sagged = FRAC_PI_2 - angle(&simulation.world);
+    let exact = 2.0 * G * 0.5 * sagged.cos() / stiffness;
+    assert!((sagged / exact - 1.0).abs() < 0.03, "{sagged} rad, exact {exact}, {inertia}");
+}
+
+fn a_generic_joint_moves_as_the_kind_that_it_describes(open: Open) {
+    let mut world = World::new();
+    let mut carts = Vec::new();
+    for z in 0..2 {
+        let at = Vec3::new(0.0, 0.0, 3.0 * z as f32);
+        let cart = world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)).position(at.x, at.y, at.z));
+        let joint = Joint::to_world(cart, Vec3::ZERO, at);
+        let fall = Axis::limited(-1.0, 5.0);
+        world.join(match z {
+            0 => joint.slider(Vec3::Y).limited(-1.0, 5.0),
+            _ => joint.generic([Axis::LOCKED, fall, Axis::LOCKED], [Axis::LOCKED; 3]),
+        });
+        carts.push(cart);
+    }
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 1.0, |t, world| {
+        let [one, other] = [0, 1].map(|i| world.bodies[carts[i]].position.y);
+        assert!((one - other).abs() < 1e-5, "{t} s: {one} {other}");
+        assert!((one - (-0.5 * G * t * t).max(-1.0)).abs() < 0.02, "{t} s: {one}");
+    });
+    assert!(matches!(simulation.world.joints[1].linear, Linear::Axes(_)));
+}
+
+fn bodies_on_a_sliding_joint_keep_their_momentum(open: Open) {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    let a = world.add(Body::dynamic().shape(Shape::cuboid(0.4, 0.1, 0.1)).position(0.2, 0.5, 0.0));
+    let b = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.3)));
+    world.bodies[a].linear_velocity = Vec3::new(0.6, 0.0, 0.4);
+    world.bodies[b].angular_velocity = Vec3::new(0.0, 0.5, 1.0);
+    world.join(Joint::new(a, Vec3::ZERO, b, 0.5 * Vec3::Y).slider(Vec3::X));
+    let (linear, angular) = (world.linear_momentum(), world.angular_momentum());
+    let mut simulation = simulate(world, open);
+    let mut first = None;
+    steps(&mut simulation, 2.0, |_, world| {
+        // In the first step the joint makes one motion of two.
+        let energy = *first.get_or_insert(world.kinetic_energy());
+        assert!((world.kinetic_energy() / energy - 1.0).abs() < 0.02, "{} J of {energy}", world.kinetic_energy());
+    });
+    let world = &simulation.world;
+    assert!(place(world) > 0.5, "{}", place(world));
+    assert!(world.linear_momentum().distance(linear) < 1e-3 * linear.length(), "{}", world.linear_momentum());
+    assert!(world.angular_momentum().distance(angular) < 5e-3 * angular.length(), "{}", world.angular_momentum());
+    assert!(world.joint_gap() < 2e-3, "{}", world.joint_gap());
+}
+
+/// r'' = w² r on a rod that turns at w, and the axes of the joint turn with the rod: by 0.1 rad in a step.
+fn a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine(open: Open) {
+    const SPIN: f32 = 25.0;
+    const BEGIN: f32 = 0.5;
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    let bead = Body::dynamic().shape(Shape::ball(0.05)).position(BEGIN, 0.0, 0.0);
+    let bead = world.add(bead.velocity(Vec3::NEG_Z * SPIN * BEGIN, Vec3::Y * SPIN));
+    let rod = Body::kinematic().shape(Shape::cuboid(3.0, 0.01, 0.01));
+    let rod = world.add(rod.velocity(Vec3::ZERO, Vec3::Y * SPIN));
+    world.join(Joint::new(bead, Vec3::ZERO, rod, Vec3::ZERO).slider(Vec3::X));
+    let mut simulation = simulate(world, open);
+    let mut worst = 0.0_f32;
+    steps(&mut simulation, 0.075, |time, world| {
+        let exact = BEGIN * (SPIN * time).cosh();
+        worst = worst.max((place(world) / exact - 1.0).abs());
+        println!("{time} s: {} of {exact} m, gap {}", place(world), world.joint_gap());
+    });
+    assert!(worst < 0.02, "{worst}");
+}
+
+/// Two rods that rest on their limits; the joint of the first goes.
+fn impulses_of_axes_follow_their_joint_and_its_substeps() {
+    let mut world = World::new();
+    let mut joints = Vec::new();
+    for z in [0.0, 2.0] {
+        let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.02)).total_mass(2.0).position(0.5, 0.0, z);
+        let rod = world.add(rod);
+        let hinge = Joint::to_world(rod, -0.5 * Vec3::X, z * Vec3::Z).hinge(Vec3::Z);
+        joints.push(world.insert_joint(hinge.limited(0.0, 1.0)));
+    }
+    let mut simulation = simulate(world, || Box::new(Reference::<f32>::new()));
+    steps(&mut simulation, 0.5, |_, _| {});
+    let held = simulation.joint_angular_impulses()[1];
+    let weight = 2.0 * G * 0.5 * DT / simulation.config().substeps as f32;
+    assert!((held.z.abs() / weight - 1.0).abs() < 0.01, "{held} N m s of {weight}");
+    simulation.world.remove_joint(joints[0]).expect("a joint");
+    let of_limit = |problem: &StepProblem| {
+        let axis = problem.axes.iter().position(|axis| axis.left > -1.0).expect("a limit");
+        assert_eq!((problem.joints.len(), problem.axes.len()), (1, 3));
+        problem.joint_impulses[1 + axis].linear[0].abs()
+    };
+    let (problem, _) = simulation.next_problem(DT).unwrap();
+    assert_eq!(of_limit(&problem), held.z.abs());
+    // Half as long substeps bear the force with half of the impulse.
+    let (problem, _) = simulation.next_problem(0.5 * DT).unwrap();
+    assert_eq!(of_limit(&problem), 0.5 * held.z.abs());
+    // With a motor it has another list of axes.
+    simulation.world.joints[0] = simulation.world.joints[0].motor(0.0, 1.0);
+    let (problem, _) = simulation.next_problem(DT).unwrap();
+    assert!(problem.joint_impulses[1..].iter().all(|row| row.linear[0] == 0.0));
+}
+
+/// A rod of 40 g on a hinge, and a ball of 1 kg on a slider, without gravity.
+fn driven(is_hinge: bool, drive: impl Fn(Joint) -> Joint, open: Open) -> Simulation {
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    let body = Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1));
+    let joint = if is_hinge {
+        let rod = world.add(body.density(1.0).position(0.0, 0.5, 0.0));
+        Joint::to_world(rod, Vec3::Y * -0.5, Vec3::ZERO).hinge(Vec3::Z)
+    } else {
+        let sled = world.add(body.total_mass(1.0));
+        Joint::to_world(sled, Vec3::ZERO, Vec3::ZERO).slider(Vec3::X)
+    };
+    world.join(drive(joint));
+    simulate(world, open)
+}
+
+fn a_drive_pushes_no_axis_beyond_its_limit(open: Open) {
+    for is_hinge in [true, false] {
+        let at = |world: &World| if is_hinge { angle(world) } else { place(world) };
+        for sign in [1.0, -1.0] {
+            for load in [1.0, 100.0, 1000.0] {
+                let mut simulation = driven(is_hinge, |j| j.motor(sign * 1.5, load).limited(-1.0, 1.0), open);
+                steps(&mut simulation, 2.0, |_, _| {});
+                let beyond = sign * at(&simulation.world) - 1.0;
+                assert!(beyond.abs() < 1e-3, "a motor of {load}: {beyond} beyond its limit");
+            }
+            for frequency in [2.0, 20.0] {
+                let mut simulation =
+                    driven(is_hinge, |j| j.spring(sign * 2.5, frequency, 1.0).limited(-1.0, 1.0), open);
+                steps(&mut simulation, 2.0, |_, _| {});
+                let beyond = sign * at(&simulation.world) - 1.0;
+                assert!(beyond.abs() < 1e-3, "a spring of {frequency} Hz: {beyond} beyond its limit");
+            }
+        }
+    }
+}
+
+/// A body on a generic joint that leaves the angle about the first axis free, as a hinge does.
+fn a_spring_past_pi_pulls_back_the_shorter_way(open: Open) {
+    for target in [2.5, 3.0, -2.5] {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        let body = world.add(Body::dynamic().density(1.0).shape(Shape::cuboid(0.1, 0.5, 0.1)));
+        let angular = [Axis::FREE.spring(target, 5.0, 0.2, f32::MAX), Axis::LOCKED, Axis::LOCKED];
+        world.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], angular));
+        let mut simulation = simulate(world, open);
+        steps(&mut simulation, 4.0, |_, _| {});
+        let motion = simulation.world.joint_motion(&simulation.world.joints[0]);
+        let off = motion.position[3] - target;
+        assert!(off.abs() < 1e-3, "target {target}: {off} rad off");
+        assert!(motion.speed[3].abs() < 1e-2, "target {target}: {} rad/s", motion.speed[3]);
+    }
+}
+
+fn a_limit_stands_where_it_is_however_far_the_other_one_is(open: Open) {
+    for far in [1e3, 1e6, 1e9, f32::INFINITY] {
+        for (min, max, sign) in [(-far, 5.0, 1.0), (-5.0, far, -1.0)] {
+            let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+            let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X * 3.0 * sign, Vec3::ZERO));
+            world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).slider(Vec3::X).limited(min, max));
+            let mut simulation = simulate(world, open);
+            steps(&mut simulation, 3.0, |_, _| {});
+            let at = sign * place(&simulation.world);
+            assert!((at - 5.0).abs() < 1e-4, "limits {min} and {max}: stops at {at}");
+            assert_eq!(simulation.world.joint_motion(&simulation.world.joints[0]).position[1].abs(), 0.0);
+        }
+    }
+    // Without a limit on either side it goes on.
+    let mut simulation = driven(false, |j| j.motor(1.0, 1e3).limited(f32::NEG_INFINITY, f32::INFINITY), open);
+    steps(&mut simulation, 1.0, |_, _| {});
+    assert!((place(&simulation.world) - 1.0).abs() < 0.01, "{}", place(&simulation.world));
+}
+
+/// A ball on a joint to the world falls, and two balls on one fly into each other without a blow, whether or not another joint has axes.
+fn a_joint_whose_axes_are_all_free_holds_nothing(open: Open) {
+    for (with_axes, is_distance, collide) in
+        [(false, false, false), (true, false, false), (false, true, false), (false, false, true)]
+    {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        let ball = |x: f32, v: f32| {
+            Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0).velocity(Vec3::X * v, Vec3::ZERO)
+        };
+        let [a, b] = [(-1.0, 1.0), (1.0, -1.0)].map(|(x, v)| world.add(ball(x, v)));
+        let free = |joint: Joint| match is_distance {
+            true => joint.at_distance(Axis::FREE),
+            false => joint.generic([Axis::FREE; 3], [Axis::FREE; 3]),
+        };
+        let pair = free(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO));
+        world.join(if collide { pair.colliding() } else { pair });
+        world.join(free(Joint::to_world(a, Vec3::ZERO, Vec3::ZERO)));
+        if with_axes {
+            let c = world.add(ball(9.0, 0.0));
+            world.join(Joint::to_world(c, Vec3::ZERO, Vec3::X * 9.0).hinge(Vec3::Z));
+        }
+        let mut simulation = simulate(world, open);
+        let mut rows = 0;
+        steps(&mut simulation, 1.0, |_, _| {});
+        rows += simulation.step(DT).unwrap().joints;
+        assert_eq!(rows, usize::from(with_axes));
+        let [a, b] = [0, 1].map(|i| simulation.world.bodies[i].position.x);
+        if collide {
+            assert!(a < -0.4 && b > 0.4, "{a} {b}");
+        } else {
+            assert!((a - DT).abs() < 1e-4 && (b + DT).abs() < 1e-4, "{a} {b}");
+        }
+    }
+}

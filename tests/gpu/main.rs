@@ -1,0 +1,63 @@
+//! Tests on every backend, and of all that an adapter runs: shaders, devices, the numbers that come back.
+
+#[macro_use]
+#[path = "../common/mod.rs"]
+mod common;
+
+mod breaking;
+mod closed_forms;
+mod conform;
+mod course;
+mod direct_joints;
+mod events;
+mod faults;
+mod forces;
+mod golden_gpu;
+#[cfg(feature = "serde")]
+mod gpu;
+mod jamming;
+mod joint_kinds;
+mod joints;
+mod kernels;
+mod living;
+mod living_random;
+mod masses;
+mod problems;
+mod resident;
+mod saved_problem;
+mod solver;
+#[cfg(feature = "serde")]
+mod spin;
+mod teleports;
+mod waits;
+
+fn main() -> std::process::ExitCode {
+    common::harness::run([
+        breaking::tests(),
+        closed_forms::tests(),
+        conform::tests(),
+        course::tests(),
+        direct_joints::tests(),
+        events::tests(),
+        faults::tests(),
+        forces::tests(),
+        golden_gpu::tests(),
+        #[cfg(feature = "serde")]
+        gpu::tests(),
+        jamming::tests(),
+        joint_kinds::tests(),
+        joints::tests(),
+        kernels::tests(),
+        living::tests(),
+        living_random::tests(),
+        masses::tests(),
+        problems::tests(),
+        resident::tests(),
+        saved_problem::tests(),
+        solver::tests(),
+        #[cfg(feature = "serde")]
+        spin::tests(),
+        teleports::tests(),
+        waits::tests(),
+    ])
+}
