@@ -7,7 +7,7 @@ import * as numbers from "./numbers.js";
 import * as panel from "./panel.js";
 import { keys, listen } from "./pointer.js";
 import {
-  act, assignments, canvases, chosen, enqueue, file, frame, game, hasWebGPU, loop, open, openPicture, pause, paused, pointer, refuse, restart, say,
+  act, assignments, canvases, changes, chosen, enqueue, file, frame, game, hasWebGPU, loop, open, openPicture, pause, paused, pointer, refuse, restart, say,
   setPace, shows, state, step, stepOnce, tilts, tried,
 } from "./run.js";
 
@@ -130,6 +130,12 @@ function shortcut(event) {
   }
 }
 
+/// Listens to pointers and keys on the pictures.
+function hear() {
+  for (const id of canvases) listen(element(id), act, () => document.querySelector('input[name="tool"]:checked').value);
+  keys(element("picture"), act);
+}
+
 /// Loads the solver and shows the first picture.
 async function begin() {
   await start({ module_or_path: new URL("drystone_web_bg.wasm", import.meta.url) });
@@ -141,8 +147,8 @@ async function begin() {
     note = `There is no picture: ${error.message}. The numbers are those of the run.`;
   }
   controls();
-  for (const id of canvases) listen(element(id), act, () => document.querySelector('input[name="tool"]:checked').value);
-  keys(element("picture"), act);
+  hear();
+  changes.addEventListener("canvases", hear);
   if (!device.known() && !location.hash) await device.measure();
   await enqueue(async () => {
     const usual = { ...chosen, parameters: panel.first("pile") };

@@ -8,7 +8,7 @@ const element = (id) => document.getElementById(id);
 /// Most steps between two pictures, and the time after which none begins (ms).
 const [MOST_STEPS, PATIENCE] = [4, 25];
 
-/// Tells `replaced` when something else runs, and `differs` at the first number that differs.
+/// Tells `replaced` when something else runs, `differs` at the first number that differs, and `canvases` when other canvases took their places.
 export const changes = new EventTarget();
 /// What the controls say.
 export let chosen = { maze: null, scene: "pile", parameters: {}, settings: {}, backend: "cpu", exact: true };
@@ -131,26 +131,57 @@ export function setSettings(next) {
 
 export const setPace = (times) => (pace = times);
 
-/// The first picture.
-export const openPicture = async () => (pictures = [await Picture.open(element(canvases[0]))]);
-
 export const canvases = ["picture", "picture-beside"];
+/// Times that devices are lost until WebGL draws instead of WebGPU.
 const MOST_LOSSES = 3;
 let losses = 0;
+let drawsByWebGPU = true;
+
+/// Opens a picture, or opens it again.
+async function renew(k) {
+  try {
+    const fresh = await Picture.open(element(canvases[k]), drawsByWebGPU);
+    pictures[k]?.free();
+    pictures[k] = fresh;
+  } catch (error) {
+    if (!drawsByWebGPU) {
+      pictures.splice(0).forEach((picture) => picture.free());
+      throw error;
+    }
+    await leaveWebGPU(Math.max(pictures.length, k + 1));
+  }
+}
+
+/// Lets WebGL draw so many pictures. A canvas that WebGPU drew on gives no WebGL any more: others take their places.
+async function leaveWebGPU(count) {
+  [drawsByWebGPU, losses] = [false, 0];
+  for (const id of canvases) {
+    const [old, fresh] = [element(id), element(id).cloneNode()];
+    const hasFocus = document.activeElement === old;
+    old.replaceWith(fresh);
+    if (hasFocus) fresh.focus({ focusVisible: false, preventScroll: true });
+  }
+  changes.dispatchEvent(new Event("canvases"));
+  for (let k = 0; k < count; k += 1) await renew(k);
+}
+
+/// The first picture.
+export const openPicture = () => renew(0);
 
 /// The second picture, for the second of two shows; and new pictures for those whose device was lost.
 async function besides() {
-  if (losses > MOST_LOSSES) return;
-  if (shows.length === 2 && pictures.length === 1) pictures.push(await Picture.open(element(canvases[1])));
-  for (const [k, picture] of pictures.entries()) {
-    if (!picture.is_lost()) continue;
-    losses += 1;
-    if (losses > MOST_LOSSES) {
-      pictures.splice(0).forEach((lost) => lost.free());
-      throw new Error("there is no picture: the device that draws was lost again and again. The numbers are those of the run");
-    }
-    pictures[k] = await Picture.open(element(canvases[k]));
-    picture.free();
+  if (shows.length === 2 && pictures.length === 1) await renew(1);
+  const lost = pictures.map((picture) => picture.is_lost());
+  if (!lost.includes(true)) return;
+  losses += 1;
+  if (losses <= MOST_LOSSES) {
+    for (const k of pictures.keys()) if (lost[k]) await renew(k);
+  } else if (drawsByWebGPU) {
+    await leaveWebGPU(pictures.length);
+    say("WebGL draws from now on: the device of WebGPU was lost again and again.");
+  } else {
+    pictures.splice(0).forEach((picture) => picture.free());
+    throw new Error("there is no picture: the device that draws was lost again and again. The numbers are those of the run");
   }
 }
 

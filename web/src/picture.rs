@@ -18,9 +18,9 @@ pub struct Picture {
 }
 
 impl Picture {
-    async fn on(canvas: HtmlCanvasElement) -> Result<Self> {
+    async fn on(canvas: HtmlCanvasElement, webgpu: bool) -> Result<Self> {
         let size = (canvas.width(), canvas.height());
-        Ok(Self { sight: Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size).await?, drawn: 0 })
+        Ok(Self { sight: Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size, webgpu).await?, drawn: 0 })
     }
 
     /// Draws what has the number `number` on a canvas of `size` pixels.
@@ -48,9 +48,9 @@ impl Picture {
 
 #[wasm_bindgen]
 impl Picture {
-    /// A picture on a canvas: by WebGPU, else by WebGL.
-    pub async fn open(canvas: HtmlCanvasElement) -> std::result::Result<Picture, JsError> {
-        thrown(Self::on(canvas).await)
+    /// A picture on a canvas: by WebGPU where there is one and `webgpu` allows it, else by WebGL.
+    pub async fn open(canvas: HtmlCanvasElement, webgpu: bool) -> std::result::Result<Picture, JsError> {
+        thrown(Self::on(canvas, webgpu).await)
     }
 
     /// What draws: `WebGPU` or `WebGL`.

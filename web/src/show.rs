@@ -5,7 +5,7 @@ use drystone::metrics::rms_speed;
 use drystone::scenes::SceneFile;
 use drystone::stages::compare::BodyDifference;
 use drystone::{Cpu, Error, Recorder, RecordingIntervals, Replay, Result};
-use drystone_view::{Bounds, Camera, ColorBy, Live, Overlay, Pointer, Show as _};
+use drystone_view::{Camera, ColorBy, Live, Overlay, Pointer, Show as _};
 use glam::Vec2;
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::*;
@@ -22,8 +22,6 @@ const LONGEST: usize = 128 << 20;
 pub struct Show {
     pub(crate) live: Live,
     pub(crate) camera: Camera,
-    /// Where bodies were since all of them were shown.
-    reached: Bounds,
     #[cfg_attr(not(target_family = "wasm"), expect(dead_code, reason = "only browsers draw"))]
     pub(crate) number: u32,
     /// What records the run; none where a recording runs again, or where the run became too long.
@@ -34,7 +32,7 @@ pub struct Show {
 
 impl Show {
     fn new(mut live: Live) -> Result<Self> {
-        let (camera, reached) = (live.camera(1.0), live.bounds());
+        let camera = live.camera(1.0);
         let recorder = match live.is_recording() {
             true => None,
             false => {
@@ -42,7 +40,7 @@ impl Show {
                 Some(Recorder::new(Vec::new(), &live.title(), &mut live.simulation, intervals)?)
             }
         };
-        Ok(Self { live, camera, reached, number: next_number(), recorder, fault: None })
+        Ok(Self { live, camera, number: next_number(), recorder, fault: None })
     }
 
     fn of_scene(name: &str, parameters: &[String], settings: &str) -> Result<Self> {
@@ -189,14 +187,13 @@ impl Show {
 
     /// Shows the whole scene in a picture of width `aspect` times its height.
     pub fn whole(&mut self, aspect: f32) {
-        (self.camera, self.reached) = (self.live.camera(aspect), self.live.bounds());
+        self.live.look_anew();
+        self.follow(aspect);
     }
 
-    /// Moves the camera back as far as bodies have come since [`Self::whole`].
+    /// Moves the camera with the bodies.
     pub fn follow(&mut self, aspect: f32) {
-        self.reached = self.reached.join(self.live.bounds());
-        let Camera { up, yaw, pitch, .. } = self.camera;
-        self.camera = Camera::framing(&self.reached, up, yaw, pitch, aspect);
+        self.camera = self.live.camera(aspect);
     }
 
     /// Looks as another show does.

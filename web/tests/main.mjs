@@ -13,13 +13,14 @@ import * as hidden from "./groups/hidden.mjs";
 import * as keyboard from "./groups/keyboard.mjs";
 import * as links from "./groups/links.mjs";
 import * as loading from "./groups/loading.mjs";
+import * as lost from "./groups/lost.mjs";
 import * as maze from "./groups/maze.mjs";
 import * as node from "./groups/node.mjs";
 import * as phone from "./groups/phone.mjs";
 import * as webgpu from "./groups/webgpu.mjs";
 import * as without from "./groups/without.mjs";
 
-const GROUPS = [node, loading, hashes, webgpu, without, gallery, maze, files, links, phone, keyboard, colors, hidden];
+const GROUPS = [node, loading, hashes, webgpu, without, lost, gallery, maze, files, links, phone, keyboard, colors, hidden];
 const root = resolve(import.meta.dirname, "../..");
 
 /// Runs a group, and with it a mistake on purpose if one is given. Whatever the console of a page says is a failure.
@@ -31,7 +32,8 @@ async function run(group, browser, print, mistake = {}) {
   const close = () => pages.at(-1)?.context().close();
   const open = async (options = {}) => {
     await close();
-    const page = await browser.open({ ...options, ...profile, script });
+    const scripts = [options.script, script].filter(Boolean).join("\n");
+    const page = await browser.open({ ...options, ...profile, script: scripts || null });
     pages.push(page);
     return page;
   };

@@ -97,8 +97,9 @@ impl Box3d {
             let ground = (!self.world.joints.is_empty()).then(|| b3CreateBody(self.id, &b3DefaultBodyDef()));
             for joint in &self.world.joints {
                 let mut def = b3DefaultSphericalJointDef();
-                def.base.bodyIdA = self.bodies[joint.body_a];
-                def.base.bodyIdB = joint.body_b.map_or_else(|| ground.expect("there are joints"), |b| self.bodies[b]);
+                def.base.bodyIdA = self.bodies[joint.body_a.index()];
+                let other = joint.body_b.map(|b| self.bodies[b.index()]);
+                def.base.bodyIdB = other.unwrap_or_else(|| ground.expect("there are joints"));
                 def.base.localFrameA = transform(joint.anchor_a, Quat::IDENTITY);
                 def.base.localFrameB = transform(joint.anchor_b, Quat::IDENTITY);
                 def.base.collideConnected = joint.collide;

@@ -132,10 +132,10 @@ impl Physx {
         for joint in &self.world.joints {
             let [a, b] = [joint.anchor_a, joint.anchor_b].map(|anchor| transform(anchor, Quat::IDENTITY));
             // The null actor is the world.
-            let other = joint.body_b.map_or(null_mut(), |b| self.actors[b]);
+            let other = joint.body_b.map_or(null_mut(), |b| self.actors[b.index()]);
             // SAFETY: the instance and both actors are there.
             unsafe {
-                let made = phys_PxSphericalJointCreate(sdk.0, self.actors[joint.body_a], &a, other, &b).cast();
+                let made = phys_PxSphericalJointCreate(sdk.0, self.actors[joint.body_a.index()], &a, other, &b).cast();
                 PxJoint_setConstraintFlag_mut(made, PxConstraintFlag::CollisionEnabled, joint.collide);
                 self.joints.push(made);
             }

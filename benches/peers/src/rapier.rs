@@ -31,9 +31,9 @@ impl Rapier {
         // The body that stands for the world in joints to it.
         let ground = physics.insert_body(RigidBodyBuilder::fixed());
         for joint in &world.joints {
-            let b = joint.body_b.map_or(ground, |b| handles[b]);
+            let b = joint.body_b.map_or(ground, |b| handles[b.index()]);
             let anchors = SphericalJointBuilder::new().local_anchor1(joint.anchor_a).local_anchor2(joint.anchor_b);
-            physics.insert_impulse_joint(handles[joint.body_a], b, anchors.contacts_enabled(joint.collide));
+            physics.insert_impulse_joint(handles[joint.body_a.index()], b, anchors.contacts_enabled(joint.collide));
         }
         Ok(Self { physics, handles, world })
     }
