@@ -45,10 +45,11 @@ fn a_settled_step_allocates_nothing_and_one_that_computes_its_contacts_does() {
     assert!(allocations(1, anew, false)[1] > 0, "the counter counts nothing");
 }
 
-/// Each of many small simulations pays for its own rows, in its first step alone.
+/// Each of many small simulations pays for its own rows, in its first step alone. One thread: detection keeps a workspace for each
+/// thread, and a second one takes its first task in whichever step it wakes up for.
 #[test]
 fn a_small_simulation_allocates_in_its_first_step_alone() {
-    let asked = counting::in_pool(2, || {
+    let asked = counting::in_pool(1, || {
         let mut asked = [0; 2];
         for simulation_number in 0..20 {
             let mut world = World::new();
