@@ -344,3 +344,14 @@ fn bullet_is_refused_by_a_build_without_it() {
     assert_eq!(refused.to_string(), "Bullet is not in this build; build with --features bullet");
     assert!(!Engine::built().contains(&Engine::Bullet));
 }
+
+/// The board is a mesh that moves, and the ball as small as 3 cm: the world is given to Bullet larger.
+#[test]
+#[cfg(feature = "bullet")]
+fn bullet_plays_the_maze() {
+    use drystone_maze::{Map, Outcome, pilot, play};
+    let begin = || drystone_peers::bullet_game(Map::find("easy").expect("a board"), 4, 0.03).expect("a game");
+    let script = pilot(begin()).expect("a script that wins");
+    let played = play(begin(), &script, |_| ()).expect("a game");
+    assert_eq!(played.outcome, Outcome::Goal, "after {} s", played.time);
+}
