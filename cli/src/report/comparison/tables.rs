@@ -223,7 +223,7 @@ impl Rows {
         }
         let mut thirds = self.thirds.iter().filter(|row| row.scene == scene && row.engine == engine);
         let Some(first) = thirds.next() else { return Cell::default() };
-        let end = thirds.filter(|row| row.setting == first.setting).last().unwrap_or(first);
+        let end = thirds.rfind(|row| row.setting == first.setting).unwrap_or(first);
         figures(end.ms, end.penetration_mean)
     }
 

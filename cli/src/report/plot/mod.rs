@@ -126,8 +126,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
         }
     }
     // Beside the plot, each name where its curve ends.
-    let end = |(path, places): (&Vec<(i32, i32)>, &Vec<(i32, i32)>)| path.last().or(places.last()).map(|end| end.1);
-    let ends: Vec<_> = paths.iter().zip(&places).map(end).collect();
+    let ends = paths.iter().zip(&places).map(|(path, places)| path.last().or(places.last()).map(|end| end.1));
     let mut legend: Vec<_> = series.iter().zip(ends).filter_map(|(s, end)| Some((end?, s))).collect();
     legend.sort_by_key(|(end, _)| *end);
     let middles = apart(&legend.iter().map(|(end, _)| *end).collect::<Vec<_>>(), LINE, rows);
