@@ -6,6 +6,8 @@
 //! contacts, friction model, restitution threshold) is what an engine does unless told otherwise.
 
 mod box3d;
+#[cfg(feature = "bullet")]
+mod bullet;
 mod entrant;
 #[cfg(feature = "physx")]
 mod physx;
@@ -14,7 +16,7 @@ mod round;
 mod setting;
 mod team;
 
-pub use entrant::{Engine, Entrant};
+pub use entrant::{BulletSolver, Engine, Entrant};
 pub use team::team;
 
 use drystone::Result;
@@ -31,4 +33,22 @@ pub fn rapier_game(map: Map, substeps: u32, frequency: Option<f32>, unit: f32) -
         let hertz = entrant.hertz(scene.dt);
         Ok(Box::new(rapier::Rapier::new(&scene, substeps, hertz, 1)?.length_unit(unit)))
     })
+}
+
+/// The maze game on `map` in Bullet's hands at its defaults, but for `substeps`; things of `unit` meters are as large as those of 1 m are
+/// by default, since Bullet's margins and thresholds are lengths.
+///
+/// # Errors
+/// A map that is not fit for a board; a build without Bullet.
+pub fn bullet_game(map: Map, substeps: u32, unit: f32) -> Result<Game> {
+    #[cfg(feature = "bullet")]
+    return Game::with(map, |scene| {
+        let usual = Entrant::default_of(Engine::Bullet);
+        Ok(Box::new(bullet::Bullet::new(&scene, substeps, (usual.solver, usual.iterations), 1, unit)?))
+    });
+    #[cfg(not(feature = "bullet"))]
+    {
+        let _ = (map, substeps, unit);
+        Err(entrant::no_bullet())
+    }
 }

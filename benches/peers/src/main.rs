@@ -1,4 +1,4 @@
-//! `drystone-peers SCENE...`: drystone, Rapier, Box3D and PhysX on the same scenes, time beside errors.
+//! `drystone-peers SCENE...`: drystone, Rapier, Box3D, PhysX and Bullet on the same scenes, time beside errors.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,10 +9,10 @@ use drystone::{Error, Result, Scene};
 use drystone_cli::commands::SurveyArgs;
 use drystone_cli::files;
 use drystone_cli::report::comparison::{Origin, Row, blocks, measure, scene};
-use drystone_peers::{Engine, Entrant, team};
+use drystone_peers::{BulletSolver, Engine, Entrant, team};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Runs scenes with drystone, Rapier, Box3D and PhysX, each at its defaults and at the settings asked for.
+/// Runs scenes with drystone, Rapier, Box3D, PhysX and Bullet, each at its defaults and at the settings asked for.
 ///
 /// They step in turns of 10 steps. The first table has the thirds of a run: the median and the worst time of a step, the time relative
 /// to the fastest other engine in the same turns, and errors at the end of the third. The first step of a run has a column of its own.
@@ -25,8 +25,9 @@ struct Args {
     /// Scenes: names of the catalogue, as tower or tower:n=20,top_ratio=100, and paths of scene files.
     #[arg(required = true)]
     scenes: Vec<String>,
-    /// Engines that take part; PhysX needs a build with `--features physx`.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = Engine::built())]
+    /// Engines that take part; all of the build that run on so many threads if this is not given. PhysX needs a build with
+    /// `--features physx`, and Bullet, which runs on one thread, with `--features bullet`.
+    #[arg(long, value_enum, value_delimiter = ',')]
     engines: Vec<Engine>,
     /// Substeps to run besides the defaults.
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096))]
@@ -34,6 +35,12 @@ struct Args {
     /// Contact frequencies to run with each of the substeps, times the length of a substep; `own` is what an engine does by itself.
     #[arg(long, value_delimiter = ',', default_value = "0.125", value_parser = parse_frequency)]
     frequency: Vec<Frequency>,
+    /// Solvers of Bullet to run with each of its iterations.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "sequential")]
+    bullet_solver: Vec<BulletSolver>,
+    /// Iterations of Bullet in a substep to run besides the default, 10.
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096))]
+    bullet_iterations: Vec<u32>,
     /// Settings of drystone, as key=value,key=value; each time this is given adds a row with them.
     #[arg(long, value_name = "KEY=VALUE,...")]
     set: Vec<String>,
@@ -75,21 +82,31 @@ impl Args {
     /// Each engine at its defaults, then at what was asked for, each once.
     fn entrants(&self, dt: f32) -> Vec<Entrant> {
         let mut entrants: Vec<Entrant> = Vec::new();
-        for &engine in &self.engines {
+        let engines = if self.engines.is_empty() { Engine::on(self.threads.into()) } else { self.engines.clone() };
+        for engine in engines {
             let usual = Entrant::default_of(engine);
             let asked = self.substeps.iter().flat_map(|&substeps| {
                 self.frequency.iter().map(move |f| Entrant { substeps, frequency: f.0, ..Entrant::default_of(engine) })
             });
             let set = |text: &String| Entrant { set: text.split(',').map(str::to_owned).collect(), ..usual.clone() };
             let set = self.set.iter().filter(|_| engine == Engine::Drystone).map(set);
-            for entrant in std::iter::once(usual.clone()).chain(asked).chain(set) {
-                let named = |e: &Entrant| (e.engine, e.substeps, e.hertz(dt).round(), e.set.clone());
+            let bullets = if engine == Engine::Bullet { self.bullets(&usual) } else { Vec::new() };
+            for entrant in std::iter::once(usual.clone()).chain(asked).chain(set).chain(bullets) {
+                let named =
+                    |e: &Entrant| (e.engine, e.substeps, e.hertz(dt).round(), e.solver, e.iterations, e.set.clone());
                 if entrants.iter().all(|e| named(e) != named(&entrant)) {
                     entrants.push(entrant);
                 }
             }
         }
         entrants
+    }
+
+    /// The solvers and iterations of Bullet that were asked for.
+    fn bullets(&self, usual: &Entrant) -> Vec<Entrant> {
+        let all = [&[usual.iterations][..], &self.bullet_iterations].concat();
+        let of = |&solver| all.iter().map(move |&iterations| Entrant { solver, iterations, ..usual.clone() });
+        self.bullet_solver.iter().flat_map(of).collect()
     }
 
     fn scene(&self, text: &str) -> Result<Scene> {
@@ -136,9 +153,11 @@ fn mm(x: f64) -> String {
 fn print_tables(scene: &Scene, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("{}: {} dynamic bodies, {} steps, threads {}", scene.name, first.bodies, first.steps, first.threads);
-    let heads = ["", "steps", "ms", "worst", "first", "to best", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place"];
+    let heads =
+        ["", "steps", "ms", "worst", "first", "to best", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place"];
     let thirds = rows.iter().flat_map(|row| &row.windows).map(|w| {
-        let (head, first) = if w.from == 1 { (w.setting.clone(), format!("{:.3}", w.ms_first)) } else { Default::default() };
+        let (head, first) =
+            if w.from == 1 { (w.setting.clone(), format!("{:.3}", w.ms_first)) } else { Default::default() };
         let to_best = w.to_best.map_or_else(String::new, |ratio| format!("{ratio:.2}"));
         let steps = format!("{} to {}", w.from, w.to);
         let times = [w.ms, w.ms_worst].map(|ms| format!("{ms:.3}"));
@@ -147,8 +166,7 @@ fn print_tables(scene: &Scene, rows: &[Row]) {
         [vec![head, steps], times.into(), vec![first, to_best], errors.into(), vec![in_place]].concat()
     });
     print_table(&heads, thirds);
-    let heads =
-        ["", "ms a step", "", "ratio", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place", "gap mm"];
+    let heads = ["", "ms a step", "", "ratio", "deepest mm", "mean mm", "rms mm/s", "drift mm", "in place", "gap mm"];
     let halves = rows.iter().map(|row| {
         vec![
             row.setting().label(),

@@ -8,7 +8,7 @@ use super::output::{print, say};
 use super::progress::{PERCENT, Progress};
 use crate::adapter;
 use crate::files;
-use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes};
+use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes, tables};
 use crate::report::{RUNS, Shard, Solvers, convergence, performance, problems, rules, solvers};
 use drystone::{Error, Result};
 
@@ -36,6 +36,15 @@ enum Page {
         /// Directory for the page; its folder performance has the rows, as CSV, and gets the picture.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
+    },
+    /// Tables of README.md and docs/speed-vs-error.md, from the rows in docs/report and docs/performance.
+    Tables {
+        /// Directory of README.md and docs.
+        #[arg(long, default_value = ".")]
+        root: PathBuf,
+        /// Write nothing; fail if a table is not that of the rows.
+        #[arg(long)]
+        check: bool,
     },
     /// Sweeps that contact problems need to reach an error.
     Convergence {
@@ -104,6 +113,9 @@ impl ReportArgs {
             Some(Page::Performance { out }) => {
                 performance(out)?;
                 print(out.join("performance.md").display())
+            }
+            Some(Page::Tables { root, check }) => {
+                tables(root, *check)?.iter().try_for_each(|page| print(page.display()))
             }
             Some(Page::Convergence { out, problems, siconos }) => {
                 // A wrong table is refused before anything runs.

@@ -21,6 +21,7 @@ mod trajectory;
 
 pub use convergence::{convergence, problem_of_step, problems};
 pub use performance::performance;
+pub use plot::engine_color;
 pub use rules::{RUNS, RulesReport, rules};
 pub use run::{KernelRow, RunReport, Spread, StageRow, Standing};
 pub use shard::Shard;

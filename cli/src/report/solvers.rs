@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::plot::{Frame, Scale, Series, svg};
+use super::plot::{Frame, Look, Scale, Series, svg};
 use drystone::{Error, Result};
 
 /// The solver that is ours in the table.
@@ -162,7 +162,7 @@ fn profile(rows: &[Row], target: &str) -> String {
     let line = |(look, solver): (usize, &str)| {
         let share = |(i, ratio): (usize, f64)| (ratio, (i + 1) as f64 / count);
         let line: Vec<_> = ratios(rows, solver, target).into_iter().enumerate().map(share).collect();
-        Series { name: solver.into(), look, points: Vec::new(), line }
+        Series { name: solver.into(), look: Look::nth(look), points: Vec::new(), line }
     };
     let lines: Vec<_> = std::iter::once(OURS).chain(others.into_iter().take(LINES)).enumerate().map(line).collect();
     let title = format!("e_vel at most {target}");

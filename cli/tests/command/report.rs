@@ -10,7 +10,7 @@ use drystone::{Error, Result, Scene, SolverConfig, World};
 use drystone_cli::files;
 use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, StatesRow, WorldsRow};
 use drystone_cli::report::comparison::{
-    Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all,
+    Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all, tables,
 };
 use drystone_cli::report::{Shard, performance};
 
@@ -306,4 +306,44 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
     write("growth.csv", Vec::new());
     let message = performance(folder.path()).unwrap_err().to_string();
     assert!(message.contains("growth.csv: no rows"), "{message}");
+}
+
+/// The tables of README.md and docs/speed-vs-error.md have the figures of the rows beside them, and the best ones are bold.
+#[test]
+fn the_tables_of_the_pages_have_the_figures_of_the_rows() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    tables(root, true).unwrap_or_else(|e| panic!("{e}; `drystone report tables` writes them"));
+
+    // A figure, a bold one and a row that are off are found, and written anew.
+    let folder = tempfile::tempdir().unwrap();
+    let files = [
+        "README.md",
+        "docs/speed-vs-error.md",
+        "docs/report/scenes.csv",
+        "docs/report/problems.csv",
+        "docs/performance/engines-1.csv",
+    ];
+    for file in files {
+        let to = folder.path().join(file);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(root.join(file), to).unwrap();
+    }
+    for page in &files[..2] {
+        let path = folder.path().join(page);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let inside = text.find("<!-- rows: ").expect("a table");
+        let bold = inside + text[inside..].find(" **0").expect("a figure in bold");
+        let row = text[..bold].rfind("\n|").unwrap() + 1;
+        let end = row + text[row..].find('\n').unwrap() + 1;
+        let line = &text[row..end];
+        let without_bold = line.replacen("**", "", 2);
+        let figure = line.replacen(" **0", " **1", 1);
+        for changed in [&*without_bold, &figure, ""] {
+            std::fs::write(&path, [&text[..row], changed, &text[end..]].concat()).unwrap();
+            let message = tables(folder.path(), true).unwrap_err().to_string();
+            assert!(message.contains("is not that of the rows") && message.lines().count() == 1, "{message}");
+            tables(folder.path(), false).unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+    }
 }

@@ -64,7 +64,7 @@ fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene
 pub(super) fn throw(n: usize, speed: f32) -> Scene {
     const DISTANCE: f32 = 20.0;
     let mut world = floor(40.0, 10.0);
-    stack(&mut world, n, |_| ([0.0; 2], 1000.0));
+    stack(&mut world, n, 0.0, |_| ([0.0; 2], 1000.0));
     let rise = 0.5 * -world.gravity.y * DISTANCE / speed;
     let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5)).velocity(Vec3::new(speed, rise, 0.0), Vec3::ZERO);
     world.add(ball.position(-1.0 - DISTANCE, (0.5 * n as f32).max(0.5), 0.0));

@@ -26,3 +26,8 @@ pub(super) fn unit_box() -> Body {
 pub(super) fn centered(k: usize, n: usize) -> f64 {
     k as f64 - (n as f64 - 1.0) / 2.0
 }
+
+/// How far gaps lift the k-th row, in heights of a row, if each row has `gap` of a height below it.
+pub(super) fn lifted(k: usize, gap: f32) -> f32 {
+    (k + 1) as f32 * gap
+}

@@ -202,7 +202,7 @@ pub(super) fn dominoes(n: usize) -> Scene {
 
 /// A plane pyramid of cubes with 0.1 m between neighbors, and on its tip one more, `ratio` times as dense.
 pub(super) fn pyramid_heavy(base: usize, ratio: f32) -> Scene {
-    let mut scene = super::boxes::pyramid(base);
+    let mut scene = super::boxes::pyramid(base, 0.0);
     scene.name = "pyramid-heavy".to_owned();
     scene.steps = 600;
     let top = unit_box().named("heavy").density(1000.0 * ratio);

@@ -21,6 +21,8 @@ const BOXES: Parameter = Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number
 const JITTER: Parameter =
     Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]");
 const CUBES: Parameter = Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes");
+const GAP: Parameter =
+    Parameter::real("gap", 0.0, (0.0, 0.1), "gap that is below each of them at the start, relative to its height");
 const MU: Parameter = Parameter::real("mu", 0.5, (0.0, 10.0), "friction of all bodies");
 const LIFTED: Parameter = Parameter::real("angle", 90.0, (0.0, 180.0), "start, lifted from where it hangs [degrees]");
 
@@ -46,7 +48,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::real("ratio", 1.0, (1e-6, 1e6), "density of every other box relative to the others"),
         ],
         bodies: |v| v[0],
-        build: |v| Ok(boxes::pile(v[0] as usize, v[1], v[2] as u64, v[3] as f32)),
+        build: |v| boxes::pile(v[0] as usize, v[1], v[2] as u64, v[3] as f32),
     },
     Entry {
         name: "pile-mixed",
@@ -55,16 +57,22 @@ pub static CATALOGUE: &[Entry] = &[
             BOXES,
             JITTER,
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the sizes, densities, shifts and turns"),
+            Parameter::whole(
+                "kinds",
+                1,
+                (1.0, 6.0),
+                "kinds of shapes in turn: box, ball, capsule, cylinder, cone, hull",
+            ),
         ],
         bodies: |v| v[0],
-        build: |v| Ok(boxes::pile_mixed(v[0] as usize, v[1], v[2] as u64)),
+        build: |v| boxes::pile_mixed(v[0] as usize, v[1], v[2] as u64, v[3] as usize),
     },
     Entry {
         name: "pyramid",
         summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
-        parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row")],
+        parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row"), GAP],
         bodies: |v| triangle(v[0]),
-        build: |v| Ok(boxes::pyramid(v[0] as usize)),
+        build: |v| Ok(boxes::pyramid(v[0] as usize, v[1] as f32)),
     },
     Entry {
         name: "many-pyramids",
@@ -83,9 +91,10 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of boxes"),
             Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
             Parameter::real("top_ratio", 1.0, (1e-6, 1e6), "density of the top box relative to the others"),
+            GAP,
         ],
         bodies: |v| v[0],
-        build: |v| Ok(stacks::tower(v[0] as usize, v[1] as f32, v[2] as f32)),
+        build: |v| Ok(stacks::tower(v[0] as usize, v[1] as f32, v[2] as f32, v[3] as f32)),
     },
     Entry {
         name: "wall",
@@ -93,9 +102,10 @@ pub static CATALOGUE: &[Entry] = &[
         parameters: &[
             Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
             Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
+            GAP,
         ],
         bodies: |v| v[0] * v[1] + (v[0] / 2.0).floor(),
-        build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize)),
+        build: |v| Ok(boxes::wall(v[0] as usize, v[1] as usize, v[2] as f32)),
     },
     Entry {
         name: "drop",
@@ -179,9 +189,10 @@ pub static CATALOGUE: &[Entry] = &[
         parameters: &[
             CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
+            GAP,
         ],
         bodies: |v| v[0],
-        build: |v| Ok(stacks::mass_ratio(v[0] as usize, v[1] as f32)),
+        build: |v| Ok(stacks::mass_ratio(v[0] as usize, v[1] as f32, v[2] as f32)),
     },
     Entry {
         name: "pendulum",

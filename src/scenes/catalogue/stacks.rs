@@ -1,22 +1,22 @@
 //! Stacks of cubes: straight, shifted, many next to each other, light under heavy.
 
-use super::common::{centered, floor, unit_box};
+use super::common::{centered, floor, lifted, unit_box};
 use crate::random::SplitMix64;
 use crate::scenes::scene::{Group, Scene};
 use crate::world::{Body, Shape, World};
 
-/// Adds `n` cubes on top of each other; `cube(k)` gives the k-th one's place along x and z (m) and its density (kg/m³).
-pub(super) fn stack(world: &mut World, n: usize, mut cube: impl FnMut(usize) -> ([f32; 2], f32)) {
+/// Adds `n` cubes on top of each other, with gaps as in [`lifted`]; `cube(k)` gives the k-th one's place along x and z (m) and its density (kg/m³).
+pub(super) fn stack(world: &mut World, n: usize, gap: f32, mut cube: impl FnMut(usize) -> ([f32; 2], f32)) {
     for k in 0..n {
         let ([x, z], density) = cube(k);
-        world.add(unit_box().density(density).position(x, k as f32 + 0.5, z));
+        world.add(unit_box().density(density).position(x, k as f32 + 0.5 + lifted(k, gap), z));
     }
 }
 
 /// One such stack on a floor, as a scene that stands.
-fn standing(name: &str, n: usize, cube: impl FnMut(usize) -> ([f32; 2], f32)) -> Scene {
+fn standing(name: &str, n: usize, gap: f32, cube: impl FnMut(usize) -> ([f32; 2], f32)) -> Scene {
     let mut world = floor(20.0, 20.0);
-    stack(&mut world, n, cube);
+    stack(&mut world, n, gap, cube);
     Scene::new(name, world, 600).standing()
 }
 
@@ -27,7 +27,7 @@ fn in_turn(k: usize, offset: f32) -> f32 {
 
 /// A stack of `n` cubes, straight.
 pub(super) fn aligned(n: usize) -> Scene {
-    standing("stack", n, |_| ([0.0; 2], 1000.0))
+    standing("stack", n, 0.0, |_| ([0.0; 2], 1000.0))
 }
 
 /// A straight stack of `n` cylinders, 1 m wide and 4 cm thick.
@@ -42,20 +42,20 @@ pub(super) fn coins(n: usize) -> Scene {
 }
 
 /// A stack of `n` cubes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
-pub(super) fn tower(n: usize, offset: f32, top_ratio: f32) -> Scene {
-    standing("tower", n, |k| ([in_turn(k, offset), 0.0], if k + 1 == n { 1000.0 * top_ratio } else { 1000.0 }))
+pub(super) fn tower(n: usize, offset: f32, top_ratio: f32, gap: f32) -> Scene {
+    standing("tower", n, gap, |k| ([in_turn(k, offset), 0.0], if k + 1 == n { 1000.0 * top_ratio } else { 1000.0 }))
 }
 
 /// A stack of `n` cubes, each off the axis by up to `offset` along x and along z: SplitMix64 with seed 1, x first.
 pub(super) fn misaligned(n: usize, offset: f64) -> Scene {
     let mut random = SplitMix64::new(1);
     let mut shift = || (offset * random.symmetric()) as f32;
-    standing("misaligned", n, |_| ([shift(), shift()], 1000.0))
+    standing("misaligned", n, 0.0, |_| ([shift(), shift()], 1000.0))
 }
 
 /// A stack of `n` cubes, the lowest of 1000 kg/m³, every other one `ratio` times as dense.
-pub(super) fn mass_ratio(n: usize, ratio: f32) -> Scene {
-    standing("mass-ratio", n, |k| ([0.0; 2], if k % 2 == 0 { 1000.0 } else { 1000.0 * ratio }))
+pub(super) fn mass_ratio(n: usize, ratio: f32, gap: f32) -> Scene {
+    standing("mass-ratio", n, gap, |k| ([0.0; 2], if k % 2 == 0 { 1000.0 } else { 1000.0 * ratio }))
 }
 
 /// Towers of `step`, 2 `step`, ... up to `n` cubes, 4 m apart along z, each a group; cubes 0.01 m off to the one side and
@@ -68,7 +68,7 @@ pub(super) fn tallest(n: usize, step: usize) -> Scene {
     for k in 0..count {
         let (height, z) = ((k + 1) * step, (centered(k, count) * PITCH) as f32);
         let first = world.bodies.len();
-        stack(&mut world, height, |i| ([in_turn(i, 0.01), z], 1000.0));
+        stack(&mut world, height, 0.0, |i| ([in_turn(i, 0.01), z], 1000.0));
         groups.push(Group { name: format!("{height} cubes"), bodies: first..world.bodies.len() });
     }
     Scene { groups, ..Scene::new("tallest", world, 1200).standing() }

@@ -1,4 +1,4 @@
-//! `maze [FOLDER]`: the boards of the maze game with drystone and with Rapier, as a page with pictures in FOLDER (docs).
+//! `maze [FOLDER]`: the boards of the maze game with drystone, Rapier and Bullet, as a page with pictures in FOLDER (docs).
 //!
 //! Three times: by one script for all, which the pilot wrote on drystone; by another, which it wrote on Rapier; and by the pilot
 //! itself, which looks where the ball is.
@@ -12,45 +12,77 @@ use drystone::backend::{BackendChoice, choose};
 use drystone::stats::median;
 use drystone::{Error, Result, SolverConfig};
 use drystone_cli::files;
+use drystone_cli::report::engine_color;
 use drystone_cli::report::rounds::interleave;
 use drystone_maze::{BOARDS, CELL, Cell, Game, Map, Outcome, Played, Script, pilot, play};
-use drystone_peers::rapier_game;
+use drystone_peers::{Engine, bullet_game, rapier_game};
 use plotters::prelude::*;
 
 /// An engine as it is set.
 struct Player {
     name: &'static str,
     begin: fn(Map) -> Result<Game>,
-    /// Color of its track in the pictures, if it has one there.
-    color: Option<RGBColor>,
+    /// Its track in the pictures, if it has one there.
+    track: Option<Track>,
 }
 
-const PLAYERS: [Player; 8] = [
-    Player { name: "drystone, 8 substeps (default)", begin: |m| drystone(m, 8), color: Some(RGBColor(0, 114, 178)) },
-    Player { name: "drystone, 4 substeps", begin: |m| drystone(m, 4), color: None },
-    Player { name: "drystone, 32 substeps", begin: |m| drystone(m, 32), color: Some(RGBColor(86, 180, 233)) },
-    Player { name: "drystone, 8 substeps, software GPU", begin: drystone_gpu, color: None },
+/// A track in the color of an engine.
+#[derive(Clone, Copy)]
+enum Track {
+    Full(&'static str),
+    /// Half as dark.
+    Faint(&'static str),
+}
+
+impl Track {
+    fn color(self) -> RGBColor {
+        let (Self::Full(engine) | Self::Faint(engine)) = self;
+        let (r, g, b) = engine_color(engine);
+        match self {
+            Self::Full(_) => RGBColor(r, g, b),
+            Self::Faint(_) => {
+                let [r, g, b] = [r, g, b].map(|channel| 128 + channel / 2);
+                RGBColor(r, g, b)
+            }
+        }
+    }
+}
+
+const PLAYERS: [Player; 11] = [
+    Player { name: "drystone, 8 substeps (default)", begin: |m| drystone(m, 8), track: Some(Track::Full("drystone")) },
+    Player { name: "drystone, 4 substeps", begin: |m| drystone(m, 4), track: None },
+    Player { name: "drystone, 32 substeps", begin: |m| drystone(m, 32), track: Some(Track::Faint("drystone")) },
+    Player { name: "drystone, 8 substeps, software GPU", begin: drystone_gpu, track: None },
     Player {
         name: "rapier, 4 iterations, 30 Hz (default)",
         begin: |m| rapier_game(m, 4, None, 1.0),
-        color: Some(RGBColor(213, 94, 0)),
+        track: Some(Track::Faint("rapier")),
     },
     Player {
         name: "rapier, length unit 3 cm",
         begin: |m| rapier_game(m, 4, None, 0.03),
-        color: Some(RGBColor(0, 158, 115)),
+        track: Some(Track::Full("rapier")),
     },
     Player {
         name: "rapier, length unit 3 cm, 8 iterations, 120 Hz",
         begin: |m| rapier_game(m, 8, Some(0.125), 0.03),
-        color: None,
+        track: None,
     },
     Player {
         name: "rapier, length unit 3 cm, 32 iterations, 480 Hz",
         begin: |m| rapier_game(m, 32, Some(0.125), 0.03),
-        color: None,
+        track: None,
     },
+    Player { name: "bullet, 1 substep (default)", begin: |m| bullet_game(m, 1, 1.0), track: None },
+    Player { name: "bullet, length unit 3 cm", begin: |m| bullet_game(m, 1, 0.03), track: Some(Track::Full("bullet")) },
+    Player { name: "bullet, length unit 3 cm, 4 substeps", begin: |m| bullet_game(m, 4, 0.03), track: None },
 ];
+
+/// The players of this build.
+fn players() -> Vec<&'static Player> {
+    let has_bullet = Engine::built().contains(&Engine::Bullet);
+    PLAYERS.iter().filter(|player| has_bullet || !player.name.starts_with("bullet")).collect()
+}
 
 /// Who has written the scripts for all: the default of one, and the other with what suits it best.
 const DRYSTONE: usize = 0;
@@ -89,15 +121,17 @@ fn page(folder: &Path) -> Result<()> {
     for (board, _) in BOARDS {
         let map = Map::find(board)?;
         // A script that the pilot wrote is what it did with the engine.
-        let own = PLAYERS.each_ref().map(|player| pilot((player.begin)(map.clone())?));
-        let of = |writer: usize| {
-            PLAYERS.each_ref().map(|_| own[writer].as_ref().cloned().map_err(|e| Error::input(e.to_string())))
+        let players = players();
+        let own: Vec<_> = players.iter().map(|player| pilot((player.begin)(map.clone())?)).collect();
+        let of = |writer: usize| -> Vec<_> {
+            let script = || own[writer].as_ref().cloned().map_err(|e| Error::input(e.to_string()));
+            players.iter().map(|_| script()).collect()
         };
         let _ = write!(text, "\n## {board}\n");
         let by_script = table(&mut text, "script written on drystone", &map, &of(DRYSTONE))?;
         table(&mut text, "script written on rapier, 3 cm", &map, &of(RAPIER))?;
         table(&mut text, "the pilot steers", &map, &own)?;
-        let tracks = by_script.iter().zip(&PLAYERS).filter_map(|(played, player)| Some((played.as_ref()?, player)));
+        let tracks = by_script.iter().zip(players).filter_map(|(played, player)| Some((played.as_ref()?, player)));
         let path = pictures.join(format!("{board}.svg"));
         files::write(&path, picture(&map, tracks).as_bytes())?;
         let _ = write!(text, "\n![tracks on the {board} board](maze/{board}.svg)\n");
@@ -111,7 +145,7 @@ fn page(folder: &Path) -> Result<()> {
 /// Adds a table of what all players make of their scripts, or why there is none; returns the games.
 fn table(text: &mut String, title: &str, map: &Map, scripts: &[Result<Script>]) -> Result<Vec<Option<Played>>> {
     let player = |(k, (player, script))| (k, player, script, Vec::new(), None);
-    let mut games: Vec<_> = PLAYERS.iter().zip(scripts).enumerate().map(player).collect();
+    let mut games: Vec<_> = players().into_iter().zip(scripts).enumerate().map(player).collect();
     let mut first = f64::NAN;
     interleave(ROUNDS, &mut games, |round, (k, player, script, ratios, game)| {
         let Some(script) = script.as_ref().ok().filter(|_| *k != GPU || round == 0) else { return Ok(()) };
@@ -159,7 +193,8 @@ type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 
 /// The board from above with the tracks on it, as SVG text.
 fn picture<'a>(map: &Map, tracks: impl Iterator<Item = (&'a Played, &'a Player)>) -> String {
-    let tracks: Vec<_> = tracks.filter_map(|(played, player)| Some((played, player.name, player.color?))).collect();
+    let tracks: Vec<_> =
+        tracks.filter_map(|(played, player)| Some((played, player.name, player.track?.color()))).collect();
     let height = map.rows * SIDE + MARGIN;
     let legend = 12 + LINE * tracks.len() as i32;
     let size = ((map.columns * SIDE + MARGIN + 12) as u32, height as u32 + 12 + legend as u32);

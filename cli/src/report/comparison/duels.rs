@@ -61,10 +61,22 @@ pub fn page(results: &[Vec<Row>]) -> Result<Option<String>> {
          quartiles. Errors are of the second half: deepest and mean overlap, speed at rest (rms) and drift, or the gap of joints. Another engine \
          ({names}) is ahead where each setting of {OWN} with an error no larger takes longer, or none has an error as small. The number is \
          the time of the fastest of these settings relative to that of the other engine. A ~ says that the quartiles of both times overlap.\n\n\
-         ## Where another engine is ahead\n\n\
-         | scene | error | rows | setting of the largest ratio | its error | relative time |\n|---|---|--:|---|--:|--:|\n"
+         ## Where another engine is ahead\n\n"
     );
-    let (mut ahead, mut compared, mut tables) = (0, 0, String::new());
+    let (lost, ahead, compared) = ahead(results)?;
+    text.push_str(&lost);
+    let _ = writeln!(text, "\nAnother engine is ahead somewhere in {ahead} of {compared} pairs of scene and error.");
+    for rows in results {
+        table(&mut text, rows, &leads(rows)?, rows.first().map_or(&[][..], Fault::of_scene));
+    }
+    Ok(Some(text))
+}
+
+/// A table of the pairs of scene and error in which another engine is ahead, their number, and that of all pairs.
+pub(super) fn ahead(results: &[Vec<Row>]) -> Result<(String, usize, usize)> {
+    let mut text =
+        "| scene | error | rows | setting of the largest ratio | its error | relative time |\n|---|---|--:|---|--:|--:|\n".to_owned();
+    let (mut ahead, mut compared) = (0, 0);
     for rows in results {
         let leads = leads(rows)?;
         let faults = rows.first().map_or(&[][..], Fault::of_scene);
@@ -75,18 +87,11 @@ pub fn page(results: &[Vec<Row>]) -> Result<Option<String>> {
             ahead += 1;
             let (scene, setting) = (&worst.row.scene, worst.row.setting().label());
             let error = format!("{} {}", number(fault.of(worst.row) * 1e3), fault.unit());
-            let _ = writeln!(
-                text,
-                "| {scene} | {} | {} | {setting} | {error} | {} |",
-                fault.name(),
-                of.len(),
-                worst.ratio()
-            );
+            let (count, ratio) = (of.len(), worst.ratio());
+            let _ = writeln!(text, "| {scene} | {} | {count} | {setting} | {error} | {ratio} |", fault.name());
         }
-        table(&mut tables, rows, &leads, faults);
     }
-    let _ = writeln!(text, "\nAnother engine is ahead somewhere in {ahead} of {compared} pairs of scene and error.");
-    Ok(Some(text + &tables))
+    Ok((text, ahead, compared))
 }
 
 /// All rows of a scene, and for each row of another engine the errors in which it is ahead.

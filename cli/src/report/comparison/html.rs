@@ -4,7 +4,7 @@ use std::fmt::{Display, Write as _};
 
 use super::pareto::profile;
 use crate::report::plot::Scale::{Decades, Share};
-use crate::report::plot::{Frame, Series, svg};
+use crate::report::plot::{Frame, Look, Series, svg};
 
 pub(super) fn table(html: &mut String, headings: &[String], rows: impl IntoIterator<Item = Vec<String>>) {
     let headings = headings.iter().map(|heading| format!("<th>{heading}</th>")).collect::<String>();
@@ -24,16 +24,16 @@ pub(super) fn profile_picture(
     title: &str,
     y: &str,
     count: usize,
-    names: &[String],
+    names: &[(String, Look)],
     costs: &[Vec<Option<f64>>],
 ) -> String {
-    let named = names.iter().enumerate().zip(profile(costs));
-    let series = |((look, name), ratios): ((usize, &String), Vec<f64>)| {
+    let named = names.iter().zip(profile(costs));
+    let series = |((name, look), ratios): (&(String, Look), Vec<f64>)| {
         let share = |n: usize| n as f64 / count as f64;
         let line = ratios.iter().enumerate().map(|(i, &ratio)| (ratio, share(i + 1))).collect();
-        Series { name: name.clone(), look, points: Vec::new(), line }
+        Series { name: name.clone(), look: *look, points: Vec::new(), line }
     };
-    let frame = Frame { title, x: "time, relative to the fastest", y, scales: (Decades, Share), size: (400, 280) };
+    let frame = Frame { title, x: "time, relative to the fastest", y, scales: (Decades, Share), size: (440, 280) };
     svg(&frame, &named.map(series).collect::<Vec<_>>())
 }
 

@@ -12,6 +12,7 @@ mod problems;
 mod row;
 mod solves;
 mod survey;
+mod tables;
 mod windows;
 
 pub use contender::{Contender, Drystone, Extent, Setting, Team};
@@ -22,6 +23,7 @@ pub use points::{drystone, scene, scenes, substeps};
 pub use row::{Row, WindowRow};
 pub use solves::SolveRow;
 pub use survey::{Report, Survey};
+pub use tables::tables;
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,7 @@ use super::row::Row;
 use super::solves::SolveRow;
 use crate::report::number::number;
 use crate::report::plot::Scale::Decades;
-use crate::report::plot::{Frame, Series, grid, svg};
+use crate::report::plot::{Frame, Look, Series, grid, svg};
 use drystone::Result;
 
 pub struct Page {
@@ -30,7 +30,7 @@ pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     let has_line = |side: &&String| results.iter().any(|rows| of_side(rows, side).len() > 1);
     let drawn: Vec<_> = sides.iter().filter(has_line).cloned().collect();
     let main =
-        grid(&results.iter().map(|rows| picture(rows, &drawn, faults(rows)[0], (410, 320))).collect::<Vec<_>>(), 3);
+        grid(&results.iter().map(|rows| picture(rows, &drawn, faults(rows)[0], (440, 320))).collect::<Vec<_>>(), 3);
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Speed against error</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>\n{}</style></head><body>\n<h1>Speed against error</h1>\n",
@@ -53,6 +53,14 @@ fn side(row: &Row) -> String {
     if row.backend == "gpu" { format!("{} gpu", row.engine) } else { row.engine.clone() }
 }
 
+/// The look of the engine, dashed on a GPU.
+fn look(side: &str) -> Look {
+    match side.split_once(' ') {
+        Some((engine, _)) => Look::of_engine(engine).dashed(),
+        None => Look::of_engine(side),
+    }
+}
+
 /// All sides: [`OWN`], the other engines, then the other sides of [`OWN`].
 fn sides(results: &[Vec<Row>]) -> Vec<String> {
     let all: BTreeSet<_> = results.iter().flatten().map(side).collect();
@@ -61,7 +69,7 @@ fn sides(results: &[Vec<Row>]) -> Vec<String> {
     own.into_iter().chain(others).chain(same).collect()
 }
 
-fn of_side<'a>(rows: &'a [Row], wanted: &str) -> Vec<&'a Row> {
+pub(super) fn of_side<'a>(rows: &'a [Row], wanted: &str) -> Vec<&'a Row> {
     rows.iter().filter(|row| side(row) == wanted).collect()
 }
 
@@ -69,7 +77,7 @@ fn present<'a>(rows: &'a [Row], sides: &'a [String]) -> impl Iterator<Item = (&'
     sides.iter().map(|name| (name, of_side(rows, name))).filter(|(_, rows)| !rows.is_empty())
 }
 
-fn faults(rows: &[Row]) -> &'static [Fault] {
+pub(super) fn faults(rows: &[Row]) -> &'static [Fault] {
     rows.first().map_or(&[Fault::Mean], Fault::of_scene)
 }
 
@@ -99,7 +107,7 @@ fn picture(rows: &[Row], sides: &[String], fault: Fault, size: (u32, u32)) -> St
     let place = |row: &Row| (row.ms, fault.of(row) * 1e3);
     let series = |(name, rows): (&String, Vec<&Row>)| Series {
         name: name.clone(),
-        look: sides.iter().position(|side| side == name).unwrap_or(0),
+        look: look(name),
         points: rows.iter().filter(|r| r.holds()).map(|r| (place(r).0, place(r).1, point_label(r))).collect(),
         line: front(&rows, fault).into_iter().map(place).collect(),
     };
@@ -161,7 +169,8 @@ fn profiles(html: &mut String, results: &[Vec<Row>], sides: &[String]) -> Result
         };
         let costs = sides.iter().map(cost).collect::<Result<Vec<_>>>()?;
         let title = format!("error of at most {} mm", level * 1e3);
-        html.push_str(&inline(&profile_picture(&title, "share of scenes", results.len(), sides, &costs)));
+        let named: Vec<_> = sides.iter().map(|side| (side.clone(), look(side))).collect();
+        html.push_str(&inline(&profile_picture(&title, "share of scenes", results.len(), &named, &costs)));
     }
     html.push_str("</div>\n");
     Ok(())
@@ -176,7 +185,7 @@ fn scene(html: &mut String, rows: &[Row], sides: &[String], drawn: &[String]) {
         first.hash, first.run
     );
     for &fault in faults(rows) {
-        html.push_str(&inline(&picture(rows, drawn, fault, (590, 400))));
+        html.push_str(&inline(&picture(rows, drawn, fault, (610, 400))));
     }
     html.push_str("</div>\n");
     at_fixed_times(html, rows, sides);

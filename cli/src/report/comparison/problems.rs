@@ -6,21 +6,16 @@ use super::html::{cell, escape, inline, profile_picture, table};
 use super::solves::SolveRow;
 use crate::report::number::number;
 use crate::report::plot::Scale::Decades;
-use crate::report::plot::{Frame, Series, svg};
+use crate::report::plot::{Frame, Look, Series, svg};
 
-const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
+/// Errors that tables have the times of.
+pub(super) const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     if solves.is_empty() {
         return;
     }
-    // The solvers in the order of the rows.
-    let mut solvers: Vec<String> = Vec::new();
-    for solver in solves.iter().flatten().map(SolveRow::solver) {
-        if !solvers.contains(&solver) {
-            solvers.push(solver);
-        }
-    }
+    let solvers = solvers(solves);
     let _ = writeln!(
         html,
         "<h2>Contact problems</h2>\n<p>The problems are single steps with hard contacts, solved from zero impulses. The error e_vel is the natural map in \
@@ -33,7 +28,8 @@ pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
         let costs: Vec<Vec<_>> =
             solvers.iter().map(|s| solves.iter().map(|rows| time_to(rows, s, level)).collect()).collect();
         let title = format!("e_vel of at most {level}");
-        html.push_str(&inline(&profile_picture(&title, "share of problems", solves.len(), &solvers, &costs)));
+        let named: Vec<_> = (0..).zip(&solvers).map(|(k, solver)| (solver.clone(), Look::nth(k))).collect();
+        html.push_str(&inline(&profile_picture(&title, "share of problems", solves.len(), &named, &costs)));
     }
     html.push_str("</div>\n<h3>Time to an error [ms]</h3>\n");
     let time = |rows: &[SolveRow], level, solver: &str| time_to(rows, solver, level).map_or("-".into(), number);
@@ -49,6 +45,17 @@ pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
         html.push_str(&inline(&curves(rows, &solvers)));
     }
     html.push_str("</div></details>\n");
+}
+
+/// The solvers in the order of the rows.
+pub(super) fn solvers(solves: &[Vec<SolveRow>]) -> Vec<String> {
+    let mut solvers: Vec<String> = Vec::new();
+    for solver in solves.iter().flatten().map(SolveRow::solver) {
+        if !solvers.contains(&solver) {
+            solvers.push(solver);
+        }
+    }
+    solvers
 }
 
 /// A table with a row for each problem and a column for each value and solver.
@@ -71,7 +78,7 @@ fn grid_table<const N: usize>(
 }
 
 /// Least time in which a solver reaches an error (ms).
-fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
+pub(super) fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)
 }
@@ -81,9 +88,9 @@ fn curves(rows: &[SolveRow], solvers: &[String]) -> String {
         let of = rows.iter().filter(|row| row.solver() == *name && row.e_vel > 0.0);
         let line: Vec<_> = of.clone().map(|row| (row.ms_low, row.e_vel)).collect();
         let points = line.iter().map(|&(ms, e)| (ms, e, String::new())).collect();
-        Series { name: name.clone(), look, points, line }
+        Series { name: name.clone(), look: Look::nth(look), points, line }
     });
     let frame =
-        Frame { title: &rows[0].problem, x: "time [ms]", y: "e_vel", scales: (Decades, Decades), size: (400, 300) };
+        Frame { title: &rows[0].problem, x: "time [ms]", y: "e_vel", scales: (Decades, Decades), size: (480, 300) };
     svg(&frame, &series.collect::<Vec<_>>())
 }

@@ -34,8 +34,8 @@ pub struct Survey<'a> {
 }
 
 pub struct Report {
-    results: Vec<Vec<Row>>,
-    solves: Vec<Vec<SolveRow>>,
+    pub(super) results: Vec<Vec<Row>>,
+    pub(super) solves: Vec<Vec<SolveRow>>,
 }
 
 impl Survey<'_> {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::report::comparison::WindowRow;
 use crate::report::number::number;
-use crate::report::plot::{Frame, Scale, Series, grid, svg};
+use crate::report::plot::{Frame, Look, Scale, Series, grid, svg};
 
 /// The engine of the page.
 pub(super) const OWN: &str = "drystone";
@@ -73,20 +73,22 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
 /// Time of a step over the run, one frame a scene, on the least number of threads.
 pub(super) fn picture(rows: &[WindowRow]) -> String {
     let threads = rows.iter().map(|r| r.threads).min().unwrap_or(1);
-    let known = distinct(rows.iter().map(|r| &*r.setting));
     let frame_of = |scene: &str| {
         let settings = distinct(rows.iter().filter(|r| r.scene == scene).map(|r| &*r.setting));
         let series = settings.iter().filter_map(|setting| {
             let own = thirds(rows, scene, threads, setting);
-            own.first()?;
+            let engine = &*own.first()?.engine;
+            // An engine's first setting is its default.
+            let is_first = rows.iter().find(|r| r.engine == engine).is_some_and(|r| r.setting == **setting);
+            let look = Look::of_engine(engine);
+            let look = if is_first { look } else { look.dashed() };
             let line: Vec<_> = own.iter().map(|r| ((r.from - 1 + r.to) as f64 / 2.0, r.ms)).collect();
             let points = line.iter().map(|&(x, y)| (x, y, String::new())).collect();
-            let look = known.iter().position(|known| known == setting).unwrap_or(0);
             Some(Series { name: (*setting).to_owned(), look, points, line })
         });
         let title = format!("{scene}, threads: {threads}");
         let scales = (Scale::Linear, Scale::Decades);
-        let frame = Frame { title: &title, x: "step", y: "ms a step", scales, size: (440, 300) };
+        let frame = Frame { title: &title, x: "step", y: "ms a step", scales, size: (520, 300) };
         svg(&frame, &series.collect::<Vec<_>>())
     };
     grid(&distinct(rows.iter().map(|r| &*r.scene)).into_iter().map(frame_of).collect::<Vec<_>>(), 2)

@@ -1,6 +1,8 @@
 //! Plots of points and lines as SVG text.
 
 mod axis;
+mod labels;
+mod look;
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::Ranged;
@@ -8,21 +10,13 @@ use plotters::prelude::*;
 
 pub use axis::Scale;
 use axis::{Axis, plain};
-
-/// Colors that differ for the color-blind too (Okabe and Ito).
-const COLORS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
+use labels::{Labels, apart};
+pub use look::{Look, engine_color};
+use look::{dashes, mark};
 
 pub struct Series {
     pub name: String,
-    /// Number of color and marker.
-    pub look: usize,
+    pub look: Look,
     pub points: Vec<(f64, f64, String)>,
     /// Corners of the line: straight from one to the next if x is linear, else in stairs.
     pub line: Vec<(f64, f64)>,
@@ -70,13 +64,27 @@ pub fn grid(pictures: &[String], columns: usize) -> String {
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
+/// Pixels between the lines of the legend, and of its marks before the names.
+const LINE: i32 = 15;
+const SIGN: i32 = 34;
+
+/// Height and mean width of a letter in fonts of 12 and 11 pixels (pixels).
+const LETTER: (i32, f64) = (12, 6.6);
+const SMALL: (i32, f64) = (11, 6.0);
+
+fn width(text: &str, (_, letter): (i32, f64)) -> i32 {
+    (text.chars().count() as f64 * letter).ceil() as i32
+}
+
 fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series], x: Axis, y: Axis) -> Drawn {
     root.fill(&WHITE)?;
     let right = x.range().end;
+    let drawn = || series.iter().filter(|s| !(s.points.is_empty() && s.line.is_empty()));
+    let names = drawn().map(|s| width(&s.name, LETTER)).max().unwrap_or(0);
     let mut chart = ChartBuilder::on(root)
         .caption(frame.title, ("sans-serif", 16))
         .margin(8)
-        .margin_right(16)
+        .margin_right(if names > 0 { names + SIGN + 12 } else { 16 })
         .x_label_area_size(40)
         .y_label_area_size(58)
         .build_cartesian_2d(x, y)?;
@@ -91,64 +99,46 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
         .label_style(("sans-serif", 12))
         .axis_desc_style(("sans-serif", 13))
         .draw()?;
-    // Positions of the labels so far.
-    let mut taken: Vec<(i32, i32)> = Vec::new();
-    for Series { name, look, points, line } in series {
-        let color = COLORS[look % COLORS.len()];
-        let path = match frame.scales {
-            (Scale::Linear, _) => line.clone(),
-            (_, y) => stairs(line, right, y == Scale::Share),
-        };
-        chart
-            .draw_series(LineSeries::new(path, color.stroke_width(2)))?
-            .label(name)
-            .legend(move |at| EmptyElement::at(at) + marker(*look, (10, 0), color.filled()));
-        for (px, py, label) in points {
+    let path = |line: &[(f64, f64)]| match frame.scales {
+        (Scale::Linear, _) => line.to_vec(),
+        (_, y) => stairs(line, right, y == Scale::Share),
+    };
+    let paths: Vec<Vec<_>> =
+        series.iter().map(|s| path(&s.line).iter().map(|point| chart.backend_coord(point)).collect()).collect();
+    let places: Vec<Vec<_>> =
+        series.iter().map(|s| s.points.iter().map(|p| chart.backend_coord(&(p.0, p.1))).collect()).collect();
+    let (columns, rows) = chart.plotting_area().get_pixel_range();
+    let mut labels = Labels::new(columns.clone(), rows.clone());
+    paths.iter().for_each(|path| labels.keep_off_path(path));
+    places.iter().flatten().for_each(|&place| labels.keep_off_mark(place));
+    for ((Series { look, points, line, .. }, path), places) in series.iter().zip(&paths).zip(&places) {
+        for piece in dashes(*look, path) {
+            root.draw(&PathElement::new(piece, look.color().stroke_width(2)))?;
+        }
+        for ((px, py, label), &place) in points.iter().zip(places) {
             let best = line.contains(&(*px, *py));
-            let style = if best { color.filled() } else { color.mix(0.35).stroke_width(1) };
-            chart.plotting_area().draw(&(EmptyElement::at((*px, *py)) + marker(*look, (0, 0), style)))?;
-            let (x, y) = chart.backend_coord(&(*px, *py));
-            let free = taken.iter().all(|t| (t.0 - x).abs() > 28 || (t.1 - y).abs() > 12);
-            if best && free && !label.is_empty() {
-                taken.push((x, y));
-                let style = ("sans-serif", 11).into_font().color(&color);
-                chart
-                    .plotting_area()
-                    .draw(&(EmptyElement::at((*px, *py)) + Text::new(label.clone(), (6, -13), style)))?;
+            let style = if best { look.color().filled() } else { look.color().mix(0.35).stroke_width(1) };
+            root.draw(&mark(*look, place, style))?;
+            let free = if best { labels.free(place, (width(label, SMALL), SMALL.0)) } else { None };
+            if let Some(at) = free.filter(|_| !label.is_empty()) {
+                root.draw(&Text::new(label.clone(), at, ("sans-serif", SMALL.0).into_font().color(&look.text())))?;
             }
         }
     }
-    let places = series.iter().flat_map(|s| &s.points).map(|p| chart.backend_coord(&(p.0, p.1)));
-    let corner = if frame.scales.1 == Scale::Share {
-        SeriesLabelPosition::LowerRight
-    } else {
-        emptiest(frame.size, &places.collect::<Vec<_>>())
-    };
-    chart
-        .configure_series_labels()
-        .position(corner)
-        .label_font(("sans-serif", 12))
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.2))
-        .draw()?;
+    // Beside the plot, each name where its curve ends.
+    let ends = paths.iter().zip(&places).map(|(path, places)| path.last().or(places.last()).map(|end| end.1));
+    let mut legend: Vec<_> = series.iter().zip(ends).filter_map(|(s, end)| Some((end?, s))).collect();
+    legend.sort_by_key(|(end, _)| *end);
+    let middles = apart(&legend.iter().map(|(end, _)| *end).collect::<Vec<_>>(), LINE, rows);
+    for ((end, Series { name, look, .. }), middle) in legend.iter().zip(middles) {
+        let (edge, sign) = (columns.end, (columns.end + SIGN - 10, middle));
+        root.draw(&PathElement::new([(edge + 1, *end), (edge + 12, middle), (sign.0, middle)], look.color().mix(0.6)))?;
+        root.draw(&mark(*look, sign, look.color().filled()))?;
+        let style = ("sans-serif", LETTER.0).into_font().color(&look.text());
+        root.draw(&Text::new(name.clone(), (sign.0 + 10, middle - 7), style))?;
+    }
     root.present()?;
     Ok(())
-}
-
-/// The corner with the fewest of these places for the legend; the upper right before others.
-fn emptiest((width, height): (u32, u32), places: &[(i32, i32)]) -> SeriesLabelPosition {
-    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
-    let (right, left) = ((width * 3 / 5) as i32, (width / 2) as i32);
-    let (upper, lower) = ((height * 2 / 5) as i32, (height / 2) as i32);
-    let in_corner = |corner: &SeriesLabelPosition, &&(x, y): &&(i32, i32)| match corner {
-        UpperRight => x > right && y < upper,
-        LowerLeft => x < left && y > lower,
-        LowerRight => x > right && y > lower,
-        _ => x < left && y < upper,
-    };
-    let corners = [UpperRight, LowerLeft, LowerRight, UpperLeft];
-    let count = |corner: &SeriesLabelPosition| places.iter().filter(|place| in_corner(corner, place)).count();
-    corners.into_iter().min_by_key(count).unwrap_or(UpperRight)
 }
 
 /// Stairs through the corners along the axes, continued to the right end.
@@ -164,28 +154,6 @@ fn stairs(line: &[(f64, f64)], right: f64, rising: bool) -> Vec<(f64, f64)> {
     }
     stairs.extend(line.last().map(|&(_, y)| (right, y)));
     stairs
-}
-
-/// A circle, triangle, square, diamond, X or inverted triangle of some 8 pixels.
-fn marker<'a>(look: usize, at: (i32, i32), style: ShapeStyle) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
-    let around = |corners: &[(i32, i32)]| corners.iter().map(|c| (at.0 + c.0, at.1 + c.1)).collect::<Vec<_>>();
-    let closed = |corners: &[(i32, i32)]| {
-        let mut corners = around(corners);
-        if style.filled {
-            Polygon::new(corners, style).into_dyn()
-        } else {
-            corners.push(corners[0]);
-            PathElement::new(corners, style).into_dyn()
-        }
-    };
-    match look % COLORS.len() {
-        0 => Circle::new(at, 4, style).into_dyn(),
-        1 => closed(&[(-5, 4), (5, 4), (0, -5)]),
-        2 => closed(&[(-4, -4), (4, -4), (4, 4), (-4, 4)]),
-        3 => closed(&[(-5, 0), (0, -5), (5, 0), (0, 5)]),
-        4 => Cross::new(at, 4, style.stroke_width(2)).into_dyn(),
-        _ => closed(&[(-5, -4), (5, -4), (0, 5)]),
-    }
 }
 
 #[cfg(test)]
@@ -204,18 +172,40 @@ mod tests {
         use Scale::{Decades, Linear, Share};
         for scales in [(Decades, Decades), (Decades, Share), (Linear, Linear), (Linear, Decades)] {
             let frame = Frame { title: "T & t", x: "time ms", y: "depth mm", scales, size: (400, 300) };
-            let of = |name: &str, look| Series {
+            let of = |name: &str, look: Look| Series {
                 name: name.into(),
                 look,
                 points: vec![(0.1, 0.2, "8x1".into()), (0.5, f64::NAN, String::new()), (2.0, 0.1, String::new())],
                 line: vec![(0.1, 0.2)],
             };
-            let all: Vec<_> = (0..6).map(|look| of(&format!("name {look}"), look)).collect();
+            let all: Vec<_> = (0..6).map(|k| of(&format!("name {k}"), Look::nth(k))).collect();
             let text = svg(&frame, &all);
             for part in ["<svg", "T &amp; t", "time ms", "depth mm", "8x1", "name 0", "name 5"] {
                 assert!(text.contains(part), "{part} is missing");
             }
             assert!(svg(&frame, &[]).contains("<svg"));
         }
+    }
+
+    /// Each name stands once, beside the plot, in the order of the ends of the curves.
+    #[test]
+    fn names_stand_beside_the_ends_of_their_curves() {
+        let frame = Frame { title: "t", x: "x", y: "y", scales: (Scale::Linear, Scale::Linear), size: (400, 300) };
+        let of = |name: &str, look, end| {
+            let line = vec![(0.0, 1.0), (1.0, end)];
+            Series { name: name.into(), look, points: Vec::new(), line }
+        };
+        let all = [("low", 0.0), ("high", 9.0), ("also high", 9.0)];
+        let all: Vec<_> = (0..).zip(all).map(|(k, (name, end))| of(name, Look::nth(k), end)).collect();
+        let text = svg(&frame, &all);
+        let place = |name: &str| {
+            let before = text.split(&format!("\n{name}\n</text>")).next().expect("a name");
+            let tag = &before[before.rfind("<text").expect("a tag")..];
+            let of = |key: &str| tag.split(&format!("{key}=\"")).nth(1)?.split('"').next()?.parse::<i32>().ok();
+            (of(" x").expect("a place"), of(" y").expect("a place"))
+        };
+        let (low, high, also) = (place("low"), place("high"), place("also high"));
+        assert!(low.0 == high.0 && high.0 > 280, "{low:?} {high:?}");
+        assert!(high.1 < 60 && low.1 > 200 && also.1 - high.1 >= LINE, "{high:?} {also:?} {low:?}");
     }
 }

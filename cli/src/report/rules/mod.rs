@@ -12,7 +12,7 @@ use crate::settings;
 use drystone::metrics::{drift, in_place_count, rms_speed};
 use drystone::{BodyKind, Error, Reference, Result, Scene, Simulation, World};
 
-use super::plot::{Frame, Scale, Series, svg};
+use super::plot::{Frame, Look, Scale, Series, svg};
 
 pub struct RulesReport {
     pub page: String,
@@ -91,7 +91,7 @@ impl RulesReport {
         let _ = writeln!(self.page, "\n![{file}](rules/{file})");
         let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {
             line.retain(|p| scale != Scale::Decades || p.1 > 0.0);
-            Series { name, look, points: Vec::new(), line }
+            Series { name, look: Look::nth(look), points: Vec::new(), line }
         });
         let frame = Frame { title, x: "time s", y, scales: (Scale::Linear, scale), size: (760, 420) };
         self.pictures.push((file, svg(&frame, &series.collect::<Vec<_>>())));
