@@ -227,7 +227,8 @@ fn joint(random: &mut Random, kind: Kind, joint: Joint, beside: Vec3) -> Joint {
 
 /// A drive for each axis of a joint that is not locked, of most. `load` is what the joint bears about (N).
 fn drive(random: &mut Random, family: Family, joint: &mut Joint, load: f32) {
-    let is_ball = joint.is_ball();
+    // No scene file drives both a distance and angles.
+    let (is_ball, is_distance) = (joint.is_ball(), matches!(joint.linear, Linear::Distance(_)));
     let linear: &mut [Axis] = match &mut joint.linear {
         Linear::Axes(axes) => axes,
         Linear::Distance(distance) => std::slice::from_mut(distance),
@@ -241,7 +242,7 @@ fn drive(random: &mut Random, family: Family, joint: &mut Joint, load: f32) {
         let (target, is_weak) = (random.within(-0.3, 0.3), random.happens(0.2));
         // A torque is that of the load on a lever of 0.5 m.
         let load = load * strength * if is_angle { 0.5 } else { 1.0 };
-        if !is_driven || *axis == Axis::LOCKED || (is_ball && !is_angle) {
+        if !is_driven || *axis == Axis::LOCKED || (is_ball && !is_angle) || (is_distance && is_angle) {
             continue;
         }
         // A spring of a distance has its target already.
@@ -270,7 +271,7 @@ impl Drawn {
         let has_floor = random.happens(0.5);
         if has_floor {
             world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
-        } else if random.happens(0.5) {
+        } else if random.happens(0.8) {
             world.gravity = Vec3::ZERO;
         }
         let count = 2 + random.below(6);

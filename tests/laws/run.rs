@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use drystone::glam::DVec3;
-use drystone::preset::Preset;
 use drystone::{Backend, BodyKind, Cpu, Listen, Scene, Simulation, SolverConfig, World};
 
 use super::measures::{Gap, Mechanics, Springs, is_alone, size};
@@ -14,7 +13,8 @@ pub const SHARE: f64 = 1e-3;
 pub const SHARE_OF_WEIGHT: f64 = 1e-6;
 /// The largest gap of a joint, over its lever, or angle (rad).
 pub const MOST_GAP: f64 = 0.01;
-/// The largest change of momentum of what nothing outside touches, over the sum of the sizes of the momenta of the bodies.
+/// The largest change of momentum of what nothing outside touches, over the sum of the sizes of the momenta of the bodies, beyond what the
+/// rounding of places and of a fall explains ([`Rounding`]).
 ///
 /// A velocity of f32 rounds by 2^-24 of itself. A step of 8 substeps changes it some 50 times in each of its joints and contacts, so that 10 s of
 /// 60 steps round it some 10^5 times. Signs of these errors are not those of each other: their sum is 2^-24 times the root of 10^5, 2e-5; five
@@ -35,10 +35,6 @@ impl Case {
         Self { scene: Scene { dt: 1.0 / rate as f32, ..scene }, config, seconds }
     }
 
-    pub fn of_preset(scene: Scene, preset: Preset, rate: u32, seconds: f32) -> Self {
-        Self::new(scene, preset.config(), rate, seconds)
-    }
-
     pub fn steps(&self) -> u32 {
         (self.seconds / self.scene.dt).round() as u32
     }
@@ -53,6 +49,8 @@ pub struct Verdict {
     pub rise: f64,
     /// Most that it rose beyond what law 1 allows (J); above 0 the law is broken.
     pub excess: f64,
+    /// Likewise above the value that it began with: less than the excess where energy is lost and comes back.
+    pub above_start: f64,
     /// The step in which the law was broken first.
     pub broken_at: Option<u32>,
     /// The energy that the world began with: in motion, in springs, of its weight over its size, of what pushes it apart (J).
@@ -231,20 +229,43 @@ impl Driver {
     }
 }
 
+/// What rounding alone does to the momentum of what nothing outside touches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rounding {
+    /// Each substep of a fall rounds the velocity of a body by up to 2^-24 of itself, and all of them alike (kg m/s).
+    linear: f64,
+    /// Each substep rounds the place x of a body by up to 2^-24 of it, one this way and one that way: after n of them the body is off by
+    /// x 2^-24 times the root of n, with its momentum (kg m²/s).
+    angular: f64,
+}
+
+impl Rounding {
+    fn add(&mut self, world: &World, now: &Mechanics, substeps: f64) {
+        const UNIT: f64 = 1.0 / (1 << 24) as f64;
+        let falls = world.gravity != drystone::glam::Vec3::ZERO;
+        self.linear += if falls { substeps * UNIT * now.momentum.length() } else { 0.0 };
+        let far = world.dynamic().map(|body| f64::from(body.position.length())).fold(0.0, f64::max);
+        self.angular = self.angular.hypot(substeps.sqrt() * UNIT * far * now.momenta);
+    }
+}
+
 /// Follows energy from step to step: the most that it rose above an earlier value.
 #[derive(Clone, Debug)]
 pub struct Passivity {
     lowest: f64,
     /// The largest energy in motion and in springs so far (J).
     in_motion: f64,
+    start: f64,
     pub rise: f64,
     pub excess: f64,
+    pub above_start: f64,
 }
 
 impl Passivity {
     /// Of a world that begins with so much energy, of which so much is in motion (J).
     pub fn new(energy: f64, in_motion: f64) -> Self {
-        Self { lowest: energy, in_motion, rise: 0.0, excess: f64::NEG_INFINITY }
+        let none = f64::NEG_INFINITY;
+        Self { lowest: energy, in_motion, start: energy, rise: 0.0, excess: none, above_start: none }
     }
 
     /// After a step: the energy without the work that was done so far, that in motion, and what the law allows besides 0.1 % of the latter (J).
@@ -256,13 +277,14 @@ impl Passivity {
         let excess = rise - allowance - SHARE * self.in_motion;
         self.rise = self.rise.max(rise);
         self.excess = self.excess.max(excess);
+        self.above_start = self.above_start.max(excess + self.lowest - self.start);
         self.lowest = self.lowest.min(energy);
         excess <= 0.0
     }
 
     /// Forgets what was before.
     fn restart(&mut self, energy: f64) {
-        self.lowest = energy;
+        (self.lowest, self.start) = (energy, energy);
     }
 }
 
@@ -304,7 +326,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     let (mut pushed, mut open) = (Overlaps::new(), open_joints(&simulation.world));
     let (mut work, mut given, mut slack, mut push_left) = (0.0, 0.0, 0.0, 0.0);
     let (mut momenta, mut spins) = (start.momenta, start.spins);
-    let mut drift = [0.0_f64; 2];
+    let (mut drift, mut rounding) = ([0.0_f64; 2], Rounding::default());
     for step in 0..case.steps() {
         if let Err(e) = simulation.step(case.scene.dt) {
             verdict.lost = Some(e.to_string());
@@ -353,17 +375,19 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
             passivity.restart(total);
             push_left = 0.0;
         }
+        let substeps = dynamic.iter().map(|&i| simulation.substeps_of(i)).fold(1, u32::max);
         if alone {
             (momenta, spins) = (momenta.max(after.momenta), spins.max(after.spins));
             let fallen = start.momentum + after.mass * gravity * (dt * f64::from(step + 1));
-            drift[0] = drift[0].max((after.momentum - fallen).length());
-            drift[1] = drift[1].max((after.spin - start.spin).length());
+            rounding.add(world, &after, f64::from(substeps));
+            drift[0] = drift[0].max((after.momentum - fallen).length() - rounding.linear);
+            drift[1] = drift[1].max((after.spin - start.spin).length() - rounding.angular);
         }
         let gap = Gap::largest(world);
         if gap.worst() > verdict.gap.worst() {
             (verdict.gap, verdict.gap_at) = (gap, step);
         }
-        verdict.substeps = dynamic.iter().map(|&i| simulation.substeps_of(i)).fold(verdict.substeps, u32::max);
+        verdict.substeps = verdict.substeps.max(substeps);
         if traces {
             verdict.trace.push([motion(&after), if alone { 0.0 } else { after.potential }, springs.energy, work]);
         }
@@ -371,12 +395,10 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     }
     verdict.work = given;
     verdict.scale += given;
-    (verdict.rise, verdict.excess) = (passivity.rise, passivity.excess);
+    (verdict.rise, verdict.excess, verdict.above_start) = (passivity.rise, passivity.excess, passivity.above_start);
     if alone {
         let share = |drift: f64, whole: f64| if whole > 0.0 { drift / whole } else { 0.0 };
-        // What falls has a momentum that rounds by itself.
-        let falling = start.mass * gravity.length() * f64::from(case.seconds);
-        verdict.drift = Some([share(drift[0], momenta + start.momentum.length() + falling), share(drift[1], spins)]);
+        verdict.drift = Some([share(drift[0], momenta + start.momentum.length()), share(drift[1], spins)]);
     }
     verdict
 }

@@ -26,9 +26,10 @@ fn line(name: &str, rows: &[&Row], worst: usize) -> String {
     let seeds: Vec<String> = by_gain.iter().take(worst).map(|(drawn, _)| drawn.seed.to_string()).collect();
     let seconds: f64 = rows.iter().map(|(_, (_, seconds))| seconds).sum();
     format!(
-        "| {name} | {} | {} | {} | {} | {} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {:.3} | {} |\n",
+        "| {name} | {} | {} | {} | {} | {} | {} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {:.3} | {} |\n",
         rows.len(),
         share(&|v| v.lost.is_some() || v.excess > 0.0),
+        share(&|v| v.lost.is_some() || v.above_start > 0.0),
         share(&gained(0.01)),
         count(&gained(10.0)),
         count(&gained(1e6)),
@@ -48,8 +49,8 @@ fn line(name: &str, rows: &[&Row], worst: usize) -> String {
 /// The table, with the worst seeds of each row.
 pub fn text(rows: &[Row], worst: usize) -> String {
     let mut text = String::from(
-        "| worlds | number | break law 1 | gain > 1 % | > 10x | > 1e6x | lost | worst | gap > 1 % | worst gap | drift | worst | spin drift | worst | s each | seeds |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| worlds | number | break law 1 | above start | gain > 1 % | > 10x | > 1e6x | lost | worst | gap > 1 % | worst gap | drift | worst | spin drift | worst | s each | seeds |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for own in rows.chunk_by(same) {
         let name = own[0].0.to_string();
@@ -61,16 +62,17 @@ pub fn text(rows: &[Row], worst: usize) -> String {
 
 /// A line for each world.
 pub fn csv(rows: &[Row]) -> String {
-    let mut text = String::from("world,broken,gain,excess,scale,push,work,gap_share,gap_angle,drift,spin_drift,substeps,broken_at,seconds,lost\n");
+    let mut text = String::from("world,broken,gain,excess,above_start,scale,push,work,gap_share,gap_angle,drift,spin_drift,substeps,broken_at,seconds,lost\n");
     for (drawn, (v, seconds)) in rows {
         let [drift, spin] = v.drift.unwrap_or([f64::NAN; 2]);
         let at = v.broken_at.map_or(String::new(), |step| step.to_string());
         let lost = v.lost.as_deref().unwrap_or_default().replace([',', '\n'], ";");
         text += &format!(
-            "{drawn},{},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.2e},{:.2e},{drift:.2e},{spin:.2e},{},{at},{seconds:.3},{lost}\n",
+            "{drawn},{},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.2e},{:.2e},{drift:.2e},{spin:.2e},{},{at},{seconds:.3},{lost}\n",
             v.broken().join(" "),
             v.gain(),
             v.excess,
+            v.above_start,
             v.scale,
             v.push,
             v.work,
