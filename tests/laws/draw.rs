@@ -59,6 +59,8 @@ words!(
 words!(
     /// The joints of a world.
     Kind {
+        /// Bodies without joints.
+        None = "none",
         Ball = "ball",
         Hinge = "hinge",
         Slider = "slider",
@@ -67,7 +69,7 @@ words!(
         Generic = "generic",
         /// Ropes, rods, springs.
         Distance = "distance",
-        /// Any of them.
+        /// Any of them, for each joint anew.
         All = "all",
     }
 );
@@ -196,7 +198,7 @@ fn joint(random: &mut Random, kind: Kind, joint: Joint, beside: Vec3) -> Joint {
     const KINDS: [Kind; 6] = [Kind::Ball, Kind::Hinge, Kind::Slider, Kind::Fixed, Kind::Generic, Kind::Distance];
     let kind = if kind == Kind::All { KINDS[random.below(KINDS.len())] } else { kind };
     match kind {
-        Kind::Ball | Kind::All => joint,
+        Kind::None | Kind::Ball | Kind::All => joint,
         Kind::Hinge => {
             let angle = limits(random, 2.8, 0.6);
             joint.generic([Axis::LOCKED; 3], [angle, Axis::LOCKED, Axis::LOCKED])
@@ -341,7 +343,7 @@ impl Drawn {
         };
         drive(random, self.family, &mut tie, 10.0 * lighter);
         let moves = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
-        if is_there && (moves(b) || a.is_some_and(moves)) {
+        if is_there && self.kind != Kind::None && (moves(b) || a.is_some_and(moves)) {
             world.join(tie);
         }
     }

@@ -154,9 +154,9 @@ fn each<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync)
 }
 
 fn print(name: &str, verdict: &Verdict) {
-    let Verdict { lost, rise, excess, broken_at, scale, push, work, gap, gap_at, drift, substeps, .. } = verdict;
+    let Verdict { lost, rise, excess, above_start, broken_at, scale, push, work, gap, gap_at, drift, substeps, .. } = verdict;
     println!("{name}: breaks {:?}", verdict.broken());
-    println!("  energy: rise {rise:.3e} J, {excess:.3e} J beyond the law (first in step {broken_at:?}), {:.3e} of {scale:.3e} J; push {push:.2e}, work {work:.2e}", verdict.gain());
+    println!("  energy: rise {rise:.3e} J, {excess:.3e} J beyond the law (first in step {broken_at:?}), {above_start:.3e} J of that above the start, {:.3e} of {scale:.3e} J; push {push:.2e}, work {work:.2e}", verdict.gain());
     println!("  gap: {:.2e} of a lever, {:.2e} rad, {:.2e} m (step {gap_at}); drift {}; at most {substeps} substeps",
         gap.share, gap.angle, gap.distance, drift.map_or("none".into(), |[p, l]| format!("{p:.1e} {l:.1e}")));
     if let Some(lost) = lost {

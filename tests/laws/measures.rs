@@ -286,8 +286,10 @@ fn lever(world: &World, joint: &Joint, at: [DVec3; 2]) -> f64 {
     ends(world, joint).into_iter().zip(at).map(of).fold(1e-9, f64::max)
 }
 
-/// The largest distance of a point of the shapes of a body from its origin (m).
+/// The largest distance of a point of the shapes of a body from its origin, or without shapes the radius of a ball of its inertia (m).
 pub fn size(body: &Body) -> f64 {
     let of = |c: &drystone::world::Collider| f64::from(c.position.length() + c.shape.bounding_radius());
-    body.colliders.iter().map(of).filter(|size| size.is_finite()).fold(0.0, f64::max)
+    let size = body.colliders.iter().map(of).filter(|size| size.is_finite()).fold(0.0, f64::max);
+    let mass = body.mass;
+    if size > 0.0 { size } else { (2.5 * f64::from(mass.principal_inertia.max_element() / mass.mass)).sqrt() }
 }

@@ -8,8 +8,10 @@ use super::run::{Case, Verdict, run};
 /// What is to stay as a world shrinks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
-    /// A gain of energy of at least this share.
+    /// A gain of energy of at least this share, above what the world began with.
     Gain(f64),
+    /// Energy of at least this share that was lost and comes back.
+    Return(f64),
     /// A step is refused, or numbers are not finite.
     Lost,
     /// A gap of at least this share or angle.
@@ -19,12 +21,13 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// The worst that a run shows, at a tenth of its size at least; none if it breaks no law.
+    /// The worst that a run shows, at half of its size or less; none if it breaks no law.
     pub fn of(verdict: &Verdict) -> Option<Self> {
         let drift = verdict.drift.unwrap_or_default();
         match verdict.broken().first().copied()? {
             "finite" => Some(Self::Lost),
-            "energy" => Some(Self::Gain((0.5 * verdict.gain()).min(0.05))),
+            "energy" if verdict.above_start > 0.0 => Some(Self::Gain((0.5 * verdict.lasting_gain()).min(0.05))),
+            "energy" => Some(Self::Return((0.5 * verdict.gain()).min(0.05))),
             "gap" => Some(Self::Gap((0.5 * verdict.gap.worst()).clamp(0.01, 0.1))),
             "momentum" => Some(Self::Drift(0, (0.5 * drift[0]).min(1e-2))),
             _ => Some(Self::Drift(1, (0.5 * drift[1]).min(1e-2))),
@@ -34,7 +37,8 @@ impl Cause {
     /// Whether a run shows it.
     pub fn is_in(self, verdict: &Verdict) -> bool {
         match self {
-            Self::Gain(share) => verdict.lost.is_none() && verdict.excess > 0.0 && verdict.gain() >= share,
+            Self::Gain(share) => verdict.lost.is_none() && verdict.lasting_gain() >= share,
+            Self::Return(share) => verdict.lost.is_none() && verdict.gain() >= share,
             Self::Lost => verdict.lost.is_some() && verdict.scale > 0.0,
             Self::Gap(most) => verdict.lost.is_none() && verdict.gap.worst() >= most,
             Self::Drift(which, most) => verdict.drift.is_some_and(|drift| drift[which] >= most),
@@ -125,7 +129,9 @@ fn changes(world: &World) -> Vec<Change> {
             for simpler in [simpler_free, simpler_locked, simpler_undriven] {
                 all.push(Box::new(move |world| {
                     let handle = world.joints.handles()[k];
-                    world.joint_mut(handle).is_some_and(|joint| axis_of(joint, axis).is_some_and(simpler))
+                    // A ball joint stays one.
+                    let is_fit = |joint: &Joint| axis >= 3 || !joint.holds_anchors();
+                    world.joint_mut(handle).is_some_and(|joint| is_fit(joint) && axis_of(joint, axis).is_some_and(simpler))
                 }));
             }
         }

@@ -14,13 +14,13 @@ fn same(a: &Row, b: &Row) -> bool {
 fn line(name: &str, rows: &[&Row], worst: usize) -> String {
     let count = |is: &dyn Fn(&Verdict) -> bool| rows.iter().filter(|(_, (verdict, _))| is(verdict)).count();
     let share = |is: &dyn Fn(&Verdict) -> bool| format!("{:.1} %", 100.0 * count(is) as f64 / rows.len() as f64);
-    let gained = |least: f64| move |v: &Verdict| v.lost.is_none() && v.gain() > least;
+    let gained = |least: f64| move |v: &Verdict| v.lost.is_none() && v.lasting_gain() > least;
     let most = |of: &dyn Fn(&Verdict) -> f64| rows.iter().map(|(_, (v, _))| of(v)).fold(0.0, f64::max);
     let drift = |which: usize| move |v: &Verdict| v.drift.map_or(0.0, |drift| drift[which]);
-    let finite_gain = |v: &Verdict| if v.lost.is_none() { v.gain() } else { 0.0 };
+    let finite_gain = |v: &Verdict| if v.lost.is_none() { v.lasting_gain() } else { 0.0 };
     let mut by_gain: Vec<_> = rows.iter().filter(|(_, (v, _))| v.lost.is_some() || v.excess > 0.0).collect();
     by_gain.sort_by(|x, y| {
-        let size = |row: &Row| if row.1.0.lost.is_some() { f64::INFINITY } else { row.1.0.gain() };
+        let size = |row: &Row| if row.1.0.lost.is_some() { f64::INFINITY } else { row.1.0.lasting_gain().max(1e-9 * row.1.0.gain()) };
         size(y).total_cmp(&size(x))
     });
     let seeds: Vec<String> = by_gain.iter().take(worst).map(|(drawn, _)| drawn.seed.to_string()).collect();
