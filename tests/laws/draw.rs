@@ -217,7 +217,8 @@ fn joint(random: &mut Random, kind: Kind, joint: Joint, beside: Vec3) -> Joint {
         Kind::Distance => {
             let length = beside.length();
             let joint = Joint { anchor_a: joint.anchor_a + beside, ..joint };
-            let (slack, frequency, damping) = (random.within(0.5, 1.5), random.scale(0.3, 10.0), random.within(-1.0, 1.0));
+            let (slack, frequency, damping) =
+                (random.within(0.5, 1.5), random.scale(0.3, 10.0), random.within(-1.0, 1.0));
             match random.below(3) {
                 0 => joint.rope(length * slack.max(1.0)),
                 1 => joint.rod(length),
@@ -239,7 +240,8 @@ fn drive(random: &mut Random, family: Family, joint: &mut Joint, load: f32) {
     for (i, axis) in linear.iter_mut().chain(&mut joint.angular).enumerate() {
         let is_angle = i >= count;
         let (is_driven, strength, is_still) = (random.happens(0.7), random.scale(0.1, 10.0), random.happens(1.0 / 3.0));
-        let speed = random.within(0.5, if is_angle { 10.0 } else { 2.0 }) * if random.happens(0.5) { 1.0 } else { -1.0 };
+        let speed =
+            random.within(0.5, if is_angle { 10.0 } else { 2.0 }) * if random.happens(0.5) { 1.0 } else { -1.0 };
         let (frequency, damping, is_damped) = (random.scale(0.3, 20.0), random.within(0.0, 1.0), random.happens(0.5));
         let (target, is_weak) = (random.within(-0.3, 0.3), random.happens(0.2));
         // A torque is that of the load on a lever of 0.5 m.
@@ -265,9 +267,9 @@ impl Drawn {
     /// The scene: 10 s at 60 steps a second.
     pub fn scene(&self) -> Scene {
         let label = format!("{}/{}-{}", self.family, self.kind, u8::from(self.collides));
-        let stream = label.bytes().fold(self.seed, |all, byte| {
-            SplitMix64::new(all.wrapping_mul(257).wrapping_add(u64::from(byte))).bits()
-        });
+        let stream = label
+            .bytes()
+            .fold(self.seed, |all, byte| SplitMix64::new(all.wrapping_mul(257).wrapping_add(u64::from(byte))).bits());
         let random = &mut Random(SplitMix64::new(stream));
         let mut world = World::new();
         let has_floor = random.happens(0.5);
@@ -282,7 +284,8 @@ impl Drawn {
         let mut chain: Vec<(usize, f32)> = Vec::new();
         for i in 0..count {
             let (mut own, size) = body(random, self.family);
-            at += Vec3::new(random.within(SPACING.0, SPACING.1), 0.0, 0.0) + random.vector(BESIDE) * Vec3::new(0.0, 1.0, 1.0);
+            at += Vec3::new(random.within(SPACING.0, SPACING.1), 0.0, 0.0)
+                + random.vector(BESIDE) * Vec3::new(0.0, 1.0, 1.0);
             if has_floor {
                 at.y = at.y.max(0.87 * size + CLEARANCE);
             }
@@ -292,7 +295,10 @@ impl Drawn {
                 let (velocity, spin) = (random.vector(2.0), random.vector(3.0));
                 // Its work is known from the momentum that it gives: where it turns, only if nothing else gives any.
                 let is_turning = turns && !has_floor;
-                own = own.velocity(if is_turning { Vec3::ZERO } else { velocity }, if is_turning { spin } else { Vec3::ZERO });
+                own = own.velocity(
+                    if is_turning { Vec3::ZERO } else { velocity },
+                    if is_turning { spin } else { Vec3::ZERO },
+                );
             }
             if !self.collides {
                 own.groups = Groups { membership: 2 << i, filter: 1 };
@@ -321,7 +327,9 @@ impl Drawn {
     /// Joins body b to body a, or to the world, `away` from the center of b.
     fn join(&self, random: &mut Random, world: &mut World, ends: [Option<usize>; 2], away: Vec3, is_there: bool) {
         let [Some(b), a] = ends else { return };
-        let pose = |body: Option<usize>| body.map_or((Vec3::ZERO, Quat::IDENTITY), |i| (world.bodies[i].position, world.bodies[i].rotation));
+        let pose = |body: Option<usize>| {
+            body.map_or((Vec3::ZERO, Quat::IDENTITY), |i| (world.bodies[i].position, world.bodies[i].rotation))
+        };
         let ((at_b, turn_b), (at_a, turn_a)) = (pose(Some(b)), pose(a));
         let point = at_b + away;
         let anchor_b = turn_b.inverse() * away;

@@ -154,11 +154,20 @@ fn each<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync)
 }
 
 fn print(name: &str, verdict: &Verdict) {
-    let Verdict { lost, rise, excess, above_start, broken_at, scale, push, work, gap, gap_at, drift, substeps, .. } = verdict;
+    let Verdict { lost, rise, excess, above_start, broken_at, scale, push, work, gap, gap_at, drift, substeps, .. } =
+        verdict;
     println!("{name}: breaks {:?}", verdict.broken());
-    println!("  energy: rise {rise:.3e} J, {excess:.3e} J beyond the law (first in step {broken_at:?}), {above_start:.3e} J of that above the start, {:.3e} of {scale:.3e} J; push {push:.2e}, work {work:.2e}", verdict.gain());
-    println!("  gap: {:.2e} of a lever, {:.2e} rad, {:.2e} m (step {gap_at}); drift {}; at most {substeps} substeps",
-        gap.share, gap.angle, gap.distance, drift.map_or("none".into(), |[p, l]| format!("{p:.1e} {l:.1e}")));
+    println!(
+        "  energy: rise {rise:.3e} J, {excess:.3e} J beyond the law (first in step {broken_at:?}), {above_start:.3e} J of that above the start, {:.3e} of {scale:.3e} J; push {push:.2e}, work {work:.2e}",
+        verdict.gain()
+    );
+    println!(
+        "  gap: {:.2e} of a lever, {:.2e} rad, {:.2e} m (step {gap_at}); drift {}; at most {substeps} substeps",
+        gap.share,
+        gap.angle,
+        gap.distance,
+        drift.map_or("none".into(), |[p, l]| format!("{p:.1e} {l:.1e}"))
+    );
     if let Some(lost) = lost {
         println!("  lost: {lost}");
     }
@@ -177,7 +186,10 @@ fn answer(options: &Options) -> Result<(), String> {
         }
         let verdict = run::run_on(&case, Box::new(Cpu::new()), options.trace);
         for (step, [motion, weight, springs, work]) in verdict.trace.iter().enumerate() {
-            println!("{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e}", motion + weight + springs - work);
+            println!(
+                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e}",
+                motion + weight + springs - work
+            );
         }
         print(name, &verdict);
         return Ok(());
@@ -197,7 +209,12 @@ fn answer(options: &Options) -> Result<(), String> {
     for &family in &options.families {
         for &kind in &options.kinds {
             for &collides in &options.collides {
-                all.extend((options.from..options.from + options.worlds).map(|seed| Drawn { family, kind, collides, seed }));
+                all.extend((options.from..options.from + options.worlds).map(|seed| Drawn {
+                    family,
+                    kind,
+                    collides,
+                    seed,
+                }));
             }
         }
     }

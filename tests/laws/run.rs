@@ -168,10 +168,14 @@ fn push(world: &World, limit: f64, overlaps: &Overlaps, depth: f64, open: &BTree
         let is_pushed = edges.iter().any(|&(a, b, length)| length > 0 && own.contains(&a) && own.contains(&b));
         if is_pushed {
             let gravity = f64::from(world.gravity.length());
-            all += own.iter().filter(|&&i| i != root && i != count).map(|&i| {
-                let d = f64::from(distance[i].max(1));
-                mass(i) * (0.5 * (d * limit).powi(2) + gravity * d * depth)
-            }).sum::<f64>();
+            all += own
+                .iter()
+                .filter(|&&i| i != root && i != count)
+                .map(|&i| {
+                    let d = f64::from(distance[i].max(1));
+                    mass(i) * (0.5 * (d * limit).powi(2) + gravity * d * depth)
+                })
+                .sum::<f64>();
         }
     }
     all
@@ -324,7 +328,8 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     let alone = is_alone(&simulation.world);
     let gravity = simulation.world.gravity.as_dvec3();
     let power = motor_power(&simulation.world);
-    let weight: f64 = simulation.world.dynamic().map(|b| f64::from(b.mass.mass) * size(b)).sum::<f64>() * gravity.length().max(1.0);
+    let weight: f64 =
+        simulation.world.dynamic().map(|b| f64::from(b.mass.mass) * size(b)).sum::<f64>() * gravity.length().max(1.0);
     let dynamic: Vec<usize> =
         (0..simulation.world.bodies.len()).filter(|&i| simulation.world.bodies[i].kind == BodyKind::Dynamic).collect();
     let (mut before, mut springs_before) = (Mechanics::of(&simulation.world), Springs::of(&simulation.world));

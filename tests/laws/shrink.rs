@@ -131,7 +131,9 @@ fn changes(world: &World) -> Vec<Change> {
                     let handle = world.joints.handles()[k];
                     // A ball joint stays one.
                     let is_fit = |joint: &Joint| axis >= 3 || !joint.holds_anchors();
-                    world.joint_mut(handle).is_some_and(|joint| is_fit(joint) && axis_of(joint, axis).is_some_and(simpler))
+                    world
+                        .joint_mut(handle)
+                        .is_some_and(|joint| is_fit(joint) && axis_of(joint, axis).is_some_and(simpler))
                 }));
             }
         }
@@ -154,7 +156,9 @@ fn changes(world: &World) -> Vec<Change> {
             body.mass.principal_inertia = body.mass.principal_inertia.map(rounded);
             body.mass != before
         }));
-        all.push(Box::new(move |world| placed(world, i, |_, turn| (None, if turn == Quat::IDENTITY { None } else { Some(Quat::IDENTITY) }))));
+        all.push(Box::new(move |world| {
+            placed(world, i, |_, turn| (None, if turn == Quat::IDENTITY { None } else { Some(Quat::IDENTITY) }))
+        }));
         all.push(Box::new(move |world| {
             placed(world, i, |at, _| (Some(at.map(rounded)).filter(|&next| next != at), None))
         }));
@@ -229,7 +233,11 @@ fn isotropic(body: &mut Body) -> bool {
     let moments = body.mass.principal_inertia;
     let differ = body.mass.is_anisotropic();
     if differ {
-        let mass = MassProperties { principal_inertia: Vec3::splat(moments.element_sum() / 3.0), principal_frame: Quat::IDENTITY, ..body.mass };
+        let mass = MassProperties {
+            principal_inertia: Vec3::splat(moments.element_sum() / 3.0),
+            principal_frame: Quat::IDENTITY,
+            ..body.mass
+        };
         *body = body.clone().mass_properties(mass);
     }
     differ

@@ -20,7 +20,9 @@ fn line(name: &str, rows: &[&Row], worst: usize) -> String {
     let finite_gain = |v: &Verdict| if v.lost.is_none() { v.lasting_gain() } else { 0.0 };
     let mut by_gain: Vec<_> = rows.iter().filter(|(_, (v, _))| v.lost.is_some() || v.excess > 0.0).collect();
     by_gain.sort_by(|x, y| {
-        let size = |row: &Row| if row.1.0.lost.is_some() { f64::INFINITY } else { row.1.0.lasting_gain().max(1e-9 * row.1.0.gain()) };
+        let size = |row: &Row| {
+            if row.1.0.lost.is_some() { f64::INFINITY } else { row.1.0.lasting_gain().max(1e-9 * row.1.0.gain()) }
+        };
         size(y).total_cmp(&size(x))
     });
     let seeds: Vec<String> = by_gain.iter().take(worst).map(|(drawn, _)| drawn.seed.to_string()).collect();
@@ -62,7 +64,9 @@ pub fn text(rows: &[Row], worst: usize) -> String {
 
 /// A line for each world.
 pub fn csv(rows: &[Row]) -> String {
-    let mut text = String::from("world,broken,gain,excess,above_start,scale,push,work,gap_share,gap_angle,drift,spin_drift,substeps,broken_at,seconds,lost\n");
+    let mut text = String::from(
+        "world,broken,gain,excess,above_start,scale,push,work,gap_share,gap_angle,drift,spin_drift,substeps,broken_at,seconds,lost\n",
+    );
     for (drawn, (v, seconds)) in rows {
         let [drift, spin] = v.drift.unwrap_or([f64::NAN; 2]);
         let at = v.broken_at.map_or(String::new(), |step| step.to_string());
