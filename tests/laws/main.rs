@@ -3,6 +3,7 @@
 //! ```text
 //! laws [--family WORDS] [--kind WORDS] [--collides 0|1|both] [--worlds N] [--from SEED] [--seconds S]
 //!      [--preset NAME] [--rate N] [--set KEY=VALUE]... [--threads N] [--csv FILE] [--worst N]
+//! laws ... --shrinks N --out FOLDER                       the same, and the N worst of each kind shrunk, as scene files
 //! laws --one plain/ball-0/17 [--trace] [--out FILE]      a world by its name, as the first column of the csv has it
 //! laws --scene FILE [--trace]                            a scene file
 //! laws --shrink NAME|FILE --out FILE                     the smallest world that breaks the same law
@@ -46,6 +47,7 @@ struct Options {
     one: Option<String>,
     shrink: Option<String>,
     out: Option<String>,
+    shrinks: usize,
     trace: bool,
 }
 
@@ -75,6 +77,7 @@ impl Options {
             one: None,
             shrink: None,
             out: None,
+            shrinks: 0,
             trace: false,
         };
         while let Some(name) = arguments.next() {
@@ -105,6 +108,7 @@ impl Options {
                 "--worst" => options.worst = number(&value)?,
                 "--one" | "--scene" => options.one = Some(value),
                 "--shrink" => options.shrink = Some(value),
+                "--shrinks" => options.shrinks = number(&value)?,
                 "--out" => options.out = Some(value),
                 _ => return Err(format!("{name}: no such option; the first lines of tests/laws/main.rs name all")),
             }
@@ -126,6 +130,35 @@ impl Options {
         };
         Ok(Case::new(scene, self.config.clone(), self.rate.unwrap_or(rate), self.seconds))
     }
+}
+
+/// Shrinks the worst worlds of each family and kind; a line for each.
+fn shrink_worst(options: &Options, rows: &[table::Row], rate: u32) -> Result<(), String> {
+    let folder = options.out.as_deref().unwrap_or(".");
+    std::fs::create_dir_all(folder).map_err(|e| format!("{folder}: {e}"))?;
+    let worst: Vec<&table::Row> =
+        table::groups(rows).flat_map(|own| table::worst(own).into_iter().take(options.shrinks)).collect();
+    let lines = each(worst.len(), options.threads, |i| {
+        let (drawn, (verdict, _)) = worst[i];
+        let cause = Cause::of(verdict)?;
+        let small = shrunk(&Case::new(drawn.scene(), options.config.clone(), rate, options.seconds), cause);
+        let world = &small.scene.world;
+        let verdict = run::run(&small);
+        let path = format!("{folder}/{}.json", drawn.to_string().replace('/', "-"));
+        let written = write(&small.scene, &path).map_or_else(|e| e, |()| path);
+        Some(format!(
+            "{drawn}: {cause:?}, {} bodies, {} joints, {} steps, gravity {}: gain {:.1e}, lasting {:.1e}, gap {:.1e}; {written}",
+            world.bodies.count(),
+            world.joints.len(),
+            small.steps(),
+            world.gravity.y,
+            verdict.gain(),
+            verdict.lasting_gain(),
+            verdict.gap.worst(),
+        ))
+    });
+    lines.iter().flatten().for_each(|line| println!("{line}"));
+    Ok(())
 }
 
 /// Runs `work` on each of `count` numbers, on so many threads; each world runs on one. The results are in order.
@@ -230,6 +263,9 @@ fn answer(options: &Options) -> Result<(), String> {
         std::fs::write(path, table::csv(&rows)).map_err(|e| format!("{path}: {e}"))?;
     }
     print!("{}", table::text(&rows, options.worst));
+    if options.shrinks > 0 {
+        shrink_worst(options, &rows, rate)?;
+    }
     println!("{} worlds in {:.1} s on {} threads", rows.len(), start.elapsed().as_secs_f64(), options.threads);
     Ok(())
 }

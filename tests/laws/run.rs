@@ -29,11 +29,13 @@ pub struct Case {
     pub config: SolverConfig,
     /// How long it runs (s).
     pub seconds: f32,
+    /// It ends before that once it gained so many times what it began with.
+    pub enough: f64,
 }
 
 impl Case {
     pub fn new(scene: Scene, config: SolverConfig, rate: u32, seconds: f32) -> Self {
-        Self { scene: Scene { dt: 1.0 / rate as f32, ..scene }, config, seconds }
+        Self { scene: Scene { dt: 1.0 / rate as f32, ..scene }, config, seconds, enough: f64::INFINITY }
     }
 
     pub fn steps(&self) -> u32 {
@@ -384,6 +386,9 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         let total = energy(&after, &springs) - work - slack;
         if !passivity.follow(total, motion(&after) + springs.energy, allowance) && verdict.broken_at.is_none() {
             verdict.broken_at = Some(step);
+        }
+        if passivity.above_start > case.enough * (verdict.scale + given) {
+            break;
         }
         if push_left > 0.0 && !is_pushing {
             // From now on nothing is pushed out of where it began.

@@ -11,21 +11,31 @@ fn same(a: &Row, b: &Row) -> bool {
     (a.0.family, a.0.kind, a.0.collides) == (b.0.family, b.0.kind, b.0.collides)
 }
 
-fn line(name: &str, rows: &[&Row], worst: usize) -> String {
+/// The worlds of each family and kind.
+pub fn groups(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
+    rows.chunk_by(same)
+}
+
+/// Those that are lost or break law 1, the worst first.
+pub fn worst(rows: &[Row]) -> Vec<&Row> {
+    let mut broken: Vec<_> = rows.iter().filter(|(_, (v, _))| v.lost.is_some() || v.excess > 0.0).collect();
+    // What comes back of energy that was lost counts less than what is gained.
+    let size = |(_, (v, _)): &Row| {
+        if v.lost.is_some() { f64::INFINITY } else { v.lasting_gain().max(1e-9 * v.gain()) }
+    };
+    broken.sort_by(|x, y| size(y).total_cmp(&size(x)));
+    broken
+}
+
+fn line(name: &str, rows: &[Row], most_seeds: usize) -> String {
     let count = |is: &dyn Fn(&Verdict) -> bool| rows.iter().filter(|(_, (verdict, _))| is(verdict)).count();
     let share = |is: &dyn Fn(&Verdict) -> bool| format!("{:.1} %", 100.0 * count(is) as f64 / rows.len() as f64);
     let gained = |least: f64| move |v: &Verdict| v.lost.is_none() && v.lasting_gain() > least;
     let most = |of: &dyn Fn(&Verdict) -> f64| rows.iter().map(|(_, (v, _))| of(v)).fold(0.0, f64::max);
     let drift = |which: usize| move |v: &Verdict| v.drift.map_or(0.0, |drift| drift[which]);
     let finite_gain = |v: &Verdict| if v.lost.is_none() { v.lasting_gain() } else { 0.0 };
-    let mut by_gain: Vec<_> = rows.iter().filter(|(_, (v, _))| v.lost.is_some() || v.excess > 0.0).collect();
-    by_gain.sort_by(|x, y| {
-        let size = |row: &Row| {
-            if row.1.0.lost.is_some() { f64::INFINITY } else { row.1.0.lasting_gain().max(1e-9 * row.1.0.gain()) }
-        };
-        size(y).total_cmp(&size(x))
-    });
-    let seeds: Vec<String> = by_gain.iter().take(worst).map(|(drawn, _)| drawn.seed.to_string()).collect();
+    let seeds: Vec<String> =
+        self::worst(rows).into_iter().take(most_seeds).map(|(drawn, _)| drawn.seed.to_string()).collect();
     let seconds: f64 = rows.iter().map(|(_, (_, seconds))| seconds).sum();
     format!(
         "| {name} | {} | {} | {} | {} | {} | {} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {} | {:.1e} | {:.3} | {} |\n",
@@ -54,12 +64,12 @@ pub fn text(rows: &[Row], worst: usize) -> String {
         "| worlds | number | break law 1 | above start | gain > 1 % | > 10x | > 1e6x | lost | worst | gap > 1 % | worst gap | drift | worst | spin drift | worst | s each | seeds |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for own in rows.chunk_by(same) {
+    for own in groups(rows) {
         let name = own[0].0.to_string();
         let name = name.rsplit_once('/').map_or(name.as_str(), |(group, _)| group);
-        text += &line(name, &own.iter().collect::<Vec<_>>(), worst);
+        text += &line(name, own, worst);
     }
-    text + &line("all", &rows.iter().collect::<Vec<_>>(), 0)
+    text + &line("all", rows, 0)
 }
 
 /// A line for each world.
