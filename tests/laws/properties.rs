@@ -67,7 +67,7 @@ impl Group {
         let verdict = |(drawn, case): &(Drawn, Case)| {
             let verdict = run_on(case, (self.backend)(), false);
             let broken: Vec<_> = verdict.broken().into_iter().filter(|law| laws.contains(law)).collect();
-            (!broken.is_empty()).then(|| (*drawn, broken, verdict))
+            (!broken.is_empty()).then_some((*drawn, broken, verdict))
         };
         let broken: Vec<_> = cases.par_iter().filter_map(verdict).collect();
         let mut lines = String::new();
