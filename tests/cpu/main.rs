@@ -13,6 +13,19 @@ mod common {
     pub use drystone::stages::conform::{passes as kernels, random};
 }
 
+/// Random worlds, and the laws that they are held against.
+#[cfg(feature = "serde")]
+#[path = "../laws"]
+#[allow(dead_code)]
+mod laws {
+    mod draw;
+    mod measures;
+    mod own;
+    mod properties;
+    mod run;
+    mod shrink;
+}
+
 mod allocations;
 mod changes;
 #[cfg(feature = "serde")]

@@ -4,6 +4,17 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+/// Random worlds, and the laws that they are held against.
+#[cfg(feature = "serde")]
+#[path = "../laws"]
+#[allow(dead_code)]
+mod laws {
+    mod draw;
+    pub mod exact;
+    mod measures;
+    mod run;
+}
+
 mod breaking;
 mod closed_forms;
 mod conform;
@@ -48,6 +59,8 @@ fn main() -> std::process::ExitCode {
         joint_kinds::tests(),
         joints::tests(),
         kernels::tests(),
+        #[cfg(feature = "serde")]
+        laws::exact::tests(),
         living::tests(),
         living_random::tests(),
         masses::tests(),

@@ -1,0 +1,162 @@
+//! The laws on random worlds, as tests. `cargo run --release --package drystone-laws` runs more of them.
+//!
+//! Of each group a test draws as many worlds as `DRYSTONE_LAWS` says, 12 unless told otherwise, and names those that break the law, each with
+//! a scene file in the folder for temporary files. Tests of a law that does not hold yet are ignored, and say how often it is broken:
+//! `cargo test --test cpu laws -- --ignored` runs them.
+
+use std::fmt::Write;
+
+use drystone::preset::Preset;
+use drystone::scenes::SceneFile;
+use drystone::{Backend, Cpu, Reference, SolverConfig};
+use rayon::prelude::*;
+
+use super::draw::{Drawn, Family, Kind};
+use super::run::{Case, Verdict, run_on};
+
+/// Worlds of each group.
+const WORLDS: u64 = 12;
+/// How long each of them runs (s).
+const SECONDS: f32 = 4.0;
+
+fn worlds() -> u64 {
+    let asked = std::env::var("DRYSTONE_LAWS").ok();
+    asked.map_or(WORLDS, |count| count.parse().expect("DRYSTONE_LAWS is a number of worlds"))
+}
+
+/// Some groups of worlds, how they run, and what they run on.
+struct Group {
+    families: &'static [Family],
+    kinds: &'static [Kind],
+    collides: &'static [bool],
+    config: SolverConfig,
+    rate: u32,
+    backend: fn() -> Box<dyn Backend>,
+}
+
+impl Group {
+    /// By default, on lanes.
+    fn new(families: &'static [Family], kinds: &'static [Kind]) -> Self {
+        let collides = &[false, true];
+        Self { families, kinds, collides, config: SolverConfig::default(), rate: 60, backend: || Box::new(Cpu::new()) }
+    }
+
+    fn preset(self, preset: Preset) -> Self {
+        Self { config: preset.config(), ..self }
+    }
+
+    fn cases(&self) -> Vec<(Drawn, Case)> {
+        let mut all = Vec::new();
+        for &family in self.families {
+            for &kind in self.kinds {
+                for &collides in self.collides {
+                    for seed in 0..worlds() {
+                        let drawn = Drawn { family, kind, collides, seed };
+                        all.push((drawn, Case::new(drawn.scene(), self.config.clone(), self.rate, SECONDS)));
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// Refuses any of the worlds that breaks one of some laws: finite, energy, gap, momentum, spin.
+    #[track_caller]
+    fn keeps(&self, laws: &[&str]) {
+        let cases = self.cases();
+        let verdict = |(drawn, case): &(Drawn, Case)| {
+            let verdict = run_on(case, (self.backend)(), false);
+            let broken: Vec<_> = verdict.broken().into_iter().filter(|law| laws.contains(law)).collect();
+            (!broken.is_empty()).then_some((*drawn, broken, verdict))
+        };
+        let broken: Vec<_> = cases.par_iter().filter_map(verdict).collect();
+        let mut lines = String::new();
+        for (drawn, laws, Verdict { lost, excess, gap, drift, .. }) in &broken {
+            let file = std::env::temp_dir().join(format!("{}.json", drawn.to_string().replace('/', "-")));
+            let text = SceneFile::of(&drawn.scene()).map_or_else(|e| e.to_string(), |file| file.to_text());
+            let place = std::fs::write(&file, text).map_or_else(|e| e.to_string(), |()| file.display().to_string());
+            let (gap, [momentum, spin]) = (gap.worst(), drift.unwrap_or_default());
+            let lost = lost.as_deref().unwrap_or_default();
+            writeln!(lines, "{drawn} breaks {laws:?}: {excess:.2e} J, gap {gap:.1e}, drift {momentum:.1e} {spin:.1e} {lost}; {place}")
+                .expect("a string takes text");
+        }
+        let (count, all) = (broken.len(), cases.len());
+        assert!(broken.is_empty(), "{count} of {all} worlds break a law:\n{lines}");
+    }
+}
+
+const JOINTED: &[Kind] =
+    &[Kind::Ball, Kind::Hinge, Kind::Slider, Kind::Fixed, Kind::Generic, Kind::Distance, Kind::All];
+const EVERY: &[Kind] =
+    &[Kind::None, Kind::Ball, Kind::Hinge, Kind::Slider, Kind::Fixed, Kind::Generic, Kind::Distance, Kind::All];
+
+// Laws that hold.
+
+#[test]
+fn bodies_without_joints_stay_finite_and_keep_their_momentum() {
+    let mut group = Group::new(&[Family::Plain, Family::Ratios, Family::Kinematic], &[Kind::None]);
+    group.keeps(&["finite", "momentum"]);
+    group.rate = 30;
+    group.keeps(&["finite", "momentum"]);
+    group.rate = 240;
+    group.preset(Preset::Fast).keeps(&["finite", "momentum"]);
+}
+
+#[test]
+fn joints_without_contacts_keep_the_momentum() {
+    let group = || Group { collides: &[false], ..Group::new(&[Family::Plain], JOINTED) };
+    group().keeps(&["momentum"]);
+    group().preset(Preset::Fast).keeps(&["momentum"]);
+    Group { rate: 30, ..group() }.keeps(&["momentum"]);
+}
+
+/// The reference and the lanes have the same bits, and so the same verdict.
+#[test]
+fn a_verdict_does_not_depend_on_lanes() {
+    let group = Group::new(Family::ALL, EVERY);
+    for (drawn, case) in group.cases().into_iter().step_by(7) {
+        let case = Case { seconds: 0.5, ..case };
+        let [lanes, one] =
+            [run_on(&case, Box::new(Cpu::new()), true), run_on(&case, Box::new(Reference::<f32>::new()), true)];
+        assert_eq!(format!("{lanes:?}"), format!("{one:?}"), "{drawn}");
+    }
+}
+
+// Laws that do not hold yet. Each count is of the worlds of the test, with DRYSTONE_LAWS=12.
+
+/// Tests of a law that is broken: each with how often, some kinds of joints, and how the worlds run.
+macro_rules! broken {
+    ($($name:ident: $how_often:literal, $group:expr, $laws:expr;)*) => {
+        $(#[test]
+        #[ignore = $how_often]
+        fn $name() {
+            $group.keeps(&$laws);
+        })*
+    };
+}
+
+broken! {
+    energy_of_contacts: "1 of 48 worlds gain energy", Group::new(&[Family::Plain, Family::Ratios], &[Kind::None]), ["energy"];
+    energy_of_ball_joints: "16 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Ball]), ["finite", "energy"];
+    energy_of_hinges: "19 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Hinge]), ["finite", "energy"];
+    energy_of_sliders: "20 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Slider]), ["finite", "energy"];
+    energy_of_fixed_joints: "19 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Fixed]), ["finite", "energy"];
+    energy_of_generic_joints: "22 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Generic]), ["finite", "energy"];
+    energy_of_distances: "14 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Distance]), ["finite", "energy"];
+    energy_of_any_joints: "14 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::All]), ["finite", "energy"];
+    energy_of_motors: "85 of 168 worlds gain energy", Group::new(&[Family::Motors], JOINTED), ["finite", "energy"];
+    energy_of_springs: "137 of 168 worlds gain energy", Group::new(&[Family::Springs], JOINTED), ["finite", "energy"];
+    energy_with_kinematic_bodies: "135 of 192 worlds gain energy", Group::new(&[Family::Kinematic], EVERY), ["finite", "energy"];
+    energy_of_light_and_heavy_bodies: "125 of 168 worlds gain energy", Group::new(&[Family::Ratios], JOINTED), ["finite", "energy"];
+    energy_on_long_levers: "146 of 168 worlds gain energy", Group::new(&[Family::Levers], JOINTED), ["finite", "energy"];
+    energy_with_fast: "138 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Fast), ["finite", "energy"];
+    energy_with_accurate: "120 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Accurate), ["finite", "energy"];
+    energy_at_30_steps: "128 of 192 worlds gain energy", Group { rate: 30, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
+    energy_at_240_steps: "126 of 192 worlds gain energy", Group { rate: 240, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
+    gaps: "135 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Plain], JOINTED), ["gap"];
+    gaps_of_light_and_heavy_bodies: "139 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Ratios], JOINTED), ["gap"];
+    gaps_on_long_levers: "149 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Levers], JOINTED), ["gap"];
+    angular_momentum_of_contacts: "5 of 24 worlds change their angular momentum", Group::new(&[Family::Plain], &[Kind::None]), ["spin"];
+    angular_momentum: "311 of 1008 worlds change their angular momentum", Group::new(Family::ALL, JOINTED), ["spin"];
+    momentum: "1 of 1152 worlds change their momentum", Group::new(Family::ALL, EVERY), ["momentum"];
+}
