@@ -84,9 +84,7 @@ fn shortened(command: &str) -> String {
         let add = |part: &&str| if part.contains(program) { format!("{part}{besides}") } else { (*part).to_owned() };
         short = parts.iter().map(add).collect::<Vec<_>>().join("; ");
     }
-    // The profile of the tests is optimized, too, and built already.
-    let is_release = std::env::var_os("DRYSTONE_README").is_some_and(|value| value == "release");
-    if is_release { short } else { short.replace("cargo run --release", "cargo run") }
+    short
 }
 
 /// A folder for what the commands of a page write, with the program as `drystone`.
@@ -104,18 +102,34 @@ impl Folder {
         folder
     }
 
-    /// Runs a line of a shell; cargo's begin in the folder of the repository, as in a fresh clone.
+    /// Runs a line of a shell. The program that `cargo run` would build is the one of the tests: another profile takes minutes.
     fn run(&self, line: &str) -> Output {
+        let line = match line.strip_prefix("cargo run --release -- ") {
+            Some(arguments) => {
+                cargo_chooses_the_program();
+                format!("drystone {arguments}")
+            }
+            None => line.to_owned(),
+        };
         let path = std::env::var_os("PATH").unwrap_or_default();
         let folders = std::iter::once(self.0.path().join("bin")).chain(std::env::split_paths(&path));
         let path = std::env::join_paths(folders.collect::<Vec<PathBuf>>()).expect("folders");
-        let place = if line.starts_with("cargo ") { root() } else { self.0.path() };
         let mut command = Command::new("sh");
-        command.args(["-ec", line]).current_dir(place).env("PATH", path);
-        command.env("SLURM_ARRAY_TASK_ID", "1").env("SLURM_SUBMIT_DIR", self.0.path());
-        // `tests/timed` sets it for the harness; cargo would build all anew.
-        command.env_remove("RUSTC_BOOTSTRAP").output().expect("a shell")
+        command.args(["-ec", &line]).current_dir(self.0.path()).env("PATH", path);
+        command.env("SLURM_ARRAY_TASK_ID", "1").env("SLURM_SUBMIT_DIR", self.0.path()).output().expect("a shell")
     }
+}
+
+/// The answer of cargo where it has read its arguments, chosen a package and a program, and then asks for a compiler that is not there.
+fn without_compiler(arguments: &[&str]) -> String {
+    let output = Command::new("cargo").args(arguments).current_dir(root()).env("RUSTC", "no-compiler").output();
+    text(&output.expect("cargo").stderr)
+}
+
+/// Fails where the packages of the workspace that cargo builds by default have several programs, and none is the default one.
+fn cargo_chooses_the_program() {
+    let said = without_compiler(&["run", "--release", "--", "run", "pile"]);
+    assert!(said.contains("no-compiler"), "cargo run: {said}");
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -158,12 +172,8 @@ fn arguments_are_known(command: &str) {
         }
     }
     if words.starts_with(&["cargo", "install"]) {
-        // Cargo reads its arguments, finds the package and its features, and then asks for a compiler that is not there.
-        let ran = |arguments: &[&str]| {
-            let output = Command::new("cargo").args(arguments).current_dir(root()).env("RUSTC", "no-compiler").output();
-            text(&output.expect("cargo").stderr)
-        };
-        let said = ran(&words[1..]);
+        // Cargo finds the package and its features.
+        let said = without_compiler(&words[1..]);
         assert!(said.contains("no-compiler"), "{command}: {said}");
         let (package, features) = (words[3], words[5]);
         let manifest: toml::Table = page(&format!("{package}/Cargo.toml")).parse().expect("TOML");
@@ -175,7 +185,8 @@ fn arguments_are_known(command: &str) {
 #[test]
 fn the_options_in_the_table_of_commands_are_those_of_the_commands() {
     let help = |name: &str| {
-        let output = Command::new(env!("CARGO_BIN_EXE_drystone")).args([name, "--help"]).output().expect("it starts");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));
+        let output = command.args(name.split(' ')).arg("--help").output().expect("it starts");
         assert!(output.status.success(), "{name}: {}", text(&output.stderr));
         text(&output.stdout)
     };
@@ -185,7 +196,12 @@ fn the_options_in_the_table_of_commands_are_those_of_the_commands() {
         // `drystone report --shard I/N`, `hard --shard I/N`
         let is_command =
             |span: &&&str| span.starts_with("drystone ") || !span.starts_with("--") && span.contains(" --");
-        let name = |span: &&str| span.trim_start_matches("drystone ").split(' ').next().unwrap_or_default().to_owned();
+        // A command, and the name of a command below it: `drystone report tables`.
+        let name = |span: &&str| {
+            let words = span.trim_start_matches("drystone ").split(' ');
+            let names = words.take_while(|word| word.chars().all(|c| c.is_ascii_lowercase()));
+            names.collect::<Vec<_>>().join(" ")
+        };
         let names: Vec<String> = spans.iter().filter(is_command).map(name).collect();
         if !cfg!(feature = "view") && names.iter().any(|name| ["render", "view"].contains(&name.as_str())) {
             continue;
