@@ -7,7 +7,6 @@ use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
-use crate::energy::Energy;
 use crate::error::{Result, ensure};
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
@@ -22,7 +21,6 @@ pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
     pub effort: Effort,
-    energy: Energy,
     /// The result of the detection of this step.
     found: DetectStats,
     key: Key,
@@ -48,7 +46,6 @@ crate::saved::cloned!(Stages {
     detector,
     sleep,
     effort,
-    energy,
     found,
     key,
     contacts,
@@ -123,7 +120,6 @@ impl Stages {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
             effort: Effort::default(),
-            energy: Energy::default(),
             found: DetectStats::default(),
             key: Key { config: config.clone(), surfaces, scale: None },
             contacts: ContactRows::default(),
@@ -147,7 +143,6 @@ impl Stages {
             detector,
             sleep,
             effort,
-            energy: _,
             found: _,
             key,
             contacts,
@@ -321,9 +316,7 @@ impl Stages {
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
-            let is_driven = |b: &Body| b.kind != crate::world::BodyKind::Dynamic && b.is_driven();
-            let has_drivers = world.bodies.iter().any(is_driven);
-            contacts.sums = events.listen.sums() || has_drivers;
+            contacts.sums = events.listen.sums();
             contacts.write(world, detector, config, effort, dt, problem);
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
@@ -395,11 +388,8 @@ impl Stages {
     }
 
     /// Brings poses and velocities to the world.
-    pub fn store(&mut self, world: &mut World, dt: f32) -> f64 {
+    pub fn store(&mut self, world: &mut World, dt: f32) {
         self.note_events(world, dt);
-        let Self { energy, effort, key, problem, .. } = self;
-        let substeps = |body: usize| key.config.substeps << effort.class_of(body);
-        let taken = if std::env::var_os("NOLAW").is_some() { 0.0 } else { energy.hold(world, problem, substeps, dt) };
         problem::store(&self.problem, self.sleep.asleep(), world);
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
@@ -409,7 +399,6 @@ impl Stages {
         }
         self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);
-        taken
     }
 }
 
