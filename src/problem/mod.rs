@@ -228,6 +228,7 @@ impl StepProblem {
             substeps: 1,
             substep,
             contacts,
+            struck: contact_colors,
             jamming: contact_colors,
             joints,
             direct,
