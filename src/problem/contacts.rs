@@ -36,8 +36,8 @@ pub struct ContactRows {
     poses: Vec<PoseRow>,
     /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
     jams: Vec<bool>,
-    /// The contacts of this step whose points are struck together, ascending.
-    struck: Vec<u32>,
+    /// The contacts of this step whose surfaces meet fast, by their rows, ascending.
+    blows: Vec<Blow>,
     /// Whether each body may be faster anywhere than half of the threshold of restitution.
     fast: Vec<bool>,
     /// The classes of bodies that the rows were written for.
@@ -62,7 +62,20 @@ crate::saved::cloned!(ContactRows {
     materials,
     sums,
     carry,
-} scratch { graph, poses, struck, fast, new_bodies });
+} scratch { graph, poses, blows, fast, new_bodies });
+
+/// A contact whose surfaces meet fast.
+#[derive(Clone, Copy, Debug)]
+pub struct Blow {
+    /// Its row.
+    pub row: u32,
+    /// Its bodies a and b.
+    pub bodies: [u32; 2],
+    /// How many points it has.
+    pub points: usize,
+    /// The mean speed of approach of its points (m/s).
+    pub speed: f32,
+}
 
 /// What the materials of a world have in common.
 #[derive(Clone, Copy, Debug)]
@@ -243,12 +256,17 @@ impl ContactRows {
     }
 
     /// The contacts that take part and whose points are struck together, ascending.
-    pub fn struck(&self) -> &[u32] {
-        &self.struck
+    pub fn struck(&self) -> Vec<u32> {
+        self.blows.iter().filter(|blow| blow.points > 1).map(|blow| blow.row).collect()
     }
 
-    /// Notes the contacts of several points whose surfaces meet, in their mean, at more than the threshold of restitution.
-    fn note_struck(&mut self, world: &World, detector: &Detector, threshold: f32) {
+    /// The contacts that take part and whose surfaces meet fast, ascending.
+    pub fn blows(&self) -> &[Blow] {
+        &self.blows
+    }
+
+    /// Notes the contacts whose surfaces meet, in the mean of their points, at more than the threshold of restitution.
+    pub fn note_blows(&mut self, world: &World, detector: &Detector, threshold: f32) {
         let is_fast = |body: &Body| {
             // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
             let square = 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
@@ -257,25 +275,27 @@ impl ContactRows {
         };
         self.fast.clear();
         self.fast.extend(world.bodies.iter().map(is_fast));
+        self.blows.clear();
+        if !self.fast.contains(&true) {
+            return;
+        }
         let fast = &self.fast;
-        let is_struck = |slot: &Slot| {
+        let blow = |(row, slot): (u32, &Slot)| {
             let pair = detector.pair(slot.world, slot.pair);
-            let bodies = [pair.body_a, pair.body_b].map(|body| body as usize);
-            if !bodies.iter().any(|&body| fast[body]) {
-                return false;
+            let bodies = [pair.body_a, pair.body_b];
+            if !slot.takes_part || !bodies.iter().any(|&body| fast[body as usize]) {
+                return None;
             }
             let manifold = &pair.manifolds[slot.manifold as usize];
-            let [a, b] = bodies.map(|body| &world.bodies[body]);
+            let [a, b] = bodies.map(|body| &world.bodies[body as usize]);
             let at = |body: &Body, arm: Vec3| body.linear_velocity + body.angular_velocity.cross(arm);
-            let speeds = manifold.points().iter().map(|p| (at(b, p.r_b) - at(a, p.r_a)).dot(manifold.normal));
-            let count = manifold.points().len() as f32;
-            count > 1.0 && speeds.sum::<f32>() < -threshold * count
+            let points = manifold.points();
+            let speeds = points.iter().map(|p| (at(a, p.r_a) - at(b, p.r_b)).dot(manifold.normal));
+            let speed = speeds.sum::<f32>() / points.len() as f32;
+            (speed > threshold).then_some(Blow { row, bodies, points: points.len(), speed })
         };
-        self.struck.clear();
-        if fast.contains(&true) {
-            let slots = (0..).zip(&self.slots.all).filter(|(_, slot)| slot.takes_part && is_struck(slot));
-            self.struck.extend(slots.map(|(row, _)| row));
-        }
+        let slots = (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free());
+        self.blows.extend(slots.filter_map(blow));
     }
 
     /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
@@ -331,7 +351,6 @@ impl ContactRows {
             warm_start: config.warm_start.into(),
         };
         self.note_written(detector);
-        self.note_struck(world, detector, config.restitution_threshold);
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
         let Self { slots, carry, patches, computed, poses, jams, classes, .. } = self;
         let pose = |body: &Body| PoseRow {

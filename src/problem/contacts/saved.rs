@@ -75,7 +75,7 @@ impl ContactRows {
             computed,
             poses: _,
             jams,
-            struck: _,
+            blows: _,
             fast: _,
             classes,
             materials,
