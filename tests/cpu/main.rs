@@ -38,6 +38,7 @@ mod drops;
 mod effort;
 mod forged;
 mod graph;
+mod impacts;
 mod inertia;
 #[cfg(feature = "serde")]
 mod lanes;
