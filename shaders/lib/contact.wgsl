@@ -30,8 +30,7 @@ fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
     return sum + larger(correction, 0.0);
 }
 
-// The change of the normal impulse that a point asks for by itself.
-fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
+fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
@@ -41,65 +40,13 @@ fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, 
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
+    let spring = -(mass * (vn + bias)) - impulse_scale * (*impulse).normal;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
     let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
-    return params.relaxation * correction;
-}
-
-fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
-    let correction = normal_correction(rules, pair, contact, point, softness, movement, (*impulse).normal);
-    let sum = clamp_normal(rules, (*impulse).normal, correction);
+    let sum = clamp_normal(rules, (*impulse).normal, params.relaxation * correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
     if rules.bounces { (*impulse).peak = larger((*impulse).peak, sum); }
     note_correction(rules.measured, change, point.normal_mass);
     apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
-}
-
-// Whether a point takes part, and the normal velocity that it lacks.
-struct Wanted { takes_part: bool, speed: f32 }
-
-// Some points of a manifold: whether each takes part, as 0 or 1, the sums of their arms, how many they are, and what they lack in all.
-struct Some { shares: array<f32, 4>, r_a: vec3f, r_b: vec3f, count: f32, lacking: f32 }
-
-fn add_point(some: ptr<function, Some>, k: u32, point: Point, wanted: Wanted) {
-    let share = select(0.0, 1.0, wanted.takes_part);
-    (*some).shares[k] = share;
-    (*some).r_a += point.r_a * share;
-    (*some).r_b += point.r_b * share;
-    (*some).count = (*some).count + share;
-    (*some).lacking = (*some).lacking + select(0.0, wanted.speed, wanted.takes_part);
-}
-
-// Gives some points equal impulses, which are one impulse at their middle, so that they part in their mean as each asks for by itself.
-fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, some: ptr<function, Some>) {
-    let inverse = reciprocal(larger((*some).count, 1.0));
-    let r_a = (*some).r_a * inverse;
-    let r_b = (*some).r_b * inverse;
-    let about_a = cross3(r_a, contact.normal);
-    let about_b = cross3(r_b, contact.normal);
-    let turning_a = dot3(about_a, spin_of(rules.isotropic, (*pair).mass_a, about_a));
-    let turning_b = dot3(about_b, spin_of(rules.isotropic, (*pair).mass_b, about_b));
-    let mass = reciprocal(((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turning_a + turning_b));
-    let change = select(0.0, mass * ((*some).lacking * inverse), (*some).count > 1.0);
-    for (var k = 0u; k < contact.point_count; k++) {
-        var impulse = impulses[contact.first_point + k];
-        impulse.normal = impulse.normal + (change * inverse) * (*some).shares[k];
-        if rules.bounces { impulse.peak = larger(impulse.peak, impulse.normal); }
-        impulses[contact.first_point + k] = impulse;
-    }
-    apply_impulse(rules.isotropic, pair, r_a, r_b, contact.normal * change);
-}
-
-// Non-penetration of all points together that press or are to press.
-fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softness: Softness, movement: NormalMovement) {
-    var some = Some();
-    for (var k = 0u; k < contact.point_count; k++) {
-        let point = points[contact.first_point + k];
-        let impulse = impulses[contact.first_point + k].normal;
-        let correction = normal_correction(rules, pair, contact, point, softness, movement, impulse);
-        add_point(&some, k, point, Wanted(larger(impulse, impulse + correction) > 0.0, correction * reciprocal(point.normal_mass)));
-    }
-    press_as_one(rules, pair, contact, &some);
 }

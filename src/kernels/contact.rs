@@ -8,9 +8,8 @@ use super::Rules;
 use super::friction::{solve_friction, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
-use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
-use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, reciprocal, smaller};
+use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, smaller};
 
 /// The points of a manifold and their impulses, wherever they stand.
 pub trait PointRows<L> {
@@ -88,21 +87,21 @@ struct Common<L> {
     movement: NormalMovement<L>,
 }
 
-/// The change of the normal impulse that a point asks for by itself.
+/// Non-penetration at one point.
 ///
 /// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other: a separation of 1e-11 m
 /// that rounding puts on the other side changes a sweep by what the spring is soft. That is why plain WGSL agrees with
 /// the reference to 1e-6 m/s in the middle of a step and to a few hundredths in the worst one.
 #[inline(always)]
-fn normal_correction<L: Lane>(
+fn solve_normal<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     Common { softness, movement }: &Common<L>,
-    pair: &Pair<L>,
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
-    impulse: L,
-) -> L {
+    impulse: &mut Impulse<L>,
+) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
@@ -113,25 +112,10 @@ fn normal_correction<L: Lane>(
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
     let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
-    params.relaxation * correction
-}
-
-/// Non-penetration at one point.
-#[inline(always)]
-fn solve_normal<L: Lane>(
-    rules: Rules,
-    params: &StepParams<L>,
-    common: &Common<L>,
-    pair: &mut Pair<L>,
-    contact: &Contact<L>,
-    point: &Point<L>,
-    impulse: &mut Impulse<L>,
-) {
-    let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
-    let sum = clamp_normal(rules, impulse.normal, correction);
+    let sum = clamp_normal(rules, impulse.normal, params.relaxation * correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
     if rules.bounces {
@@ -139,65 +123,6 @@ fn solve_normal<L: Lane>(
     }
     note_correction(rules, params, pair, change, point.normal_mass);
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
-}
-
-/// Gives some points of a manifold equal impulses, which are one impulse at their middle, so that they part in their mean as each asks for by
-/// itself. `wanted` gives whether a point takes part, and the normal velocity that it lacks. A point may pull after that, until it is solved.
-#[inline(always)]
-fn press_as_one<L: Lane>(
-    rules: Rules,
-    pair: &mut Pair<L>,
-    contact: &Contact<L>,
-    rows: &mut impl PointRows<L>,
-    wanted: impl Fn(&Pair<L>, &Point<L>, &Impulse<L>) -> (L::Mask, L),
-) {
-    let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let mut shares = [zero; MAX_POINTS];
-    let (mut r_a, mut r_b) = (Vec3::default(), Vec3::default());
-    let (mut count, mut lacking) = (zero, zero);
-    for k in 0..rules.contact_points(rows.count()) {
-        let point = rows.point(k);
-        let (takes_part, speed) = wanted(pair, &point, &rows.impulse(k));
-        shares[k] = L::select(zero, one, takes_part);
-        r_a += point.r_a * shares[k];
-        r_b += point.r_b * shares[k];
-        count = count + shares[k];
-        lacking = lacking + L::select(zero, speed, takes_part);
-    }
-    let inverse = reciprocal(larger(count, one));
-    (r_a, r_b) = (r_a * inverse, r_b * inverse);
-    let (about_a, about_b) = (cross3(r_a, contact.normal), cross3(r_b, contact.normal));
-    let turning_a = dot3(about_a, spin_of(rules, pair.mass_a.inv_inertia, about_a));
-    let turning_b = dot3(about_b, spin_of(rules, pair.mass_b.inv_inertia, about_b));
-    let mass = reciprocal((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turning_a + turning_b));
-    let change = L::select(zero, mass * (lacking * inverse), count.gt(one));
-    for k in 0..rules.contact_points(rows.count()) {
-        let impulse = rows.impulse(k);
-        let sum = impulse.normal + (change * inverse) * shares[k];
-        rows.set_normal(k, sum);
-        if rules.bounces {
-            rows.set_peak(k, larger(impulse.peak, sum));
-        }
-    }
-    apply_impulse(rules, pair, r_a, r_b, contact.normal * change);
-}
-
-/// Non-penetration of all points together that press or are to press: where each is solved, none of them lacks anything. Swept one after
-/// another only, the points of a flat blow turn the body, because the first one takes more than its share.
-#[inline(always)]
-fn solve_as_one<L: Lane>(
-    rules: Rules,
-    params: &StepParams<L>,
-    common: &Common<L>,
-    pair: &mut Pair<L>,
-    contact: &Contact<L>,
-    rows: &mut impl PointRows<L>,
-) {
-    press_as_one(rules, pair, contact, rows, |pair, point, impulse| {
-        let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
-        let presses = larger(impulse.normal, impulse.normal + correction).gt(L::constant(0.0));
-        (presses, correction * reciprocal(point.normal_mass))
-    });
 }
 
 /// Forgets the impulse of one point. Kernel `clear_impulses`.
@@ -257,9 +182,6 @@ pub fn solve_contact<L: Lane>(
         if has_friction && rules.friction_first {
             sweep_friction(rules, params, pair, contact, rows);
         }
-        if rules.as_one {
-            solve_as_one(rules, params, &common, pair, contact, rows);
-        }
         for k in 0..rules.contact_points(rows.count()) {
             let mut impulse = rows.impulse(k);
             solve_normal(rules, params, &common, pair, contact, &rows.point(k), &mut impulse);
@@ -304,7 +226,7 @@ fn sweep_friction<L: Lane>(
     }
 }
 
-/// Makes the points bounce that were hit fast enough: together, then each. Kernel `apply_restitution`.
+/// Makes the points bounce that were hit fast enough. Kernel `apply_restitution`.
 #[inline(always)]
 pub fn restitute_contact<L: Lane>(
     rules: Rules,
@@ -314,16 +236,13 @@ pub fn restitute_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let zero = L::constant(0.0);
-    let bounce = |pair: &Pair<L>, point: &Point<L>, impulse: &Impulse<L>| {
-        let hit = (-params.restitution_threshold).gt(point.approach_velocity);
-        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
-        (L::and(hit, impulse.peak.gt(zero)), -(vn + contact.restitution * point.approach_velocity))
-    };
-    press_as_one(rules, pair, contact, rows, bounce);
     for k in 0..rules.contact_points(rows.count()) {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
-        let (bounces, speed) = bounce(pair, &point, &impulse);
-        let sum = L::select(impulse.normal, larger(impulse.normal + point.normal_mass * speed, zero), bounces);
+        let hit = (-params.restitution_threshold).gt(point.approach_velocity);
+        let bounces = L::and(hit, impulse.peak.gt(zero));
+        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
+        let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
+        let sum = L::select(impulse.normal, larger(impulse.normal + correction, zero), bounces);
         let change = sum - impulse.normal;
         rows.set_normal(k, sum);
         rows.set_peak(k, larger(impulse.peak, sum));

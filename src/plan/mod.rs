@@ -39,8 +39,6 @@ struct Sweeps<'a> {
     systems: &'a [Range<u32>],
     direct: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
-    /// Contacts whose points are struck together.
-    struck: &'a [Range<u32>],
     /// Contacts whose friction jams.
     jamming: &'a [Range<u32>],
 }
@@ -139,7 +137,6 @@ impl StepPlan {
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.rules.clamping == Clamping::Accumulated,
             round: contacts.round,
-            as_one: false,
             driven: false,
             passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
@@ -181,7 +178,7 @@ impl StepPlan {
         let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
         let (contacts, joints, direct) =
             (groups(&contact_colors), groups(&own.swept_joints()), groups(&own.direct_joints()));
-        let [swept_once, struck, jamming] = own.contacts_by_kind().map(|colors| groups(&colors));
+        let [swept_once, jamming] = own.contacts_by_jamming().map(|colors| groups(&colors));
         // A color without rows needs no pass.
         let kept = |color: &'_ Range<u32>| !problem.rows_of(color).is_empty();
         let [bodies, inertias, systems, turning] =
@@ -198,7 +195,6 @@ impl StepPlan {
             systems,
             direct: &direct,
             contacts: &swept_once,
-            struck: &struck,
             jamming: &jamming,
         };
         // Friction needs some sweep to happen in.
@@ -272,7 +268,6 @@ impl StepPlan {
             systems: &[],
             direct: &[],
             contacts: &contacts,
-            struck: &[],
             jamming: &[],
         };
         plan.sweeps(sweeps, rules);
@@ -309,7 +304,6 @@ impl StepPlan {
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
-            self.over_colors(Kernel::SolveContacts(Rules { as_one: true, ..rules }), block, sweeps.struck);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {

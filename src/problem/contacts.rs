@@ -36,10 +36,6 @@ pub struct ContactRows {
     poses: Vec<PoseRow>,
     /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
     jams: Vec<bool>,
-    /// The contacts of this step whose surfaces meet fast, by their rows, ascending.
-    blows: Vec<Blow>,
-    /// Whether each body may be faster anywhere than half of the threshold of restitution.
-    fast: Vec<bool>,
     /// The classes of bodies that the rows were written for.
     classes: Vec<u8>,
     /// What all materials have in common; none where one may have changed.
@@ -62,20 +58,7 @@ crate::saved::cloned!(ContactRows {
     materials,
     sums,
     carry,
-} scratch { graph, poses, blows, fast, new_bodies });
-
-/// A contact whose surfaces meet fast.
-#[derive(Clone, Copy, Debug)]
-pub struct Blow {
-    /// Its row.
-    pub row: u32,
-    /// Its bodies a and b.
-    pub bodies: [u32; 2],
-    /// How many points it has.
-    pub points: usize,
-    /// The mean speed of approach of its points (m/s).
-    pub speed: f32,
-}
+} scratch { graph, poses, new_bodies });
 
 /// What the materials of a world have in common.
 #[derive(Clone, Copy, Debug)]
@@ -253,49 +236,6 @@ impl ContactRows {
             return Vec::new();
         }
         self.slots.taking_part().filter(|&row| self.jams[row as usize]).collect()
-    }
-
-    /// The contacts that take part and whose points are struck together, ascending.
-    pub fn struck(&self) -> Vec<u32> {
-        self.blows.iter().filter(|blow| blow.points > 1).map(|blow| blow.row).collect()
-    }
-
-    /// The contacts that take part and whose surfaces meet fast, ascending.
-    pub fn blows(&self) -> &[Blow] {
-        &self.blows
-    }
-
-    /// Notes the contacts whose surfaces meet, in the mean of their points, at more than the threshold of restitution.
-    pub fn note_blows(&mut self, world: &World, detector: &Detector, threshold: f32) {
-        let is_fast = |body: &Body| {
-            // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
-            let square = 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
-            let speed = body.linear_velocity.length() + body.angular_velocity.length() * square.sqrt();
-            2.0 * speed > threshold || body.is_driven()
-        };
-        self.fast.clear();
-        self.fast.extend(world.bodies.iter().map(is_fast));
-        self.blows.clear();
-        if !self.fast.contains(&true) {
-            return;
-        }
-        let fast = &self.fast;
-        let blow = |(row, slot): (u32, &Slot)| {
-            let pair = detector.pair(slot.world, slot.pair);
-            let bodies = [pair.body_a, pair.body_b];
-            if !slot.takes_part || !bodies.iter().any(|&body| fast[body as usize]) {
-                return None;
-            }
-            let manifold = &pair.manifolds[slot.manifold as usize];
-            let [a, b] = bodies.map(|body| &world.bodies[body as usize]);
-            let at = |body: &Body, arm: Vec3| body.linear_velocity + body.angular_velocity.cross(arm);
-            let points = manifold.points();
-            let speeds = points.iter().map(|p| (at(a, p.r_a) - at(b, p.r_b)).dot(manifold.normal));
-            let speed = speeds.sum::<f32>() / points.len() as f32;
-            (speed > threshold).then_some(Blow { row, bodies, points: points.len(), speed })
-        };
-        let slots = (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free());
-        self.blows.extend(slots.filter_map(blow));
     }
 
     /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.

@@ -8,7 +8,6 @@ use glam::Vec3;
 use super::axes;
 use super::joint_loads::borne_masses;
 use super::lent_inertia::{LentInertia, lend_inertia};
-use super::contacts::Blow;
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
@@ -39,8 +38,6 @@ pub struct JointRows {
     swept_gap: f32,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
-    /// The same of what the blows of this step would open; empty where no blow meets a joint.
-    struck: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
 }
@@ -57,7 +54,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     needs,
-} scratch { graph, struck, lent });
+} scratch { graph, lent });
 
 /// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
@@ -173,73 +170,25 @@ impl JointRows {
         let sides: Vec<_> = joints.iter().map(|&joint| self.sides(joint)).collect();
         let mass = |body: u32| world.bodies[body as usize].mass.mass;
         let weight = |body: u32| mass(body) * world.bodies[body as usize].gravity_scale.abs();
-        let gap = |(&joint, borne): (&u32, f32)| {
-            let (body_a, _) = self.joints[joint as usize].indices();
-            let gravity = world.gravity_of(world.bodies.worlds()[body_a] as usize).length();
-            borne * gravity * self.gap_by_force(joint, world, config, substep)
-        };
-        // A joint without arms has no length to be held against.
-        joints.iter().zip(borne_masses(&sides, weight)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
-    }
-
-    /// The gap that sweeps leave in a joint under a force at rest, as a share of its arms, by the force (1/N): 1/(m w²), the mass m of its bodies,
-    /// the frequency w of its spring. A joint without arms has no length to be held against.
-    fn gap_by_force(&self, joint: u32, world: &World, config: &SolverConfig, substep: f32) -> f32 {
-        let of = &self.joints[joint as usize];
-        let bears = match &of.linear {
+        let omega = TAU * config.joint_frequency / substep;
+        let bears = |joint: &Joint| match &joint.linear {
             Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
             Linear::Distance(distance) => distance.bounds != Bounds::Free,
         };
-        let (body_a, body_b) = of.indices();
-        let [anchor_a, anchor_b] = world.anchors(of);
-        let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
-        let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
-        if !bears || arms == 0.0 {
-            return 0.0;
-        }
-        let mass = |body: u32| world.bodies[body as usize].mass.mass;
-        let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
-        let omega = TAU * config.joint_frequency / substep;
-        softness / (omega * omega * arms)
-    }
-
-    /// Notes which joints the blows of a step of `dt` seconds would open beyond the promise if sweeps did not take more substeps. A blow is a load
-    /// that stops, within the step, what strikes the body; the swept joints of the body share it.
-    pub fn follow_blows(&mut self, blows: &[Blow], world: &World, config: &SolverConfig, dt: f32) {
-        self.struck.clear();
-        if config.joint_solver == JointSolver::Sweeps || self.joints.is_empty() || blows.is_empty() {
-            return;
-        }
-        let is_dynamic = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
-        let mut loads: BTreeMap<u32, (f32, u32)> = BTreeMap::new();
-        for Blow { bodies: [a, b], speed, .. } in blows {
-            for (body, other) in [(*a, *b), (*b, *a)].into_iter().filter(|(body, _)| is_dynamic(*body)) {
-                let striker = &world.bodies[if is_dynamic(other) { other } else { body } as usize];
-                let load = &mut loads.entry(body).or_default().0;
-                *load = load.max(striker.mass.mass * speed / dt);
+        let gap = |(&joint, borne): (&u32, f32)| {
+            if !bears(&self.joints[joint as usize]) {
+                return 0.0;
             }
-        }
-        let is_swept = |joint: &u32| self.systems[*joint as usize] == SWEPT;
-        let swept = || (0..self.joints.len() as u32).filter(is_swept);
-        for body in swept().flat_map(|joint| self.sides(joint)).flatten() {
-            if let Some((_, joints)) = loads.get_mut(&body) {
-                *joints += 1;
-            }
-        }
-        if loads.values().all(|(_, joints)| *joints == 0) {
-            return;
-        }
-        let mut struck = std::mem::take(&mut self.struck);
-        struck.resize(self.joints.len(), 0.0);
-        for joint in swept() {
-            let share = |body: u32| loads.get(&body).map_or(0.0, |(load, joints)| load / *joints as f32);
-            let load = self.sides(joint).into_iter().flatten().map(share).fold(0.0, f32::max);
-            if load > 0.0 {
-                let gap = load * self.gap_by_force(joint, world, config, dt / config.substeps as f32);
-                struck[joint as usize] = gap / config.max_joint_gap_share;
-            }
-        }
-        self.struck = struck;
+            let (body_a, body_b) = self.joints[joint as usize].indices();
+            let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
+            let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
+            let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
+            let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
+            let gravity = world.gravity_of(world.bodies.worlds()[body_a] as usize).length();
+            borne * gravity * softness / (omega * omega * arms)
+        };
+        // A joint without arms has no length to be held against.
+        joints.iter().zip(borne_masses(&sides, weight)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
     }
 
     /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.
@@ -301,7 +250,7 @@ impl JointRows {
 
     /// Whether any joint needs more than class 0 gives.
     pub fn are_above(&self) -> bool {
-        self.needs.iter().chain(&self.struck).any(|&need| need > 1.0)
+        self.needs.iter().any(|&need| need > 1.0)
     }
 
     /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
@@ -314,8 +263,7 @@ impl JointRows {
         };
         awake.map(move |(i, joint)| {
             let (a, b) = joint.indices();
-            let need = |needs: &[f32]| needs.get(i).copied().unwrap_or(0.0);
-            let need = need(&self.needs).max(need(&self.struck));
+            let need = self.needs.get(i).copied().unwrap_or(0.0);
             Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
         })
     }

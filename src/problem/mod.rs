@@ -25,7 +25,7 @@ mod write;
 pub use arithmetic::{Mass, Sym3};
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
-pub use contacts::{Blow, ContactRows};
+pub use contacts::ContactRows;
 pub use joint_systems::{BlockRow, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
@@ -228,7 +228,6 @@ impl StepProblem {
             substeps: 1,
             substep,
             contacts,
-            struck: contact_colors,
             jamming: contact_colors,
             joints,
             direct,

@@ -301,8 +301,6 @@ impl Stages {
                 contacts.sort(detector, problem);
             }
             let has_new_bodies = contacts.note_new_bodies(world);
-            contacts.note_blows(world, detector, config.restitution_threshold);
-            joints.follow_blows(contacts.blows(), world, config, dt);
             let asleep = sleep.asleep();
             let of_contacts = || contacts.interfaces(world, detector);
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));

@@ -38,7 +38,6 @@ mod drops;
 mod effort;
 mod forged;
 mod graph;
-mod impacts;
 mod inertia;
 #[cfg(feature = "serde")]
 mod lanes;

@@ -75,8 +75,6 @@ impl ContactRows {
             computed,
             poses: _,
             jams,
-            blows: _,
-            fast: _,
             classes,
             materials,
             new_bodies: _,
