@@ -9,10 +9,9 @@ mod common;
 #[path = "../laws"]
 #[allow(dead_code)]
 mod laws {
-    mod draw;
-    pub mod exact;
+    pub mod draw;
     mod measures;
-    mod run;
+    pub mod run;
 }
 
 mod breaking;
@@ -21,6 +20,8 @@ mod conform;
 mod course;
 mod direct_joints;
 mod events;
+#[cfg(feature = "serde")]
+mod exact_laws;
 mod faults;
 mod forces;
 mod golden_gpu;
@@ -50,6 +51,8 @@ fn main() -> std::process::ExitCode {
         course::tests(),
         direct_joints::tests(),
         events::tests(),
+        #[cfg(feature = "serde")]
+        exact_laws::tests(),
         faults::tests(),
         forces::tests(),
         golden_gpu::tests(),
@@ -59,8 +62,6 @@ fn main() -> std::process::ExitCode {
         joint_kinds::tests(),
         joints::tests(),
         kernels::tests(),
-        #[cfg(feature = "serde")]
-        laws::exact::tests(),
         living::tests(),
         living_random::tests(),
         masses::tests(),

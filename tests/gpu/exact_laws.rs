@@ -2,9 +2,9 @@
 
 use drystone::Cpu;
 
-use super::draw::{Drawn, Family, Kind};
-use super::run::{Case, run_on};
 use crate::common::gpu;
+use crate::laws::draw::{Drawn, Family, Kind};
+use crate::laws::run::{Case, run_on};
 
 tests! { exact_gpu { a_verdict_is_that_of_the_processor, } }
 
