@@ -201,7 +201,7 @@ crate::saved::cloned!(Body {
     applied_torque,
 });
 
-/// What the mass of a body follows from.
+/// The source of the mass of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Weight {
     /// The shapes at a density (kg/m³).

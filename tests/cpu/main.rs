@@ -1,6 +1,6 @@
 //! Tests that need a processor and nothing else.
 
-/// What several modules share.
+/// Helpers that several modules share.
 #[path = "../common"]
 mod common {
     pub mod contacts;

@@ -165,7 +165,7 @@ fn a_joint_to_a_body_that_is_gone_is_refused_and_does_not_tie_a_stranger() {
             let c = w.insert(cube().position(9.0, 5.0, 0.0).named("stranger"));
             assert_eq!(c.index(), a.index());
             let joint = w.insert_joint(joint(b, a));
-            // What reads such a joint meets no body, and does not stop.
+            // A function that reads such a joint finds no body, and does not panic.
             let own = *w.joint(joint).expect("just put in");
             assert!(w.anchors(&own)[1].is_nan() && w.joint_motion(&own).position[0].is_nan() && w.joint_gap() == 0.0);
             assert!(own.holds(b) && own.holds(a) && !own.holds(c));
@@ -268,7 +268,7 @@ fn ball() -> Joint {
     Joint::to_world(1, Vec3::ZERO, Vec3::ZERO)
 }
 
-/// What a caller may do with a joint whose bodies cannot be moved now: they may be movable later, and the other way round.
+/// A caller may join bodies that cannot be moved now: they may be movable later, and the other way round.
 #[test]
 fn a_joint_of_kinematic_bodies_and_one_of_a_body_that_becomes_fixed_are_taken() {
     let mut world = World::new();

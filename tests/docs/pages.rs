@@ -37,7 +37,7 @@ struct Sources {
     files: BTreeMap<String, String>,
     /// Words of the code.
     words: BTreeSet<String>,
-    /// What the blocks of each type declare.
+    /// The declarations in the blocks of each type.
     members: BTreeMap<String, BTreeSet<String>>,
 }
 

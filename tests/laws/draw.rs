@@ -39,7 +39,7 @@ macro_rules! words {
 }
 
 words!(
-    /// What the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
+    /// The things that the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
     Family {
         /// Nothing.
         Plain = "plain",

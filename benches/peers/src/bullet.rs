@@ -99,7 +99,7 @@ impl Place {
     }
 }
 
-/// What a body is in Bullet's world.
+/// The kind of a body in Bullet's world.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     /// The frame of Bullet's body in that of drystone's.

@@ -1,6 +1,6 @@
 //! The command as a process, on the processor.
 
-/// What several modules share.
+/// Helpers that several modules share.
 #[path = "../../../tests/common"]
 mod common {
     pub mod contacts;

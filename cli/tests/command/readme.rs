@@ -28,7 +28,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("parallel --retry-failed --joblog jobs.log", "it needs GNU parallel and four machines"),
 ];
 
-/// What a command has in a test, for less work; no option goes away.
+/// Shorter arguments for a test, which has less work with them; every option stays.
 const SHORTER: [(&str, &str); 8] = [
     ("n=5000", "n=20"),
     ("--steps 240", "--steps 3"),
@@ -41,7 +41,7 @@ const SHORTER: [(&str, &str); 8] = [
     ("/shared/", ""),
 ];
 
-/// What these commands get besides: the same for all parts of a survey.
+/// Arguments that these commands get besides, the same for all parts of a survey.
 const BESIDES: [(&str, &str); 3] = [
     ("drystone report", " --quick --steps 30 --scene tower:n=2 --scene chain:links=2"),
     ("drystone hard", " --case H1 --case H9 --preset fast"),

@@ -7,7 +7,7 @@ type Place = (i32, i32);
 /// A box: its left upper and its right lower corner (pixels).
 type Area = (Place, Place);
 
-/// What labels keep off, and where they may be.
+/// The places that labels avoid, and those where they may stand.
 pub(super) struct Labels {
     inside: Area,
     taken: Vec<Area>,
