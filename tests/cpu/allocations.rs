@@ -3,8 +3,10 @@
 use crate::common::counting;
 use drystone::{Body, Cpu, Listen, Scene, Shape, Simulation, SolverConfig, World, glam::Vec3};
 
-/// Allocations of the steps that compute no contact, and of the others, of a pile of 500 boxes on `threads` threads.
+/// Allocations of the steps that compute no contact, and of the others, in 40 steps of a pile of 500 boxes on `threads` threads.
 /// `listens`: to all that there is, and with a sensor around the pile.
+/// Of several threads each keeps memory of its own from the first task that it gets, in whichever step it wakes up for.
+/// So the 40 steps are measured up to five times there, until those without a contact to compute ask for nothing.
 fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2] {
     counting::in_pool(threads, || {
         let mut scene = Scene::find("pile", &["n=500".into()]).expect("the scene");
@@ -19,16 +21,23 @@ fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2
         for _ in 0..400 {
             simulation.step(scene.dt).expect("a step");
         }
-        let (mut asked, mut steps) = ([0; 2], [0; 2]);
-        for _ in 0..40 {
-            let before = counting::asked();
-            let stats = simulation.step(scene.dt).expect("a step");
-            let which = usize::from(stats.computed > 0);
-            asked[which] += counting::asked() - before;
-            steps[which] += 1;
+        let mut asked = [0; 2];
+        for _ in 0..if threads == 1 { 1 } else { 5 } {
+            asked = [0; 2];
+            let mut steps = [0; 2];
+            for _ in 0..40 {
+                let before = counting::asked();
+                let stats = simulation.step(scene.dt).expect("a step");
+                let which = usize::from(stats.computed > 0);
+                asked[which] += counting::asked() - before;
+                steps[which] += 1;
+            }
+            println!("{steps:?} steps without and with contacts computed: {asked:?} allocations");
+            assert!(steps[0] >= 20 || steps[1] == 40, "the pile has not settled: {steps:?}");
+            if asked[0] == 0 {
+                break;
+            }
         }
-        println!("{steps:?} steps without and with contacts computed: {asked:?} allocations");
-        assert!(steps[0] >= 20 || steps[1] == 40, "the pile has not settled: {steps:?}");
         asked
     })
 }
