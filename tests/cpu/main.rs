@@ -44,7 +44,6 @@ mod inertia;
 mod lanes;
 mod newton;
 mod oracle;
-mod passes;
 mod plan;
 #[cfg(feature = "gpu")]
 mod queries;
