@@ -36,7 +36,6 @@ mod derivation;
 mod determinism;
 mod drops;
 mod effort;
-mod energy;
 mod forged;
 mod graph;
 mod inertia;
