@@ -265,6 +265,13 @@ pub struct AxisRow {
     pub length: f32,
 }
 
+impl AxisRow {
+    /// Whether the row is a lock: neither a limit nor a drive.
+    pub fn is_lock(&self) -> bool {
+        crate::kernels::axis::is_lock(&crate::kernels::Axis::<f32>::load(self))
+    }
+}
+
 /// The impulse of one joint on its body b, accumulated, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
