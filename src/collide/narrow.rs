@@ -6,6 +6,7 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::flush::Neighbors;
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
@@ -18,6 +19,7 @@ pub(super) struct Narrow<'a> {
     pub cuboids: &'a [CuboidPlace],
     pub moving: &'a [BodyState],
     pub margins: Margins,
+    pub neighbors: Neighbors<'a>,
 }
 
 /// A pair that is not as it was.
@@ -94,7 +96,9 @@ impl Narrow<'_> {
                         update = None;
                     } else {
                         let bodies = [pair.body_a, pair.body_b];
-                        update = Some(blaming(bodies, || pair.compute(self.sides(pair), prediction, pair_scratch)));
+                        update = Some(blaming(bodies, || {
+                            pair.compute(self.sides(pair), prediction, Some(&self.neighbors), pair_scratch)
+                        }));
                     }
                 }
                 events.push(Event { place: place as u32, changes, update });
@@ -104,7 +108,8 @@ impl Narrow<'_> {
             let event = &mut events[number as usize];
             let pair = &mut pairs[event.place as usize];
             let prediction = tracks[event.place as usize].predicted;
-            event.update = Some(pair.take_over(self.sides(pair), prediction, write, pair_scratch));
+            event.update =
+                Some(pair.take_over(self.sides(pair), prediction, write, Some(&self.neighbors), pair_scratch));
         });
         let finish = |event: &Event| {
             let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
