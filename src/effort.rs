@@ -60,6 +60,8 @@ pub struct Effort {
     used: Vec<Kind>,
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
+    /// Whether classes rose since they were decided.
+    is_refined: bool,
     highest: u8,
     /// The lowest class from which on a class has to show that it lessens overlaps.
     judged_from: u8,
@@ -87,6 +89,7 @@ crate::saved::cloned!(Effort {
     heaps_in,
     used,
     any_above,
+    is_refined,
     highest,
     judged_from,
     movable,
@@ -112,6 +115,7 @@ impl Saved for Effort {
             heaps_in,
             used,
             any_above,
+            is_refined,
             highest,
             judged_from,
             movable,
@@ -143,6 +147,7 @@ impl Saved for Effort {
         heaps_in.walk(archive)?;
         used.walk(archive)?;
         any_above.walk(archive)?;
+        is_refined.walk(archive)?;
         highest.walk(archive)?;
         judged_from.walk(archive)?;
         movable.walk(archive)?;
@@ -259,6 +264,19 @@ impl Effort {
         self.restless.extend(bodies);
     }
 
+    /// Raises the class of the bodies of an island by two, so that the next step has a quarter of its substep; whether that is possible.
+    pub fn refine(&mut self, bodies: impl Iterator<Item = usize> + Clone) -> bool {
+        let class = bodies.clone().map(|i| self.class_of(i)).max().unwrap_or(0);
+        if class >= self.highest || self.classes.is_empty() {
+            return false;
+        }
+        for i in bodies {
+            (self.classes[i], self.calm_for[i]) = ((class + 2).min(self.highest), 0);
+        }
+        (self.any_above, self.is_refined) = (true, true);
+        true
+    }
+
     fn any_heap(&self) -> bool {
         self.heaps.contains(&true)
     }
@@ -350,7 +368,7 @@ impl Effort {
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
             (island.class, island.calm_for, island.overlapped) = island.next(self.highest, self.judged_from);
         }
-        let mut changed = false;
+        let mut changed = std::mem::take(&mut self.is_refined);
         let mut kinds = [[0; 2]; EFFORT_CLASSES];
         for &(body, is_dynamic) in &self.awake {
             let Island { class, calm_for, overlapped, is_heap, .. } = self.of_root[root(body)];

@@ -391,7 +391,8 @@ impl Simulation {
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
-        timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
+        let taken = timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
+        (stats.energy_taken, stats.refused) = (taken.energy, taken.refused);
         self.state = next_state();
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);

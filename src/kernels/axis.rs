@@ -92,7 +92,7 @@ fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L)
 
 /// The speed that a unit impulse along the axis gives.
 #[inline(always)]
-fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
+pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
     let turn_a = dot3(motion.about_a, pair.mass_a.inv_inertia.times(motion.about_a));
     let turn_b = dot3(motion.about_b, pair.mass_b.inv_inertia.times(motion.about_b));
     dot3(motion.along, motion.along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b)

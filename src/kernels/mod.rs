@@ -14,7 +14,7 @@ pub mod joint_system;
 mod kernel_rows;
 pub mod momentum;
 pub mod pair;
-mod rows;
+pub(crate) mod rows;
 
 pub use kernel_rows::KernelRows;
 pub use rows::{

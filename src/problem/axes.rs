@@ -34,6 +34,11 @@ pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
 }
 
+/// How many rows of a joint are of drives; they stand before the others.
+pub fn drive_count(joint: &Joint) -> usize {
+    kinds(joint).filter(|(_, is_drive)| *is_drive).count()
+}
+
 /// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.
 fn nearest(angle: f32, to: f32) -> f32 {
     match angle - to {

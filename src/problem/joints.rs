@@ -332,7 +332,12 @@ impl JointRows {
             }
         }));
         problem.params.axis_count = problem.axes.len() as u32;
-        if world.joints.iter().any(Joint::can_break) {
+        let is_driven = |b: usize| world.bodies[b].kind != BodyKind::Dynamic && world.bodies[b].is_driven();
+        let is_measured = |joint: &Joint| {
+            let (a, b) = joint.indices();
+            joint.can_break() || joint.is_driven() || is_driven(a) || b.is_some_and(is_driven)
+        };
+        if world.joints.iter().any(is_measured) {
             // A joint that takes no part bears nothing that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }

@@ -23,9 +23,11 @@ mod touching;
 mod write;
 
 pub use arithmetic::{Mass, Sym3};
+pub(crate) use axes::drive_count;
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
+pub(crate) use effective::InverseMass;
 pub use joint_systems::{BlockRow, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;

@@ -265,6 +265,13 @@ pub struct AxisRow {
     pub length: f32,
 }
 
+impl AxisRow {
+    /// Whether it is a limit: of two bounds that differ.
+    pub(crate) fn is_limit(&self) -> bool {
+        self.left > 0.5 * NO_LIMIT
+    }
+}
+
 /// The impulse of one joint on its body b, accumulated, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 
 use super::bodies::BodyHandle;
-use super::joint_axis::{Axis, Bounds};
+use super::joint_axis::{Axis, Bounds, Drive};
 use crate::error::Result;
 use crate::math::rotation;
 use crate::saved::{Archive, Saved};
@@ -289,6 +289,11 @@ impl Joint {
     pub fn breaking_at(mut self, force: f32) -> Self {
         self.break_force = force;
         self
+    }
+
+    /// Whether a motor or a spring drives one of its axes.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.linear_axes().iter().chain(&self.angular).any(|axis| axis.drive != Drive::None)
     }
 
     /// Whether there is a force that breaks the joint.

@@ -36,6 +36,7 @@ mod derivation;
 mod determinism;
 mod drops;
 mod effort;
+mod energy;
 mod forged;
 mod graph;
 mod inertia;

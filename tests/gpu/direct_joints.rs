@@ -211,21 +211,25 @@ fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
     assert!(simulation.world.first_non_finite().is_none());
 }
 
+/// One fall tells little: before the law of energy, the links were faster than 5 mm/s after two of these five falls with the direct solution, and
+/// the mean kinetic energy was 0.28 J; it is 0.08 J now.
 fn a_chain_that_falls_on_the_ground_lies_there() {
-    let mut world = chain(30, 100.0);
-    world.remove_joint(world.joints.handles()[0]);
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -0.6, 0.0));
-    for solver in [JointSolver::Direct, JointSolver::Sweeps] {
-        let mut simulation = simulation(world.clone(), solver);
-        let gap = largest_gap(&mut simulation, 900);
-        let speed = |body: usize| simulation.world.bodies[body].linear_velocity.length();
-        let (links, ball) = ((0..30).map(speed).fold(0.0, f32::max), speed(30));
-        let overlap = simulation.penetration().max;
-        println!("{solver}: gap {gap} m, links {links} m/s, ball {ball} m/s, overlap {overlap} m");
-        assert!(simulation.world.bodies[15].position.y < -0.4, "it did not fall");
-        assert!(gap < 5e-3 && overlap < 5e-3, "gap {gap} m, overlap {overlap} m");
+    for (solver, most) in [(JointSolver::Direct, 0.15), (JointSolver::Sweeps, 0.3)] {
+        let mut kinetic = 0.0;
+        for height in [0.6, 0.61, 0.62, 0.65, 0.7] {
+            let mut world = chain(30, 100.0);
+            world.remove_joint(world.joints.handles()[0]);
+            world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -height, 0.0));
+            let mut simulation = simulation(world, solver);
+            let gap = largest_gap(&mut simulation, 900);
+            let overlap = simulation.penetration().max;
+            println!("{solver}, {height} m: gap {gap} m, overlap {overlap} m, {} J", simulation.world.kinetic_energy());
+            assert!(simulation.world.bodies[15].position.y < 0.2 - height, "it did not fall");
+            assert!(gap < 5e-3 && overlap < 5e-3, "gap {gap} m, overlap {overlap} m");
+            kinetic += simulation.world.kinetic_energy() / 5.0;
+        }
         // The ball rolls on, with either.
-        assert!(links < 5e-3 && ball < 0.05, "{links} m/s, ball {ball} m/s");
+        assert!(kinetic < most, "{solver}: {kinetic} J");
     }
 }
 

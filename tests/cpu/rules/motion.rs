@@ -27,6 +27,8 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
             c.relax = 0;
             c.joint_frequency = frequency;
             c.joint_damping = damping;
+            // What begins beside its joint gets no more energy than this gives.
+            c.push_limit = 100.0;
         });
         let mut simulation = simulation(world, config);
         let (w, mut x, mut v) = (2.0 * PI * frequency / h, 0.1_f32, 0.0_f32);

@@ -1,0 +1,557 @@
+//! The law that constraints make no energy: contacts, joints, their springs, limits and preloads only pass energy on or take it. What a step
+//! adds to the kinetic energy of an island is at most the work of gravity, forces and drives, and what the springs of joints and contacts give
+//! back. Velocities that have more are brought back to that energy; momentum stays where nothing outside holds the island.
+//!
+//! A constraint whose impulse J changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so that work counts at mean velocities.
+//! An island that made energy and whose bodies went further than they could was torn apart within the step: that step is not taken, and the next
+//! one has shorter substeps. Derivation: docs/derivation.md, section 11.
+
+mod springs;
+
+use glam::{DMat3, DVec3, Quat, Vec3};
+use rayon::prelude::*;
+
+use crate::config::SolverConfig;
+use crate::effort::Effort;
+use crate::error::{Result, ensure};
+use crate::graph::Islands;
+use crate::math::rotation::product;
+use crate::problem::{ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
+use crate::saved::{Archive, Saved};
+use crate::world::{Body, World};
+
+/// The share of its kinetic energy that an island may regain of what it lost, and the share of the weight of a body over its size.
+const REGAINED: f64 = 1e-3;
+const ROUNDING: f64 = 1e-6;
+/// The most substeps of 1/60 s that add to velocities and not to changes of them.
+const MOST_ROUNDINGS: f64 = 16.0;
+
+/// The share of its energy that an island with joints may make in a step without shorter substeps from then on.
+const COARSE: f64 = 0.1;
+
+/// The accounts of all islands.
+#[derive(Debug, Default)]
+pub struct Energy {
+    /// Body by body.
+    kept: Vec<Kept>,
+    entries: Vec<Entry>,
+    islands: Islands,
+    /// The account of the island whose root each body is.
+    accounts: Vec<Account>,
+    /// The bodies of islands that made energy, each after its root.
+    members: Vec<(u32, u32)>,
+    /// Whether a joint holds each body.
+    jointed: Vec<bool>,
+    /// Bodies that are new in this step, or whose joints are.
+    fresh: Vec<usize>,
+}
+
+crate::saved::cloned!(Energy { kept } scratch { entries, islands, accounts, members, jointed, fresh });
+
+/// What a body keeps from step to step (J).
+#[derive(Clone, Copy, Debug, Default)]
+struct Kept {
+    /// What it may regain of what was lost.
+    reserve: f32,
+    /// What the springs of its joints and of their bodies hold.
+    springs: f32,
+}
+
+crate::saved::fields!(Kept { reserve, springs });
+
+/// What a body, or an island, has in a step (J).
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// Kinetic energy when the step began, and at its end.
+    before: f64,
+    after: f64,
+    /// Work of gravity, forces and drives.
+    work: f64,
+    /// What was kept, and what the springs of joints, and of contacts of bodies on joints, hold now.
+    kept: f64,
+    springs: f64,
+    /// The most that may be regained of what is lost.
+    slack: f64,
+    /// What is as slow as this counts as rest.
+    rest: f64,
+    /// What the rounding of velocities may add in this step.
+    rounding: f64,
+    /// The longest lever of a joint (m).
+    lever: f64,
+}
+
+impl Entry {
+    /// What motion leaves; below zero where constraints made energy.
+    fn left(&self) -> f64 {
+        self.before + self.work + self.kept - self.after
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.before += other.before;
+        self.after += other.after;
+        self.work += other.work;
+        self.kept += other.kept;
+        self.springs += other.springs;
+        self.slack += other.slack;
+        self.rest += other.rest;
+        self.rounding += other.rounding;
+        self.lever = self.lever.max(other.lever);
+    }
+}
+
+/// What an island has.
+#[derive(Clone, Copy, Debug, Default)]
+struct Account {
+    all: Entry,
+    /// What the springs of its contacts gave back, and the energy of what they push out (J).
+    released: f64,
+    pushed: f64,
+    /// Whether anything but its bodies holds it.
+    is_held: bool,
+    /// Whether a contact or a joint touches it.
+    is_touched: bool,
+    is_refused: bool,
+}
+
+impl Account {
+    /// What constraints made: not above 0 where motion is as slow as rest, or no faster than what is pushed out.
+    fn made(&self) -> f64 {
+        let made = -(self.all.left() + self.released + self.all.rounding);
+        made.min(self.all.after - self.pushed.max(self.all.rest))
+    }
+
+    fn is_over(&self) -> bool {
+        let made = self.made();
+        self.is_touched && (made > 0.0 || made.is_nan())
+    }
+}
+
+/// What the law changed in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Taken {
+    /// Energy that constraints had made (J).
+    pub energy: f64,
+    /// Islands whose step was not taken.
+    pub refused: usize,
+}
+
+impl Saved for Energy {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        let bodies = archive.count(self.kept.len())?;
+        self.kept.resize(bodies, Kept::default());
+        archive.runs(bodies, |i, archive| {
+            self.kept[i].walk(archive)?;
+            let Kept { reserve, springs } = self.kept[i];
+            ensure(reserve >= 0.0 && springs >= 0.0, || format!("body {i} keeps {reserve} J and {springs} J"))
+        })
+    }
+}
+
+impl Energy {
+    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        self.kept.resize(world.bodies.len(), Kept::default());
+        for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
+            self.kept[i] = Kept::default();
+            self.fresh.push(i);
+        }
+    }
+
+    /// Takes over the joints of a body that began or changed.
+    pub fn follow_joints_of(&mut self, body: usize) {
+        self.fresh.push(body);
+    }
+
+    /// Holds the law over the step of `dt` seconds that `problem` has run; `world` is as the step found it.
+    pub fn hold(
+        &mut self,
+        world: &World,
+        problem: &mut StepProblem,
+        effort: &mut Effort,
+        config: &SolverConfig,
+        dt: f32,
+    ) -> Taken {
+        self.fresh.extend(self.kept.len()..world.bodies.len());
+        self.kept.resize(world.bodies.len(), Kept::default());
+        let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
+        let entry = |(i, body): (usize, &Body)| Entry {
+            kept: self.kept[i].sum(),
+            ..entry(body, i, problem, dt.into(), substep(i))
+        };
+        world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
+        self.add_lent_inertia(world, problem);
+        springs::add_springs(&mut self.entries, problem, world, substep);
+        self.add_contacts_of_jointed(problem, effort);
+        self.fresh.sort_unstable();
+        springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
+        self.fresh.clear();
+        springs::add_work_of_drives(&mut self.entries, problem, world, substep);
+        let is_fine = |entry: &Entry| entry.left() + entry.rounding >= entry.springs;
+        if self.entries.iter().all(is_fine) {
+            self.kept.iter_mut().zip(&self.entries).for_each(|(kept, entry)| *kept = Kept::of(entry, entry.left()));
+            return Taken::default();
+        }
+        self.join(problem);
+        let mut taken = Taken::default();
+        if self.accounts.iter().any(Account::is_over) {
+            self.add_released(problem, effort);
+            taken = self.settle(world, problem, effort, config, dt);
+        }
+        let roots = self.islands.roots();
+        for ((kept, &root), entry) in self.kept.iter_mut().zip(roots).zip(&self.entries) {
+            let Account { all, released, .. } = &self.accounts[root as usize];
+            let of_island = Kept::of(all, all.left() + released);
+            let share = |of: f64, sum: f64| if sum > 0.0 { (of / sum) as f32 } else { 0.0 };
+            kept.springs = of_island.springs * share(entry.springs, all.springs);
+            kept.reserve = of_island.reserve * share(entry.slack, all.slack);
+        }
+        taken
+    }
+
+    /// Adds the energy of the inertia that joints lend to bodies in this step.
+    fn add_lent_inertia(&mut self, world: &World, problem: &StepProblem) {
+        for row in &problem.turning {
+            let i = row.body as usize;
+            let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
+            let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
+            let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
+            let energy = |spin: Vec3| 0.5 * spin.as_dvec3().dot(lent * spin.as_dvec3());
+            entry.before += energy(body.angular_velocity);
+            // The inertia turns with the body.
+            entry.after += energy(Quat::from_array(problem.bodies[i].dq).inverse() * Vec3::from(problem.bodies[i].w));
+        }
+    }
+
+    /// Finds the islands of bodies that contacts and joints hold together, and adds up what they have.
+    fn join(&mut self, problem: &StepProblem) {
+        let bodies = self.entries.len();
+        self.islands.reset(bodies);
+        self.accounts.clear();
+        self.accounts.resize(bodies, Account::default());
+        let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
+        let joints = problem.rows_of(&problem.joint_colors()).iter().map(|&j| &problem.joints[j as usize]);
+        let pairs = contacts.chain(joints.map(ends));
+        for [a, b] in pairs.clone() {
+            if can_move(problem, a) && can_move(problem, b) {
+                self.islands.join(a, b);
+            }
+        }
+        for [a, b] in pairs {
+            for body in [a, b].into_iter().filter(|&body| can_move(problem, body)) {
+                self.accounts[self.islands.root(body) as usize].is_touched = true;
+            }
+            match [can_move(problem, a), can_move(problem, b)] {
+                [true, false] => self.accounts[self.islands.root(a) as usize].is_held = true,
+                [false, true] => self.accounts[self.islands.root(b) as usize].is_held = true,
+                _ => {}
+            }
+        }
+        for (&root, entry) in self.islands.roots().iter().zip(&self.entries) {
+            self.accounts[root as usize].all.add(entry);
+        }
+    }
+
+    /// Adds what the springs of contacts hold now that touch bodies on joints. Joints and contacts may push against each other without an end, so
+    /// that the springs of these contacts have a budget, too.
+    fn add_contacts_of_jointed(&mut self, problem: &StepProblem, effort: &Effort) {
+        self.jointed.clear();
+        self.jointed.resize(problem.bodies.len(), false);
+        let joints = problem.rows_of(&problem.joint_colors());
+        if joints.is_empty() {
+            return;
+        }
+        joints
+            .iter()
+            .flat_map(|&j| ends(&problem.joints[j as usize]))
+            .for_each(|body| self.jointed[body as usize] = true);
+        for contact in problem.swept_contacts().filter(|contact| is_jointed(&self.jointed, contact)) {
+            let body = moved_by(problem, contact);
+            let substep = &problem.blocks[effort.block_of(body)].substep;
+            self.entries[body].springs += springs::held_by_contact(problem, contact, substep)[1];
+        }
+    }
+
+    /// Adds what the springs of other contacts gave back, in the islands that made energy without it.
+    fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
+        for contact in problem.swept_contacts().filter(|contact| !is_jointed(&self.jointed, contact)) {
+            let body = moved_by(problem, contact);
+            let account = &mut self.accounts[self.islands.root(body as u32) as usize];
+            if account.all.left() < 0.0 {
+                let [before, after] =
+                    springs::held_by_contact(problem, contact, &problem.blocks[effort.block_of(body)].substep);
+                account.released += before - after;
+                account.pushed += before;
+            }
+        }
+        self.accounts.iter_mut().for_each(|account| account.released = account.released.max(0.0));
+    }
+
+    /// Takes out what constraints made.
+    fn settle(
+        &mut self,
+        world: &World,
+        problem: &mut StepProblem,
+        effort: &mut Effort,
+        config: &SolverConfig,
+        dt: f32,
+    ) -> Taken {
+        let mut taken = Taken::default();
+        self.members.clear();
+        let is_over = |root: u32| self.accounts[root as usize].is_over();
+        let roots = self.islands.roots().iter().copied();
+        self.members.extend((0..).zip(roots).filter(|(_, root)| is_over(*root)).map(|(body, root)| (root, body)));
+        self.members.sort_unstable();
+        for members in self.members.chunk_by(|a, b| a.0 == b.0) {
+            let account = &mut self.accounts[members[0].0 as usize];
+            let over = account.made();
+            let Account { all, released, is_held, is_refused, .. } = account;
+            let members = members.iter().map(|(_, body)| *body as usize);
+            taken.energy += if over.is_finite() { over } else { all.after };
+            if over.is_finite() && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into()) {
+                let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
+                if all.lever > 0.0 && over > COARSE * all.after {
+                    effort.refine(members.clone());
+                }
+                brake(world, problem, members, [over, all.after], from_start);
+            } else {
+                taken.refused += 1;
+                *is_refused = true;
+                let is_finer = effort.refine(members.clone());
+                stand_still(world, problem, members, dt.into(), *is_held, is_finer);
+                all.springs = 0.0;
+            }
+            // Nothing is left.
+            *released = 0.0;
+            all.after = all.before + all.work + all.kept;
+        }
+        if taken.refused > 0 {
+            self.forget_impulses(problem);
+        }
+        taken
+    }
+
+    /// Lets joints and contacts of the islands whose step was not taken begin without impulses.
+    fn forget_impulses(&mut self, problem: &mut StepProblem) {
+        let (islands, accounts) = (&mut self.islands, &self.accounts);
+        let mut is_refused = |[a, b]: [u32; 2], problem: &StepProblem| {
+            let body = if can_move(problem, a) { a } else { b };
+            can_move(problem, body) && accounts[islands.root(body) as usize].is_refused
+        };
+        for i in 0..problem.joints.len() {
+            let joint = problem.joints[i];
+            if is_refused(ends(&joint), problem) {
+                let axes = problem.joints.len() + joint.first_axis as usize;
+                problem.joint_impulses[i] = JointImpulseRow::default();
+                problem.joint_impulses[axes..axes + joint.axis_count as usize].fill(JointImpulseRow::default());
+            }
+        }
+    }
+}
+
+impl Kept {
+    fn sum(&self) -> f64 {
+        f64::from(self.reserve) + f64::from(self.springs)
+    }
+
+    /// What is kept where so much is left.
+    fn of(entry: &Entry, left: f64) -> Self {
+        let springs = left.min(entry.springs).max(0.0);
+        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32 }
+    }
+}
+
+/// Whether constraints can move a body.
+fn can_move(problem: &StepProblem, body: u32) -> bool {
+    problem.masses.get(body as usize).is_some_and(|mass| mass.inv_mass > 0.0)
+}
+
+/// The body of a contact that it can move; the first of two.
+fn moved_by(problem: &StepProblem, contact: &ContactRow) -> usize {
+    let [a, b] = [contact.body_a, contact.body_b];
+    if can_move(problem, a) { a as usize } else { b as usize }
+}
+
+/// Whether a joint holds one of the bodies of a contact.
+fn is_jointed(jointed: &[bool], contact: &ContactRow) -> bool {
+    jointed[contact.body_a as usize] || jointed[contact.body_b as usize]
+}
+
+fn ends(joint: &JointRow) -> [u32; 2] {
+    [joint.body_a, joint.body_b]
+}
+
+/// What a body has, with the work of gravity and forces. A velocity at the end of a step belongs to the middle of its last substep, so that a way
+/// is half a substep longer than the mean of the velocities tells.
+fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) -> Entry {
+    let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
+    if mass.inv_mass <= 0.0 {
+        return Entry::default();
+    }
+    let m = f64::from(body.mass.mass);
+    let [v, w] = [row.v, row.w].map(|u| Vec3::from(u).as_dvec3());
+    let [v_0, w_0] = [body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
+    let acceleration = Vec3::from(mass.acceleration).as_dvec3();
+    let way = Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep);
+    let pushed = m * acceleration.dot(way).max(acceleration.dot((v + v_0) * (0.5 * dt)));
+    let turned = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
+    let turn = product(Quat::from_array(row.dq), body.rotation);
+    let spin = product(turn, body.mass.principal_frame).as_dquat().inverse() * w;
+    let after = 0.5 * (m * v.length_squared() + (body.mass.principal_inertia.as_dvec3() * spin * spin).element_sum());
+    // A body without shapes has no size.
+    let size = Some(f64::from(body.smallest_half_extent())).filter(|size| size.is_finite()).unwrap_or(0.0);
+    let rest = ROUNDING * m * acceleration.length() * size;
+    let slack = REGAINED * after + rest;
+    // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less.
+    let rounding = after * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
+    Entry { before: body.kinetic_energy(), after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
+}
+
+/// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
+/// longest lever (m) of their joints, or out of each other.
+fn is_in_reach(
+    world: &World,
+    problem: &StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    lever: f64,
+    config: &SolverConfig,
+    dt: f64,
+) -> bool {
+    let speed = |i: usize| {
+        let fallen = Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt;
+        world.bodies[i].linear_velocity.as_dvec3().length() + fallen.length()
+    };
+    let fastest = members.clone().map(speed).fold(0.0, f64::max);
+    let reach = (2.0 * fastest + f64::from(config.push_limit)) * dt + lever;
+    members.into_iter().all(|i| Vec3::from(problem.bodies[i].dp).as_dvec3().length() <= reach)
+}
+
+/// The motion that some bodies have as one rigid body.
+#[derive(Clone, Copy, Default)]
+struct RigidMotion {
+    center: DVec3,
+    drift: DVec3,
+    spin: DVec3,
+    kinetic: f64,
+}
+
+/// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
+#[derive(Default)]
+struct Momenta {
+    mass: f64,
+    center: DVec3,
+    linear: DVec3,
+    angular: DVec3,
+    inertia: DMat3,
+}
+
+impl Momenta {
+    /// Of bodies, each with its center of mass, its velocities, and its turn in the step.
+    fn of(world: &World, bodies: impl Iterator<Item = (usize, DVec3, [DVec3; 2], Quat)> + Clone) -> Self {
+        let mut all = Self::default();
+        for (i, place, [v, _], _) in bodies.clone() {
+            let m = f64::from(world.bodies[i].mass.mass);
+            all.mass += m;
+            all.center += m * place;
+            all.linear += m * v;
+        }
+        all.center /= all.mass;
+        for (i, place, [v, w], turn) in bodies {
+            let body = &world.bodies[i];
+            let m = f64::from(body.mass.mass);
+            let r = place - all.center;
+            let own = body.mass.world_inertia(product(turn, body.rotation)).as_dmat3();
+            all.angular += m * r.cross(v) + own * w;
+            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+            all.inertia += own + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * m;
+        }
+        all
+    }
+
+    fn rigid(&self) -> RigidMotion {
+        let spin = self.inertia.inverse() * self.angular;
+        let spin = if spin.is_finite() { spin } else { DVec3::ZERO };
+        let drift = self.linear / self.mass;
+        let kinetic = 0.5 * (self.mass * drift.length_squared() + spin.dot(self.inertia * spin));
+        RigidMotion { center: self.center, drift, spin, kinetic }
+    }
+}
+
+/// Some bodies as the step left them.
+fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize> + Clone) -> Momenta {
+    let body = |i: usize| {
+        let row = &problem.bodies[i];
+        let [v, w, way] = [row.v, row.w, row.dp].map(|u| Vec3::from(u).as_dvec3());
+        (i, world.bodies[i].center_of_mass().as_dvec3() + way, [v, w], Quat::from_array(row.dq))
+    };
+    Momenta::of(world, members.map(body))
+}
+
+/// Some bodies as the step found them, with what forces and torques gave them since.
+fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<Item = usize> + Clone) -> Momenta {
+    let body = |i: usize| {
+        let body = &world.bodies[i];
+        let [place, v, w] = [body.center_of_mass(), body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
+        (i, place, [v + Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt, w], Quat::IDENTITY)
+    };
+    let mut all = Momenta::of(world, members.clone().map(body));
+    all.angular += members.map(|i| world.bodies[i].whole_torque().as_dvec3() * dt).sum::<DVec3>();
+    all
+}
+
+/// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies, and no momentum where nothing holds them: their
+/// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`.
+fn brake(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    [over, kinetic]: [f64; 2],
+    from_start: Option<Momenta>,
+) {
+    let now = now(world, problem, members.clone());
+    let [from, to] = match from_start {
+        None => [RigidMotion::default(); 2],
+        Some(Momenta { linear, angular, .. }) => [now.rigid(), Momenta { linear, angular, ..now }.rigid()],
+    };
+    let (inner, left) = (kinetic - from.kinetic, kinetic - over - to.kinetic);
+    let scale = if inner > 0.0 { (left / inner).clamp(0.0, 1.0).sqrt() } else { 1.0 };
+    for i in members {
+        let place = world.bodies[i].center_of_mass().as_dvec3() + Vec3::from(problem.bodies[i].dp).as_dvec3();
+        let row = &mut problem.bodies[i];
+        let [v, w] = [row.v, row.w].map(|u| Vec3::from(u).as_dvec3());
+        let at = |motion: &RigidMotion| motion.drift + motion.spin.cross(place - motion.center);
+        row.v = (at(&to) + (v - at(&from)) * scale).as_vec3().to_array();
+        row.w = (to.spin + (w - from.spin) * scale).as_vec3().to_array();
+    }
+}
+
+/// Brings some bodies back to where the step found them, but for a fall of all together where nothing holds them. `is_kept`: they keep their
+/// velocities; else they move as one.
+fn stand_still(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    dt: f64,
+    is_held: bool,
+    is_kept: bool,
+) {
+    let after = before(world, problem, dt, members.clone());
+    let start = before(world, problem, 0.0, members.clone());
+    let gained = (after.linear - start.linear) / start.mass;
+    for i in members.clone() {
+        let (body, row) = (&world.bodies[i], &mut problem.bodies[i]);
+        (row.dp, row.dq) = ([0.0; 3], Quat::IDENTITY.to_array());
+        (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
+        if !is_held {
+            row.v = (Vec3::from(row.v) + gained.as_vec3()).to_array();
+            row.dp = ((start.linear / start.mass + 0.5 * gained) * dt).as_vec3().to_array();
+        }
+    }
+    if !is_kept {
+        let kinetic = f64::MAX;
+        brake(world, problem, members, [kinetic; 2], (!is_held).then_some(after));
+    }
+}
