@@ -11,17 +11,20 @@ mod detector;
 #[cfg(test)]
 mod distances;
 mod facet;
+mod guard;
 mod lane_pose;
 mod manifold;
 mod narrow;
 mod pair;
 mod pairs;
+mod path;
 mod places;
 mod query;
 mod report;
 mod reuse;
 mod sensors;
 mod solid;
+mod sweep;
 mod teleport;
 #[cfg(test)]
 mod testing;

@@ -6,9 +6,12 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::manifold::Manifold;
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
+use super::tree::Tree;
+use super::world_contacts::Plane;
 use crate::lanes::{InstructionSet, WIDTH, Wide};
 use crate::panics::blaming;
 
@@ -18,6 +21,10 @@ pub(super) struct Narrow<'a> {
     pub cuboids: &'a [CuboidPlace],
     pub moving: &'a [BodyState],
     pub margins: Margins,
+    pub tree: &'a Tree,
+    pub planes: &'a [Plane],
+    /// Whether the second of two bodies is fixed, and meets the first.
+    pub may_hold: &'a (dyn Fn(u32, u32) -> bool + Sync),
 }
 
 /// A pair that is not as it was.
@@ -41,6 +48,8 @@ struct Scratch {
     events: Vec<Event>,
     cuboid_pairs: Vec<CuboidPair>,
     cuboids: CuboidScratch,
+    /// The events whose bodies go far, with the manifolds that their pairs had.
+    far: Vec<(u32, Vec<Manifold>)>,
 }
 
 /// A pair that the test found not to stay as it is.
@@ -59,13 +68,14 @@ impl Narrow<'_> {
 
     fn update_with(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
         let PairChunk { first, pairs, tracks } = chunk;
-        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids } = scratch;
+        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids, far } = scratch;
         let set = InstructionSet::default();
         tests.clear();
         let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results: Mutex::new(tests) };
         set.run(&test, 0..tracks.len().div_ceil(WIDTH));
         events.clear();
         cuboid_pairs.clear();
+        far.clear();
         for (group, tested) in tests.iter().enumerate() {
             if tested.verdict == Wide([REUSED; WIDTH]) && tested.changes == Wide::default() {
                 continue;
@@ -87,6 +97,9 @@ impl Narrow<'_> {
                     let prediction = tested.prediction.0[lane];
                     track.then = bodies.map(Placed::of);
                     track.predicted = prediction;
+                    if self.goes_far(track) {
+                        far.push((events.len() as u32, pair.manifolds.clone()));
+                    }
                     let places = [pair.collider_a, pair.collider_b];
                     if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
                         let number = events.len() as u32;
@@ -106,6 +119,14 @@ impl Narrow<'_> {
             let prediction = tracks[event.place as usize].predicted;
             event.update = Some(pair.take_over(self.sides(pair), prediction, write, pair_scratch));
         });
+        for (number, before) in far.drain(..) {
+            let event = &mut events[number as usize];
+            let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
+            let update = event.update.unwrap_or_else(|| pair.part());
+            let bodies = [pair.body_a, pair.body_b];
+            let far = blaming(bodies, || self.follow_ways(pair, track, before, (&mut *pair_scratch, &mut *cuboids)));
+            event.update = Some(far.unwrap_or(update));
+        }
         let finish = |event: &Event| {
             let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
             let update = event.update.unwrap_or_else(|| pair.part());

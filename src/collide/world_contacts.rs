@@ -334,14 +334,20 @@ impl WorldContacts {
     }
 
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
-        let narrow =
-            Narrow { colliders: &self.colliders, cuboids: &self.cuboids, moving: input.moving, margins: input.margins };
-        let updates: Vec<Updated> = self.pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
-        let mut stats = DetectStats { pairs: self.pairs.len(), ..DetectStats::default() };
+        let may_hold = |body: u32, other: u32| {
+            let meets = || input.groups[body as usize].meets(input.groups[other as usize]);
+            let is_fixed = input.kinds[other as usize] == BodyKind::Fixed;
+            is_fixed && meets() && !input.jointed.contains(&key(body, other))
+        };
+        let Self { colliders, cuboids, tree, planes, pairs, changed, .. } = self;
+        let (moving, margins) = (input.moving, input.margins);
+        let narrow = Narrow { colliders, cuboids, moving, margins, tree, planes, may_hold: &may_hold };
+        let updates: Vec<Updated> = pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
+        let mut stats = DetectStats { pairs: pairs.len(), ..DetectStats::default() };
         for Updated { pair, computed, reshaped } in updates {
             stats.computed += usize::from(computed);
             stats.reshaped |= reshaped;
-            self.changed.push(PairChange { pair, computed });
+            changed.push(PairChange { pair, computed });
         }
         stats
     }

@@ -109,6 +109,7 @@ pub struct SolverConfig {
     pub gyroscopic: bool,
     /// How far apart surfaces are when a contact is already made, relative to the smallest half extent of the thinner
     /// shape. The distance that the bodies approach in one step is added, up to twice that half extent; before a half-space, all of it.
+    /// Bodies that approach further, or pass beside each other, have the contact of the place where their ways meet, and none where the ways do not.
     pub speculative_margin: f32,
     /// A manifold is reused while its bodies moved relative to each other by less than this, relative to the smallest
     /// half extent of the thinner shape; 0 computes every manifold anew.

@@ -404,11 +404,14 @@ impl Stages {
         let Self { energy, effort, key, problem, .. } = self;
         let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
+        let far = self.detector.hold(world, dt, self.sleep.activity());
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
         if self.detector.has_sensors() || !self.events.inside().is_empty() {
             let overlaps = self.detector.sense(world, self.sleep.activity());
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
+            let passed = self.detector.passed(world, dt, self.sleep.activity(), &far);
+            self.events.note_passed(passed.into_iter().map(|(pair, t)| (pair.map(|side| collider_of(world, side)), t)));
         }
         self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);

@@ -44,6 +44,7 @@ mod inertia;
 mod lanes;
 mod newton;
 mod oracle;
+mod passes;
 mod plan;
 #[cfg(feature = "gpu")]
 mod queries;

@@ -458,3 +458,26 @@ fn ragdolls_fall_down_the_stairs_and_stay_in_joint() {
     let mean = sum / FALLS as f32;
     assert!(mean < 0.09, "{mean} rad beyond a limit in the mean of all falls");
 }
+
+/// Dynamic bodies that leave the container of a scene, after each of some steps.
+fn leaving(name: &str, parameters: &[&str], steps: u32) -> usize {
+    let (scene, mut simulation) = run(name, parameters, 0);
+    let (low, high) = scene.container.expect("a container");
+    let mut most = 0;
+    for _ in 0..steps {
+        step(&mut simulation, 1);
+        let dynamic = simulation.world.bodies.iter().filter(|body| body.kind == BodyKind::Dynamic);
+        let is_out = |at: Vec3| (at.cmplt(low) | at.cmpgt(high)).any();
+        most = most.max(dynamic.filter(|body| is_out(body.position)).count());
+    }
+    most
+}
+
+#[test]
+fn nothing_falls_through_a_terrain_and_no_bullet_leaves_its_room() {
+    assert_eq!(leaving("terrain", &[], 300), 0);
+    assert_eq!(leaving("terrain", &["n=30", "height=50"], 400), 0);
+    for speed in ["speed=30", "speed=300", "speed=1000"] {
+        assert_eq!(leaving("bullets", &[speed], 120), 0, "{speed}");
+    }
+}

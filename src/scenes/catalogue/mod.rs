@@ -6,6 +6,7 @@ mod common;
 mod drop;
 mod drum;
 mod entry;
+mod fast;
 mod flow;
 mod jointed;
 mod machines;
@@ -371,5 +372,27 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |_| 0.0,
         build: |v| Ok(flow::galton(v[0] as u32, v[1] as usize, v[2] as u32, v[3] as u64)),
+    },
+    Entry {
+        name: "terrain",
+        summary: "thin slabs, coins and balls fall on hills of triangles: none goes through",
+        parameters: &[
+            Parameter::whole("n", 60, (1.0, 10_000.0), "number of bodies"),
+            Parameter::real("height", 5.0, (0.0, 100.0), "height of the fall of the lowest [m]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the places and tilts"),
+        ],
+        bodies: |v| v[0],
+        build: |v| fast::terrain(v[0] as usize, v[1] as f32, v[2] as u64),
+    },
+    Entry {
+        name: "bullets",
+        summary: "balls of 2 cm, marked as swept, fly to and fro in a room of sheets of 1 mm: none leaves",
+        parameters: &[
+            Parameter::whole("n", 64, (1.0, 10_000.0), "number of balls"),
+            Parameter::real("speed", 300.0, (1.0, 1000.0), "speed of each at the start [m/s]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the directions"),
+        ],
+        bodies: |v| v[0],
+        build: |v| Ok(fast::bullets(v[0] as usize, v[1] as f32, v[2] as u64)),
     },
 ];

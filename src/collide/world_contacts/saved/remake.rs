@@ -8,6 +8,7 @@ use crate::collide::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
 use crate::collide::manifold::Manifold;
 use crate::collide::pair::{Pair, PairScratch, Side};
 use crate::collide::pairs::{Placed, Track};
+use crate::collide::path::ANEW;
 use crate::error::{Result, ensure, input};
 use crate::lanes::InstructionSet;
 
@@ -17,7 +18,7 @@ const PAIRS_A_TASK: usize = 512;
 impl WorldContacts {
     /// Whether the manifolds of a pair follow from the rest, where its colliders and all that follows from them are as they were.
     pub(super) fn is_remade(&self, i: usize) -> bool {
-        let then = self.pairs.computed_at(i);
+        let then = self.pairs.computed_at(i).filter(|_| self.pairs.with_track(i).1.predicted != ANEW);
         then.is_some_and(|then| then.iter().all(|place| place.is_centered == 1.0))
             && !self.pairs[i].manifolds.is_empty()
     }
