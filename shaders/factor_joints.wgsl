@@ -1,46 +1,77 @@
 // factor_joints: one thread factors one system of joints.
-// Reads joint_systems, joints, bodies, masses. Writes joint_nodes and joint_blocks; no other thread writes those of the same system.
+// Reads joint_systems, joints, axes, bodies, masses. Writes joint_nodes and joint_blocks; no other thread writes those of the same system.
 // Double: factor_system in src/kernels/joint_system.rs.
+
+// The anchors of a joint as three rows, along the axes of the world: one of them.
+fn anchor_motion(anchors: Anchors, along: vec3f) -> AxisMotion {
+    return AxisMotion(along, cross3(anchors.r_a, along), cross3(anchors.r_b, along), 0.0);
+}
+
+// Row i of a node; zero where there is none.
+fn row_motion(pair: ptr<function, Pair>, joint: Joint, rows: u32, i: u32) -> AxisMotion {
+    let axis = axis_of_row(rows, i);
+    if axis == 0u { return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0); }
+    return axis_motion(pair, joint, axes[joint.first_axis + axis - 1u]);
+}
+
+fn begin_node(node: u32) {
+    let joint = joints[joint_of_node(node)];
+    let rows = rows_of_node(node);
+    var pair = load_pair(joint.body_a, joint.body_b);
+    let anchors = current_anchors(&pair, joint);
+    var x = anchor_motion(anchors, vec3f(-1.0, 0.0, 0.0));
+    var y = anchor_motion(anchors, vec3f(0.0, -1.0, 0.0));
+    var z = anchor_motion(anchors, vec3f(0.0, 0.0, -1.0));
+    if rows != ANCHORS {
+        x = row_motion(&pair, joint, rows, 0u);
+        y = row_motion(&pair, joint, rows, 1u);
+        z = row_motion(&pair, joint, rows, 2u);
+    }
+    joint_nodes[node].along = block_of_rows(x.along, y.along, z.along);
+    joint_nodes[node].about_a = block_of_rows(x.about_a, y.about_a, z.about_a);
+    joint_nodes[node].about_b = block_of_rows(x.about_b, y.about_b, z.about_b);
+    joint_nodes[node].turn_a = mat3x3f(
+        inv_inertia_times(pair.mass_a, x.about_a),
+        inv_inertia_times(pair.mass_a, y.about_a),
+        inv_inertia_times(pair.mass_a, z.about_a),
+    );
+    joint_nodes[node].turn_b = mat3x3f(
+        inv_inertia_times(pair.mass_b, x.about_b),
+        inv_inertia_times(pair.mass_b, y.about_b),
+        inv_inertia_times(pair.mass_b, z.about_b),
+    );
+    joint_nodes[node].mass_a = pair.mass_a.inv_mass;
+    joint_nodes[node].mass_b = pair.mass_b.inv_mass;
+}
 
 fn factor_system(system: u32) {
     let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);
-    for (var node = first; node < end; node++) {
-        let joint = joints[joint_of_node(node)];
-        var pair = load_pair(joint.body_a, joint.body_b);
-        let anchors = current_anchors(&pair, joint);
-        joint_nodes[node].r_a = anchors.r_a;
-        joint_nodes[node].mass_a = pair.mass_a.inv_mass;
-        joint_nodes[node].r_b = anchors.r_b;
-        joint_nodes[node].mass_b = pair.mass_b.inv_mass;
-        joint_nodes[node].turn_a = turn_of_impulse(pair.mass_a, anchors.r_a);
-        joint_nodes[node].turn_b = turn_of_impulse(pair.mass_b, anchors.r_b);
-    }
+    for (var node = first; node < end; node++) { begin_node(node); }
     for (var node = first; node < end; node++) {
         let pivot = first_block_of_node(node);
         let end_block = end_block_of_node(node);
         for (var at = pivot; at < end_block; at++) {
-            var block: mat3x3f;
+            var block = coupling(node, node_of_block(at), select(shared_of_block(at), OWN_SIDES, at == pivot));
+            let own = diagonal_of(block);
             if at == pivot {
-                block = block_sum(
-                    movement_at(joint_nodes[node].mass_a, joint_nodes[node].turn_a, joint_nodes[node].r_a),
-                    movement_at(joint_nodes[node].mass_b, joint_nodes[node].turn_b, joint_nodes[node].r_b),
-                );
-                let more = (block[0].x + block[1].y + block[2].z) * softness_of_system(system);
-                block = with_diagonal(block, more);
-                joint_nodes[node].softness = more;
-            } else {
-                block = coupling(node, node_of_block(at), shared_of_block(at));
+                let softness = (own.x + own.y + own.z) * softness_of_system(system);
+                joint_nodes[node].softness = softness;
+                block = with_diagonal(block, softness);
             }
             let end_term = end_term_of_block(at);
             for (var term = first_term_of_block(at); term < end_term; term++) {
-                block = less_product(block, joint_blocks[left_of_term(term)].lower, joint_blocks[right_of_term(term)].upper);
+                let left = joint_blocks[left_of_term(term)].lower;
+                block = block_less(block, product_with_transpose(left, joint_blocks[right_of_term(term)].upper));
             }
             if at == pivot {
-                joint_blocks[at].lower = inverse_pivot(block);
+                joint_blocks[at].lower = factored_pivot(block, own);
             } else {
-                joint_blocks[at].lower = block_product(block, joint_blocks[pivot].lower);
-                joint_blocks[at].upper = block;
+                let factors = joint_blocks[pivot].lower;
+                let inverse = diagonal_of(factors);
+                let upper = block_over(block, factors);
+                joint_blocks[at].lower = mat3x3f(upper[0] * inverse.x, upper[1] * inverse.y, upper[2] * inverse.z);
+                joint_blocks[at].upper = upper;
             }
         }
     }

@@ -75,7 +75,11 @@ fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
 // Rows that are no limits are further than this above their upper limit (m, rad).
 const LEAST_LEFT: f32 = -5e17;
 
-fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
+// Whether a row is a lock: neither a limit nor a drive.
+fn is_lock(axis: Axis) -> bool { return LEAST_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
+
+// Sweeps one axis; with `but_locks` only if it is no lock.
+fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
     let mass = reciprocal(axis_inverse_mass(pair, motion));
 
@@ -107,7 +111,8 @@ fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis,
     let wanted = (axis_speed(rules, pair, motion) - axis.speed) * sign;
     let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
     let least = select(-axis.max_impulse, 0.0, is_limit);
-    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    var sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    if but_locks { sum = select(sum, before, is_lock(axis)); }
     let change = (sum - before) * sign;
     joint_impulses[k].linear.x = sum * sign;
     note_correction(rules.measured, change, mass);
@@ -115,9 +120,33 @@ fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis,
 }
 
 // Impulses of axes follow those of joints.
-fn solve_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {
+fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint) {
     for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
-        solve_axis(rules, pair, joint, axes[k], params.joint_count + k);
+        solve_axis(rules, but_locks, pair, joint, axes[k], params.joint_count + k);
+    }
+}
+
+// The velocity that a lock lacks; none of an axis that is swept.
+fn measure_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
+    let motion = axis_motion(pair, joint, axis);
+    var wanted = axis_speed(rules, pair, motion);
+    if rules.biased {
+        wanted = wanted + (axis.gap + motion.moved) * pass_row.joint.bias_rate;
+    }
+    wanted = select(0.0, wanted, is_lock(axis));
+    note_correction(rules.measured, wanted, 1.0);
+    joint_changes[k].linear.x = wanted * -params.relaxation;
+}
+
+fn measure_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        measure_axis(rules, pair, joint, axes[k], params.joint_count + k);
+    }
+}
+
+fn apply_axis_changes(pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        apply_axis_impulse(pair, axis_motion(pair, joint, axes[k]), joint_changes[params.joint_count + k].linear.x);
     }
 }
 

@@ -52,7 +52,9 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             }
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => (contacts, None),
             Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => (joints, None),
-            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
+            Kernel::SolveAxes(_) | Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
+                (own.direct_joints(), None)
+            }
             Kernel::IntegrateVelocities { .. }
             | Kernel::BeginChanges
             | Kernel::EndChanges

@@ -164,7 +164,7 @@ pub enum JointSolver {
     Auto,
     /// One after another, as contacts.
     Sweeps,
-    /// All joints of a connected set of bodies at once, whatever that costs.
+    /// The anchors and locks of a connected set of bodies at once, whatever that costs; limits, motors and springs by sweeps.
     Direct,
 }
 

@@ -84,9 +84,11 @@ pub fn every_kernel() -> Vec<Kernel> {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
         all.push(Kernel::SolveJoints(Rules { axes: true, ..rules.of_joints() }));
-        all.push(Kernel::MeasureJoints(rules.of_joints()));
-        all.push(Kernel::SolveJointSystems(rules.of_joints()));
-        all.push(Kernel::ApplyJointChanges(rules.of_joints()));
+        let with_axes = Rules { axes: true, ..rules.of_joints() };
+        all.push(Kernel::SolveAxes(with_axes));
+        all.push(Kernel::MeasureJoints(with_axes));
+        all.push(Kernel::SolveJointSystems(with_axes));
+        all.push(Kernel::ApplyJointChanges(with_axes));
         all.push(Kernel::SolveContacts(rules));
         let Rules { patch, from_start, isotropic, .. } = rules;
         all.push(Kernel::ApplyRestitution(Rules { patch, from_start, isotropic, ..Rules::default() }));
@@ -111,7 +113,9 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
         Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => joints,
-        Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
+        Kernel::SolveAxes(_) | Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
+            problem.blocks[0].direct_joints()
+        }
         Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,
         Kernel::ClearImpulses
@@ -201,6 +205,7 @@ fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
     let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
     let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
+    let rules = Rules { axes: true, ..rules };
     let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
     let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
     let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();

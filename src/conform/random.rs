@@ -8,7 +8,7 @@ use crate::problem::StepProblem;
 use crate::problem::softness::softness;
 use crate::problem::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, NO_LIMIT,
-    Params, PointRow, Substep, TorqueRow, TurningRow,
+    NodeRow, Params, PointRow, Substep, TorqueRow, TurningRow,
 };
 use crate::random::SplitMix64;
 
@@ -131,15 +131,21 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
 
 /// Puts all joints into one system, and lets the inertia of half of the bodies turn.
 fn solve_joints_at_once(random: &mut Random, problem: &mut StepProblem) {
-    let joints: Vec<u32> = (0..problem.joints.len() as u32).collect();
+    let mut nodes = Vec::new();
+    for (row, joint) in problem.joints.iter().zip(0..) {
+        let axes = &problem.axes[row.first_axis as usize..(row.first_axis + row.axis_count) as usize];
+        let locks: Vec<u32> = (0..).zip(axes).filter(|(_, axis)| axis.is_lock()).map(|(k, _)| k).collect();
+        nodes.extend(locks.chunks(3).map(|locks| (joint, NodeRow::rows_of(locks))));
+        nodes.extend(Some((joint, NodeRow::ANCHORS)).filter(|_| row.is_loose == 0.0));
+    }
     let side = |body: u32| Some(body).filter(|&body| is_movable(body));
     let sides = |joint: u32| {
         let row = &problem.joints[joint as usize];
         [side(row.body_a), side(row.body_b)]
     };
-    assert!(problem.systems.add(&joints, sides, usize::MAX));
+    assert!(problem.systems.add(&nodes, sides, usize::MAX));
     // More joints than the bodies can follow: soft ones, or S would be near to singular.
-    problem.systems.softness[0] = 0.1;
+    problem.systems.softness[0] = 1.0;
     for body in (0..BODIES).filter(|&body| is_movable(body)) {
         if random.happens(0.5) {
             let MassRow { inv_inertia_x, inv_inertia_yz, .. } = mass_row(random);

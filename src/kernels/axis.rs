@@ -6,6 +6,7 @@ use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
 
 /// How bodies move along an axis: double of the WGSL struct `AxisMotion`.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct AxisMotion<L> {
     /// Along which the bodies shift; zero for an axis to turn about.
     pub along: Vec3<L>,
@@ -108,10 +109,18 @@ pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axi
 /// Rows that are no limits are further than this above their upper limit (m, rad): half of `NO_LIMIT`.
 const LEAST_LEFT: f64 = -5e17;
 
-/// Sweeps one axis. Kernel `solve_joints`.
+/// Whether a row is a lock: neither a limit nor a drive.
+#[inline(always)]
+pub fn is_lock<L: Lane>(axis: &Axis<L>) -> L::Mask {
+    let of_drive = axis.mass_scale + axis.impulse_scale;
+    L::and(L::constant(LEAST_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
+}
+
+/// Sweeps one axis; with `but_locks` only if it is no lock. Kernels `solve_joints` and `solve_axes`.
 #[inline(always)]
 pub fn solve_axis<L: Lane>(
     rules: Rules,
+    but_locks: bool,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     joint: &Joint<L>,
@@ -152,7 +161,10 @@ pub fn solve_axis<L: Lane>(
     let wanted = (axis_speed(rules, pair, &motion) - axis.speed) * sign;
     let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
     let least = L::select(-axis.max_impulse, zero, is_limit);
-    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    let mut sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    if but_locks {
+        sum = L::select(sum, before, is_lock(axis));
+    }
     let change = (sum - before) * sign;
     *impulse = sum * sign;
     note_correction(rules, params, pair, change, mass);

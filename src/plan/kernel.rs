@@ -71,6 +71,8 @@ pub enum Kernel {
     UpdateMomentum,
     /// One sweep of the joints; over joint colors.
     SolveJoints(Rules),
+    /// One sweep of the limits and drives of joints that are solved at once; over their colors.
+    SolveAxes(Rules),
     /// The velocities that joints lack which are solved at once; over their colors, in any order.
     MeasureJoints(Rules),
     /// Solves joints at once; over systems.
@@ -109,6 +111,7 @@ impl Kernel {
             Self::MeasureStep => "measure_step",
             Self::UpdateMomentum => "update_momentum",
             Self::SolveJoints(_) => "solve_joints",
+            Self::SolveAxes(_) => "solve_axes",
             Self::MeasureJoints(_) => "measure_joints",
             Self::SolveJointSystems(_) => "solve_joint_systems",
             Self::ApplyJointChanges(_) => "apply_joint_changes",
@@ -139,6 +142,7 @@ impl Kernel {
         match self {
             Self::WarmStart(rules)
             | Self::SolveJoints(rules)
+            | Self::SolveAxes(rules)
             | Self::MeasureJoints(rules)
             | Self::SolveJointSystems(rules)
             | Self::ApplyJointChanges(rules)
@@ -163,7 +167,11 @@ impl Kernel {
     pub fn reads_start(self) -> bool {
         let measures = matches!(
             self,
-            Self::SolveJoints(_) | Self::MeasureJoints(_) | Self::SolveContacts(_) | Self::ApplyRestitution(_)
+            Self::SolveJoints(_)
+                | Self::SolveAxes(_)
+                | Self::MeasureJoints(_)
+                | Self::SolveContacts(_)
+                | Self::ApplyRestitution(_)
         );
         measures && self.is_from_start()
     }
@@ -189,6 +197,7 @@ impl Kernel {
         match self {
             Self::Extrapolate { measured, .. } => measured,
             Self::SolveJoints(rules)
+            | Self::SolveAxes(rules)
             | Self::MeasureJoints(rules)
             | Self::SolveJointSystems(rules)
             | Self::ApplyJointChanges(rules)

@@ -38,6 +38,8 @@ struct Sweeps<'a> {
     /// Joints that are solved at once: the color of their systems, and the groups of their colors.
     systems: &'a [Range<u32>],
     direct: &'a [Range<u32>],
+    /// Those groups, if any joint has a limit or a drive.
+    swept_axes: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
     /// Contacts whose friction jams.
     jamming: &'a [Range<u32>],
@@ -79,11 +81,12 @@ pub(crate) struct PlanKey {
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
-    /// Whether joints have axes.
+    /// Whether joints have axes, and whether any is a limit or a drive.
     axes: bool,
+    swept_axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes });
+crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes, swept_axes });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -94,6 +97,7 @@ impl PlanKey {
             && self.totals != problem.totals.is_empty()
             && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
+            && self.swept_axes == has_swept_axes(problem)
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
@@ -108,8 +112,14 @@ impl PlanKey {
             isotropic,
             has_torques: !problem.torques.is_empty(),
             axes: !problem.axes.is_empty(),
+            swept_axes: has_swept_axes(problem),
         }
     }
+}
+
+/// Whether any axis is a limit or a drive.
+fn has_swept_axes(problem: &StepProblem) -> bool {
+    problem.axes.iter().any(|axis| !axis.is_lock())
 }
 
 /// Whether the bodies of each block have equal moments of inertia.
@@ -184,6 +194,7 @@ impl StepPlan {
         let [bodies, inertias, systems, turning] =
             [bodies, inertias, systems, turning].map(|color| Some(color).filter(kept));
         let [bodies, inertias, systems, turning] = [&bodies, &inertias, &systems, &turning].map(Option::as_slice);
+        let has_swept_axes = has_swept_axes(problem);
         // Momentum begins with the third sweep.
         let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
         let sweeps = |count: u32| Sweeps {
@@ -194,6 +205,7 @@ impl StepPlan {
             joints: &joints,
             systems,
             direct: &direct,
+            swept_axes: if has_swept_axes { &direct } else { &[] },
             contacts: &swept_once,
             jamming: &jamming,
         };
@@ -213,7 +225,7 @@ impl StepPlan {
             }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
-            self.over_colors(Kernel::WarmStartJoints { axes: false }, block, &direct);
+            self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &direct);
             if warm_start {
                 // Done already.
             } else if shared.accumulated {
@@ -267,6 +279,7 @@ impl StepPlan {
             joints: &joints,
             systems: &[],
             direct: &[],
+            swept_axes: &[],
             contacts: &contacts,
             jamming: &[],
         };
@@ -295,8 +308,10 @@ impl StepPlan {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
             if let [first, ..] = sweeps.direct {
-                let rules = Rules { axes: false, ..rules.of_joints() };
+                let rules = Rules { axes: true, ..rules.of_joints() };
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
+                // Locks have the last word.
+                self.over_colors(Kernel::SolveAxes(rules), block, sweeps.swept_axes);
                 self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
                 self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);

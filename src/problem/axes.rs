@@ -12,6 +12,7 @@
 
 use std::f32::consts::{PI, TAU};
 
+use super::NodeRow;
 use super::rows::{AxisRow, NO_LIMIT};
 use super::softness::softness;
 use crate::world::{Axis, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear};
@@ -37,6 +38,24 @@ pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
 /// How many rows of a joint are of drives; they stand before the others.
 pub fn drive_count(joint: &Joint) -> usize {
     kinds(joint).filter(|(_, is_drive)| *is_drive).count()
+}
+
+/// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks to turn about, which give a
+/// lever its stiffness, before those to shift along.
+pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
+    let is_lock = |axis: &Axis| match axis.bounds {
+        Bounds::Locked => true,
+        Bounds::Between { min, max } => min >= max && axis.drive == Drive::None,
+        Bounds::Free => false,
+    };
+    let locks = |are_angles: bool| {
+        let rows = (0..).zip(kinds(joint)).filter(move |(_, (i, is_drive))| !is_drive && (*i >= 3) == are_angles);
+        let axis = |i: usize| axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        let own: Vec<u32> = rows.filter(|(_, (i, _))| is_lock(axis(*i))).map(|(row, _)| row).collect();
+        NodeRow::rows_of(&own)
+    };
+    let shifts = if joint.holds_anchors() { NodeRow::ANCHORS } else { locks(false) };
+    [locks(true), shifts].into_iter().filter(|rows| *rows > 0)
 }
 
 /// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.

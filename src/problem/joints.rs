@@ -1,12 +1,11 @@
 //! The rows of joints: one for each joint of the world, in its order, and those of their axes. An impulse stays in its row.
 
 use std::collections::{BTreeMap, HashMap};
-use std::f32::consts::TAU;
 
 use glam::Vec3;
 
 use super::axes;
-use super::joint_loads::borne_masses;
+use super::joint_sets::JointSet;
 use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
@@ -14,7 +13,7 @@ use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{BodyKind, Bounds, Joint, JointHandle, Linear, World};
+use crate::world::{BodyKind, Joint, JointHandle, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Debug, Default)]
@@ -36,10 +35,14 @@ pub struct JointRows {
     /// The gravity that the bodies of joints felt then.
     gravity: Vec<Vec3>,
     swept_gap: f32,
+    /// The joints of each connected set of bodies.
+    sets: Vec<JointSet>,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
+    /// A zero for each body, likewise.
+    swings: Vec<f32>,
 }
 
 crate::saved::state!(JointRows {
@@ -53,12 +56,13 @@ crate::saved::state!(JointRows {
     chosen_for,
     gravity,
     swept_gap,
+    sets,
     needs,
-} scratch { graph, lent });
+} scratch { graph, lent, swings });
 
-/// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
+/// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
-const MOST_TERMS_A_JOINT: usize = 24;
+const MOST_TERMS_A_NODE: usize = 24;
 
 /// The gap of a net that swings over its gap at rest, as substeps for it are chosen. A net of 16 x 16 balls under 300 times opens 6 times as
 /// far as at rest with 8 substeps, and 20 times with 128.
@@ -94,7 +98,10 @@ impl JointRows {
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
         let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.needs.len()] == [count; 2];
-        ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
+        let are_sets = self.sets.iter().all(|set| set.is_of(count, bodies));
+        ensure(are_joints && are_colors && are_systems && are_chosen && are_sets, || {
+            "colors or systems of no joints".into()
+        })
     }
 
     /// Lets all joints choose their colors anew.
@@ -108,23 +115,40 @@ impl JointRows {
         self.chosen_for = None;
     }
 
-    /// Chooses the joints that are solved at once, unless they are chosen. `substep` is the length of a substep (s).
+    /// Chooses the joints that are solved at once, and adds some as bodies move faster. Their bodies go on with what is chosen. `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
             ends.flat_map(|(a, b)| [Some(a), b]).flatten().map(|body| world.gravity_on(body))
         };
-        if is_chosen && self.gravity.iter().copied().eq(felt()) {
-            return;
+        if !(is_chosen && self.gravity.iter().copied().eq(felt())) {
+            self.gravity = felt().collect();
+            self.begin_sets(world, config, substep, problem);
         }
-        self.gravity = felt().collect();
+        self.swings.clear();
+        self.swings.resize(world.bodies.len(), 0.0);
+        let mut sets = std::mem::take(&mut self.sets);
+        for set in sets.iter_mut().filter(|set| !set.is_decided) {
+            let gap = set.gap(world, &mut self.swings);
+            self.swept_gap = self.swept_gap.max(gap);
+            if config.joint_solver != JointSolver::Auto || gap > config.max_joint_gap_share {
+                self.decide(&set.joints, gap, config, problem);
+                set.is_decided = true;
+            }
+        }
+        self.sets = sets;
+    }
+
+    /// Sweeps all joints, and finds the sets of those that may be solved at once.
+    fn begin_sets(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         problem.systems = JointSystems::default();
         self.systems.clear();
         self.systems.resize(self.joints.len(), SWEPT);
         self.swept_gap = 0.0;
         self.needs.clear();
         self.needs.resize(self.joints.len(), 0.0);
+        self.sets.clear();
         if config.joint_solver == JointSolver::Sweeps {
             return;
         }
@@ -138,23 +162,25 @@ impl JointRows {
                 members.entry(islands.root(body)).or_default().push(joint as u32);
             }
         }
-        for joints in members.values() {
-            let gap = self.gap_of_sweeps(joints, world, config, substep);
-            self.swept_gap = self.swept_gap.max(gap);
-            let most_terms = match config.joint_solver {
-                JointSolver::Auto if gap <= config.max_joint_gap_share => continue,
-                JointSolver::Auto => MOST_TERMS_A_JOINT * joints.len(),
-                _ => usize::MAX,
-            };
-            let system = problem.systems.len() as u32;
-            // Axes are swept, and the anchors of their joints with them.
-            let are_balls = joints.iter().all(|&joint| self.joints[joint as usize].is_ball());
-            if are_balls && problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
-                joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
-            } else {
-                let need = SWING * gap / config.max_joint_gap_share;
-                joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
-            }
+        let set = |joints| JointSet::new(joints, world, config, substep, |joint| self.sides(joint));
+        self.sets = members.into_values().map(set).collect();
+    }
+
+    /// Solves the anchors and locks of some joints at once, which sweeps would leave open by `gap`, where that costs little enough; else they
+    /// need more substeps.
+    fn decide(&mut self, joints: &[u32], gap: f32, config: &SolverConfig, problem: &mut StepProblem) {
+        let of_joint = |&joint: &u32| axes::nodes(&self.joints[joint as usize]).map(move |rows| (joint, rows));
+        let nodes: Vec<_> = joints.iter().flat_map(of_joint).collect();
+        let most_terms = match config.joint_solver {
+            JointSolver::Auto => MOST_TERMS_A_NODE * nodes.len(),
+            _ => usize::MAX,
+        };
+        let system = problem.systems.len() as u32;
+        if problem.systems.add(&nodes, |joint| self.sides(joint), most_terms) {
+            nodes.iter().for_each(|(joint, _)| self.systems[*joint as usize] = system);
+        } else {
+            let need = SWING * gap / config.max_joint_gap_share;
+            joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
         }
     }
 
@@ -162,33 +188,6 @@ impl JointRows {
     fn sides(&self, joint: u32) -> [Option<u32>; 2] {
         let Edge { a, b, .. } = self.edges[joint as usize];
         [a, b].map(|body| Some(body).filter(|&body| body != IMMOVABLE))
-    }
-
-    /// The largest gap at rest that sweeps leave in some joints, as a share of their arms: F/(m w²), the load F that a joint bears, the mass
-    /// m of its bodies, the frequency w of its spring.
-    fn gap_of_sweeps(&self, joints: &[u32], world: &World, config: &SolverConfig, substep: f32) -> f32 {
-        let sides: Vec<_> = joints.iter().map(|&joint| self.sides(joint)).collect();
-        let mass = |body: u32| world.bodies[body as usize].mass.mass;
-        let weight = |body: u32| mass(body) * world.bodies[body as usize].gravity_scale.abs();
-        let omega = TAU * config.joint_frequency / substep;
-        let bears = |joint: &Joint| match &joint.linear {
-            Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
-            Linear::Distance(distance) => distance.bounds != Bounds::Free,
-        };
-        let gap = |(&joint, borne): (&u32, f32)| {
-            if !bears(&self.joints[joint as usize]) {
-                return 0.0;
-            }
-            let (body_a, body_b) = self.joints[joint as usize].indices();
-            let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
-            let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
-            let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
-            let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
-            let gravity = world.gravity_of(world.bodies.worlds()[body_a] as usize).length();
-            borne * gravity * softness / (omega * omega * arms)
-        };
-        // A joint without arms has no length to be held against.
-        joints.iter().zip(borne_masses(&sides, weight)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
     }
 
     /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.

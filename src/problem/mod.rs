@@ -10,6 +10,7 @@ mod check_systems;
 mod contacts;
 pub mod effective;
 mod joint_loads;
+mod joint_sets;
 mod joint_systems;
 mod joints;
 mod lent_inertia;
@@ -28,7 +29,7 @@ pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
 pub(crate) use effective::InverseMass;
-pub use joint_systems::{BlockRow, JointSystems, NodeRow};
+pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
@@ -258,6 +259,18 @@ impl StepProblem {
         let rows = self.axes[own.clone()].iter().zip(&impulses[own]);
         let wanted = rows.filter(|(axis, _)| (axis.is_linear > 0.0) == is_linear);
         wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()
+    }
+
+    /// Where the three rows of a node have their impulses; none of a row that is not there.
+    pub fn numbers_of(&self, node: &NodeRow) -> [Option<ImpulseNumber>; 3] {
+        let joint = node.joint as usize;
+        if node.is_of_anchors() {
+            return [0, 1, 2].map(|component| Some(ImpulseNumber { row: joint, component }));
+        }
+        let first = self.joints.len() + self.joints[joint].first_axis as usize;
+        let mut numbers = [None; 3];
+        node.axes().for_each(|(i, k)| numbers[i] = Some(ImpulseNumber { row: first + k, component: 0 }));
+        numbers
     }
 
     /// Number of impulses, those of patches, joints and their axes included.

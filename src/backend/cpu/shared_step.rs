@@ -83,7 +83,7 @@ impl SharedStep<'_> {
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
                 self.sweep(pass, part, self.contacts, (self.contact_points, self.contact_impulses), spread);
             }
-            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => {
+            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SolveAxes(_) => {
                 self.sweep(pass, part, self.joints, (self.joint_axes, self.joint_impulses), spread);
             }
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
