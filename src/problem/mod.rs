@@ -262,7 +262,7 @@ impl StepProblem {
     }
 
     /// Where the three rows of a node have their impulses; none of a row that is not there.
-    pub fn numbers_of(&self, node: &NodeRow) -> [Option<ImpulseNumber>; 3] {
+    pub(crate) fn numbers_of(&self, node: &NodeRow) -> [Option<ImpulseNumber>; 3] {
         let joint = node.joint as usize;
         if node.is_of_anchors() {
             return [0, 1, 2].map(|component| Some(ImpulseNumber { row: joint, component }));

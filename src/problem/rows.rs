@@ -273,7 +273,7 @@ impl AxisRow {
 
     /// Whether the row is a lock: neither a limit nor a drive.
     pub fn is_lock(&self) -> bool {
-        crate::kernels::axis::is_lock(&crate::kernels::Axis::<f32>::load(self))
+        self.left < 0.5 * NO_LIMIT && self.mass_scale + self.impulse_scale < 0.5
     }
 }
 
