@@ -93,7 +93,7 @@ pub struct SolverConfig {
     /// take more substeps where that is cheaper (nets).
     pub max_joint_gap_share: f32,
     /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where sweeps would leave a gap of more
-    /// than `max_joint_gap_share`: where a joint bears many times the mass of its bodies, or a moment, and where bodies spin fast or are light
+    /// than `max_joint_gap_share`: where a joint bears many times the mass of its bodies, or a moment, and where bodies begin with a fast spin or are light
     /// and on long levers. Limits, motors and springs are swept all the same. Measured with 8 substeps, a chain of 100 links with 1000 times the mass of a link at its end: gap
     /// 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
     pub joint_solver: JointSolver,

@@ -13,20 +13,15 @@ use crate::world::{Body, BodyKind, Bounds, Joint, Linear, World};
 const MOST_SWING: f32 = 4.0;
 
 /// The joints of a connected set of bodies that can move.
-#[derive(Clone, Debug, Default)]
 pub struct JointSet {
     /// Their indices.
     pub joints: Vec<u32>,
     /// How each of them bears its load.
     bearings: Vec<Bearing>,
-    /// Whether it is decided how the joints are solved.
-    pub is_decided: bool,
 }
 
-crate::saved::fields!(JointSet { joints, bearings, is_decided });
-
 /// How a joint bears its load.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Default)]
 struct Bearing {
     /// Its bodies.
     bodies: Vec<u32>,
@@ -42,8 +37,6 @@ struct Bearing {
     /// The angle that they leave under the moment of the weight (rad).
     angle: f32,
 }
-
-crate::saved::fields!(Bearing { bodies, arms, swings, weight, mass, gap, angle });
 
 impl JointSet {
     /// The set of some joints. `sides` are the bodies of a joint that can move; `substep` is the length of a substep (s).
@@ -67,16 +60,7 @@ impl JointSet {
         let bearings = loads.map(|((&joint, weight), all)| {
             Bearing::new(&world.joints[joint as usize], [weight, all], world, omega, substep)
         });
-        Self { bearings: bearings.collect(), joints, is_decided: false }
-    }
-
-    /// Whether its joints and bodies are below these counts.
-    pub fn is_of(&self, joints: usize, bodies: usize) -> bool {
-        let has_bodies = |bearing: &Bearing| {
-            let lengths = [bearing.arms.len(), bearing.swings.len()];
-            lengths == [bearing.bodies.len(); 2] && bearing.bodies.iter().all(|&body| (body as usize) < bodies)
-        };
-        self.joints.iter().all(|&joint| (joint as usize) < joints) && self.bearings.iter().all(has_bodies)
+        Self { bearings: bearings.collect(), joints }
     }
 
     /// The largest gap that sweeps leave in any joint, as a share of its arms, where bodies move as they do. `swings` is memory with a zero for

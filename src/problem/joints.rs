@@ -35,14 +35,10 @@ pub struct JointRows {
     /// The gravity that the bodies of joints felt then.
     gravity: Vec<Vec3>,
     swept_gap: f32,
-    /// The joints of each connected set of bodies.
-    sets: Vec<JointSet>,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
-    /// A zero for each body, likewise.
-    swings: Vec<f32>,
 }
 
 crate::saved::state!(JointRows {
@@ -56,9 +52,8 @@ crate::saved::state!(JointRows {
     chosen_for,
     gravity,
     swept_gap,
-    sets,
     needs,
-} scratch { graph, lent, swings });
+} scratch { graph, lent });
 
 /// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
@@ -98,10 +93,7 @@ impl JointRows {
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
         let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.needs.len()] == [count; 2];
-        let are_sets = self.sets.iter().all(|set| set.is_of(count, bodies));
-        ensure(are_joints && are_colors && are_systems && are_chosen && are_sets, || {
-            "colors or systems of no joints".into()
-        })
+        ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
     }
 
     /// Lets all joints choose their colors anew.
@@ -115,40 +107,24 @@ impl JointRows {
         self.chosen_for = None;
     }
 
-    /// Chooses the joints that are solved at once, and adds some as bodies move faster. Their bodies go on with what is chosen. `substep` is the length of a substep (s).
+    /// Chooses the joints that are solved at once, unless they are chosen: one that is swept pulls its gap shut softly, and would gain energy if it
+    /// were solved at once from a later step on. `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
             ends.flat_map(|(a, b)| [Some(a), b]).flatten().map(|body| world.gravity_on(body))
         };
-        if !(is_chosen && self.gravity.iter().copied().eq(felt())) {
-            self.gravity = felt().collect();
-            self.begin_sets(world, config, substep, problem);
+        if is_chosen && self.gravity.iter().copied().eq(felt()) {
+            return;
         }
-        self.swings.clear();
-        self.swings.resize(world.bodies.len(), 0.0);
-        let mut sets = std::mem::take(&mut self.sets);
-        for set in sets.iter_mut().filter(|set| !set.is_decided) {
-            let gap = set.gap(world, &mut self.swings);
-            self.swept_gap = self.swept_gap.max(gap);
-            if config.joint_solver != JointSolver::Auto || gap > config.max_joint_gap_share {
-                self.decide(&set.joints, gap, config, problem);
-                set.is_decided = true;
-            }
-        }
-        self.sets = sets;
-    }
-
-    /// Sweeps all joints, and finds the sets of those that may be solved at once.
-    fn begin_sets(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
+        self.gravity = felt().collect();
         problem.systems = JointSystems::default();
         self.systems.clear();
         self.systems.resize(self.joints.len(), SWEPT);
         self.swept_gap = 0.0;
         self.needs.clear();
         self.needs.resize(self.joints.len(), 0.0);
-        self.sets.clear();
         if config.joint_solver == JointSolver::Sweeps {
             return;
         }
@@ -162,8 +138,15 @@ impl JointRows {
                 members.entry(islands.root(body)).or_default().push(joint as u32);
             }
         }
-        let set = |joints| JointSet::new(joints, world, config, substep, |joint| self.sides(joint));
-        self.sets = members.into_values().map(set).collect();
+        let mut swings = vec![0.0; world.bodies.len()];
+        for joints in members.into_values() {
+            let set = JointSet::new(joints, world, config, substep, |joint| self.sides(joint));
+            let gap = set.gap(world, &mut swings);
+            self.swept_gap = self.swept_gap.max(gap);
+            if config.joint_solver != JointSolver::Auto || gap > config.max_joint_gap_share {
+                self.decide(&set.joints, gap, config, problem);
+            }
+        }
     }
 
     /// Solves the anchors and locks of some joints at once, which sweeps would leave open by `gap`, where that costs little enough; else they
