@@ -5,12 +5,15 @@
 //! number of threads. Each of several worlds beside each other has its own tree and pairs, so that the pairs of a world do not depend on
 //! the other worlds.
 
+mod ascent;
 mod collider;
+mod cone;
 mod cuboids;
 mod detector;
 #[cfg(test)]
 mod distances;
 mod facet;
+mod flush;
 mod guard;
 mod lane_pose;
 mod manifold;

@@ -6,12 +6,11 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::flush::Neighbors;
 use super::manifold::Manifold;
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
-use super::tree::Tree;
-use super::world_contacts::Plane;
 use crate::lanes::{InstructionSet, WIDTH, Wide};
 use crate::panics::blaming;
 
@@ -21,10 +20,7 @@ pub(super) struct Narrow<'a> {
     pub cuboids: &'a [CuboidPlace],
     pub moving: &'a [BodyState],
     pub margins: Margins,
-    pub tree: &'a Tree,
-    pub planes: &'a [Plane],
-    /// Whether the second of two bodies is fixed, and meets the first.
-    pub may_hold: &'a (dyn Fn(u32, u32) -> bool + Sync),
+    pub neighbors: Neighbors<'a>,
 }
 
 /// A pair that is not as it was.
@@ -107,7 +103,9 @@ impl Narrow<'_> {
                         update = None;
                     } else {
                         let bodies = [pair.body_a, pair.body_b];
-                        update = Some(blaming(bodies, || pair.compute(self.sides(pair), prediction, pair_scratch)));
+                        update = Some(blaming(bodies, || {
+                            pair.compute(self.sides(pair), prediction, Some(&self.neighbors), pair_scratch)
+                        }));
                     }
                 }
                 events.push(Event { place: place as u32, changes, update });
@@ -117,7 +115,8 @@ impl Narrow<'_> {
             let event = &mut events[number as usize];
             let pair = &mut pairs[event.place as usize];
             let prediction = tracks[event.place as usize].predicted;
-            event.update = Some(pair.take_over(self.sides(pair), prediction, write, pair_scratch));
+            event.update =
+                Some(pair.take_over(self.sides(pair), prediction, write, Some(&self.neighbors), pair_scratch));
         });
         for (number, before) in far.drain(..) {
             let event = &mut events[number as usize];

@@ -104,11 +104,11 @@ impl Narrow<'_> {
             let one = [CuboidPair { bodies: [0, 1], cuboids: places, prediction, number: 0 }];
             let mut update = None;
             cuboid_contacts(InstructionSet::default(), &then, self.cuboids, &one, cuboids, |_, write| {
-                update = Some(pair.take_over(sides, prediction, write, scratch));
+                update = Some(pair.take_over(sides, prediction, write, Some(&self.neighbors), scratch));
             });
             update.unwrap_or_else(|| pair.part())
         } else {
-            pair.compute(sides, prediction, scratch)
+            pair.compute(sides, prediction, Some(&self.neighbors), scratch)
         };
         let drift = (then[1].center - then[0].center) - (bodies[1].center - bodies[0].center);
         let turns = ways.map(|way| way.turned(met.time));
@@ -129,7 +129,7 @@ impl Narrow<'_> {
             let meet = |other: u32| {
                 let standing = &self.colliders[other as usize];
                 let others = [pair.collider_a, pair.collider_b].contains(&other) || standing.body == c.body;
-                if is_earlier || others || !(self.may_hold)(c.body, standing.body) {
+                if is_earlier || others || !self.neighbors.may_hold(c.body, standing.body) {
                     return;
                 }
                 let way = Way::free(&self.moving[standing.body as usize], 0.0);
@@ -137,16 +137,16 @@ impl Narrow<'_> {
                 let met = impact(standing, own, c.size, Until::Deep, true);
                 is_earlier = met.is_some_and(|met| met.time < time);
             };
-            self.tree.visit(&own.aabb(), meet);
+            self.neighbors.tree.visit(&own.aabb(), meet);
             is_earlier
-                || self.planes.iter().any(|plane| {
+                || self.neighbors.planes.iter().any(|plane| {
                     let standing = &self.colliders[plane.collider as usize];
                     let way = Way::free(&self.moving[standing.body as usize], 0.0);
                     let others = [pair.collider_a, pair.collider_b].contains(&plane.collider);
                     let standing = Swept::new(standing, &self.moving[standing.body as usize], &way);
                     let met = || impact(standing, own, c.size, Until::Deep, true);
                     !others
-                        && (self.may_hold)(c.body, self.colliders[plane.collider as usize].body)
+                        && self.neighbors.may_hold(c.body, self.colliders[plane.collider as usize].body)
                         && met().is_some_and(|met| met.time < time)
                 })
         };

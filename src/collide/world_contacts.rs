@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::collider::Activity;
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins, is_in_range};
+use super::flush::Neighbors;
 use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
@@ -334,14 +335,9 @@ impl WorldContacts {
     }
 
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
-        let may_hold = |body: u32, other: u32| {
-            let meets = || input.groups[body as usize].meets(input.groups[other as usize]);
-            let is_fixed = input.kinds[other as usize] == BodyKind::Fixed;
-            is_fixed && meets() && !input.jointed.contains(&key(body, other))
-        };
         let Self { colliders, cuboids, tree, planes, pairs, changed, .. } = self;
-        let (moving, margins) = (input.moving, input.margins);
-        let narrow = Narrow { colliders, cuboids, moving, margins, tree, planes, may_hold: &may_hold };
+        let neighbors = Neighbors { colliders, tree, planes, input };
+        let narrow = Narrow { colliders, cuboids, moving: input.moving, margins: input.margins, neighbors };
         let updates: Vec<Updated> = pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
         let mut stats = DetectStats { pairs: pairs.len(), ..DetectStats::default() };
         for Updated { pair, computed, reshaped } in updates {
