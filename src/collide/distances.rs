@@ -180,8 +180,7 @@ fn compare_solids(s: f32) {
     let [plain, rims] = compared.map(|all| [all.len(), all.iter().filter(|is_true| !**is_true).count()]);
     println!("{s} times the size: {} of {} without rims wrong, {} of {} with", plain[1], plain[0], rims[1], rims[0]);
     assert!(plain[0] > 100 && rims[0] > 100 && plain[1] == 0);
-    // parry's search stops short on rims: 14 of 300 are wrong, by up to 9 mm of 100.
-    assert!(rims[1] <= 20, "{} of {} with rims wrong", rims[1], rims[0]);
+    assert_eq!(rims[1], 0, "{} of {} with rims wrong", rims[1], rims[0]);
 }
 
 /// The furthest point of a solid in a direction, in its own frame.
@@ -236,8 +235,8 @@ fn sampled_distance(along: impl Fn(DVec3) -> f64, directions: &[DVec3]) -> f64 {
 #[test]
 fn rims_are_as_far_apart_as_dense_sampling_says() {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let spread = (0..20_000).map(|i| {
-        let y = 1.0 - (f64::from(i) + 0.5) / 10_000.0;
+    let spread = (0..10_000).map(|i| {
+        let y = 1.0 - (f64::from(i) + 0.5) / 5_000.0;
         let (s, c) = (golden * f64::from(i)).sin_cos();
         DVec3::new(c, 0.0, s) * (1.0 - y * y).sqrt() + DVec3::Y * y
     });
@@ -251,7 +250,7 @@ fn rims_are_as_far_apart_as_dense_sampling_says() {
         let (direction, rotation) = (random.vector().normalize(), random.rotation());
         let reach = |shape: &SharedShape, d: Vec3| furthest(shape, d.as_dvec3()).dot(d.as_dvec3()) as f32;
         let touching = reach(a, direction) + reach(b, rotation.inverse() * -direction);
-        let pos12 = Pose::from_parts(direction * (touching + 0.01 * random.next()), rotation);
+        let pos12 = Pose::from_parts(direction * (touching + 0.005 * (random.next() - 1.0)), rotation);
         let (at, turn) = (pos12.translation.as_dvec3(), pos12.rotation.as_dquat().normalize());
         let along = |d: DVec3| d.dot(at + turn * furthest(b, turn.inverse() * -d) - furthest(a, d));
         let distance = sampled_distance(along, &directions);
@@ -266,12 +265,11 @@ fn rims_are_as_far_apart_as_dense_sampling_says() {
         }
         Some(error)
     };
-    let errors: Vec<f64> = (0..6000).into_par_iter().filter_map(case).collect();
-    let errors = &errors[..1000];
+    let errors: Vec<f64> = (0..5500).into_par_iter().filter_map(case).collect();
     let wrong = errors.iter().filter(|error| !(**error <= 5e-4)).count();
     let worst = errors.iter().copied().fold(0.0, f64::max);
     println!("{wrong} of {} wrong, the worst by {:.2} mm", errors.len(), 1e3 * worst);
-    assert_eq!(wrong, 0, "the worst is off by {worst} m");
+    assert!(errors.len() >= 1000 && wrong == 0, "{wrong} of {} wrong, the worst by {worst} m", errors.len());
 }
 
 /// The contact of a cone or cylinder that lies on its side reaches from one end to the other.

@@ -19,8 +19,6 @@ const HALF_WIDTH: f32 = 2.0;
 /// Floors of 100 m along x whose upper side is at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Floor {
-    /// One box.
-    Whole,
     Mesh,
     HeightField,
     /// A fixed body for each box.
@@ -40,16 +38,16 @@ impl Floor {
         let brick = || Shape::cuboid(0.5 * PITCH, 0.5, 0.5 * HALF_WIDTH);
         let middle = |k: usize, z: f32| Vec3::new(edge(k) + 0.5 * PITCH, -0.5, z);
         match self {
-            Self::Whole => {
-                let shape = Shape::cuboid(0.5 * length, 0.5, HALF_WIDTH);
-                world.add(Body::fixed().shape(shape).position(0.0, -0.5, 0.0).friction(1.0));
-            }
             Self::Mesh => {
                 let line = |k: usize| [-HALF_WIDTH, 0.0, HALF_WIDTH].map(|z| Vec3::new(edge(k), 0.0, z));
                 let vertices = (0..=EDGES).flat_map(line).collect();
                 let cell = |k: usize, lane: usize| {
                     let [a, b] = [(3 * k + lane) as u32, (3 * (k + 1) + lane) as u32];
-                    if k % 3 == 0 { [[a, a + 1, b], [b, a + 1, b + 1]] } else { [[a, a + 1, b + 1], [a, b + 1, b]] }
+                    if k.is_multiple_of(3) {
+                        [[a, a + 1, b], [b, a + 1, b + 1]]
+                    } else {
+                        [[a, a + 1, b + 1], [a, b + 1, b]]
+                    }
                 };
                 let triangles = (0..EDGES).flat_map(|k| [cell(k, 0), cell(k, 1)].concat()).collect();
                 let mesh = Shape::mesh(vertices, triangles).expect("a mesh");
@@ -121,10 +119,8 @@ fn travelers() -> Vec<Traveler> {
 struct Journey {
     /// Difference from the speed that friction leaves, over the speed at first.
     lost: f32,
-    /// Highest place above the floor (m), and fastest way up or down (m/s), of all after the first tenth of a second.
+    /// The highest place above the floor, after the first tenth of a second (m).
     hop: f32,
-    fastest: f32,
-    aside: f32,
 }
 
 fn travel(floor: Floor, traveler: &Traveler, speed: f32, friction: bool, z: f32) -> Journey {
@@ -147,41 +143,107 @@ fn travel(floor: Floor, traveler: &Traveler, speed: f32, friction: bool, z: f32)
     let dt = 1.0 / 60.0;
     let mean = if deceleration > 0.0 { 0.9 * speed } else { speed };
     let steps = (0.98 * way / mean / dt) as usize;
-    let (mut hop, mut fastest, mut worst_aside) = (0.0_f32, 0.0_f32, 0.0_f32);
+    let mut hop = 0.0_f32;
     for step in 0..steps {
         simulation.step(dt).expect("a step");
         let body = &simulation.world.bodies[index];
         if step > 6 {
             hop = hop.max(body.position.y - traveler.height);
-            fastest = fastest.max(body.linear_velocity.y.abs());
         }
-        worst_aside = worst_aside.max((body.position.z - z).abs());
     }
     let expected = speed - deceleration * dt * steps as f32;
     let left = simulation.world.bodies[index].linear_velocity.x;
-    Journey { lost: (expected - left) / speed, hop, fastest, aside: worst_aside }
+    Journey { lost: (expected - left) / speed, hop }
+}
+
+/// Whether a traveler is a cylinder or capsule that friction keeps rolling.
+fn is_ridge(traveler: &Traveler, friction: bool) -> bool {
+    traveler.rolls && friction && !traveler.shape.is_ball()
+}
+
+/// Travelers on a floor, at speeds from 1 to 20 m/s, beside and above the edge along the way.
+#[track_caller]
+fn assert_edges_cost_nothing(floor: Floor, is_asked: fn(&Traveler, bool) -> bool) {
+    let all = travelers();
+    let mut cases = Vec::new();
+    for (traveler, speed) in all.iter().flat_map(|traveler| [1.0, 5.0, 20.0].map(|speed| (traveler, speed))) {
+        for (friction, z) in [(false, 0.0), (false, 0.37), (true, 0.0), (true, 0.37)] {
+            // A slow journey is long, and single precision rounds the small impulses of friction that go with it by some percent.
+            let is_exact =
+                if friction { traveler.rolls && speed > 1.0 || speed > 10.0 } else { speed > 1.0 || z > 0.0 };
+            cases.extend((is_exact && is_asked(traveler, friction)).then_some((traveler, speed, friction, z)));
+        }
+    }
+    let broken = cases.par_iter().filter_map(|&(traveler, speed, friction, z)| {
+        let journey = travel(floor, traveler, speed, friction, z);
+        let is_kept = journey.lost.abs() <= 1e-3 && journey.hop <= 5e-4 * SIZE;
+        (!is_kept).then(|| format!("{} at {speed} m/s, friction {friction}, z {z}: {journey:?}\n", traveler.name))
+    });
+    let broken: Vec<String> = broken.collect();
+    assert!(broken.is_empty(), "{} of {} on {floor:?}:\n{}", broken.len(), cases.len(), broken.concat());
 }
 
 #[test]
-fn measure() {
-    let floors = [Floor::Whole, Floor::Mesh, Floor::HeightField, Floor::Boxes, Floor::Parts, Floor::Tiles];
-    for floor in floors {
-        let cases: Vec<_> = (0..travelers().len())
-            .flat_map(|i| [1.0, 2.0, 5.0, 10.0, 20.0].map(|v| (i, v)))
-            .flat_map(|(i, v)| [false, true].map(|f| (i, v, f)))
-            .flat_map(|(i, v, f)| [0.0, 0.37].map(|z| (i, v, f, z)))
-            .collect();
-        let results: Vec<_> = cases.par_iter().map(|&(i, v, f, z)| travel(floor, &travelers()[i], v, f, z)).collect();
-        for (&(i, v, f, z), j) in cases.iter().zip(&results) {
-            let bad = if j.lost.abs() > 1e-3 || j.hop > 1e-4 { "  <--" } else { "" };
-            println!(
-                "{floor:?} {} v {v} friction {f} z {z}: lost {:.5} hop {:.3} mm {:.4} m/s aside {:.3} mm{bad}",
-                travelers()[i].name,
-                j.lost,
-                j.hop * 1e3,
-                j.fastest,
-                j.aside * 1e3
-            );
+fn edges_of_a_mesh_cost_nothing() {
+    assert_edges_cost_nothing(Floor::Mesh, |_, _| true);
+}
+
+#[test]
+fn edges_of_a_height_field_cost_nothing() {
+    assert_edges_cost_nothing(Floor::HeightField, |_, _| true);
+}
+
+#[test]
+fn edges_of_boxes_in_a_row_cost_nothing() {
+    assert_edges_cost_nothing(Floor::Boxes, |traveler, friction| !is_ridge(traveler, friction));
+}
+
+#[test]
+fn edges_of_the_parts_of_a_body_cost_nothing() {
+    assert_edges_cost_nothing(Floor::Parts, |traveler, friction| !is_ridge(traveler, friction));
+}
+
+#[test]
+#[ignore = "rolling over boxes turns a cylinder or capsule about the vertical: by 0.5 to 3 m aside in 100 m, and hops of up to 1 mm"]
+fn edges_of_boxes_cost_what_rolls_on_a_side_nothing() {
+    assert_edges_cost_nothing(Floor::Boxes, is_ridge);
+}
+
+#[test]
+fn edges_between_meshes_cost_nothing() {
+    assert_edges_cost_nothing(Floor::Tiles, |_, _| true);
+}
+
+/// What is no edge of a flush face still holds: a wall on the floor, a step, and the end of a row.
+#[test]
+fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
+    let end = |build: fn(&mut World), shape: &Shape, speed: f32| {
+        let mut world = World::new();
+        for x in [-1.5, -0.5, 0.5, 1.5] {
+            world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.5, 2.0)).position(x, -0.5, 0.0).friction(0.0));
         }
+        build(&mut world);
+        let body = Body::dynamic().shape(shape.clone()).position(-1.0, SIZE, 0.0).velocity(speed * Vec3::X, Vec3::ZERO);
+        let body = world.add(body.friction(0.0));
+        let config = SolverConfig::default().without_sleep();
+        let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a simulation");
+        for _ in 0..90 {
+            simulation.step(1.0 / 60.0).expect("a step");
+        }
+        simulation.world.bodies[body].position
+    };
+    let wall = |world: &mut World| {
+        world.add(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 2.0)).position(1.5, 1.0, 0.0));
+    };
+    let step = |world: &mut World| {
+        world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.05, 2.0)).position(1.5, 0.05, 0.0));
+    };
+    for shape in [Shape::cuboid(SIZE, SIZE, SIZE), Shape::ball(SIZE), Shape::cylinder(SIZE, SIZE)] {
+        for (build, most) in [(wall as fn(&mut World), 1.0 - SIZE), (step, 1.0)] {
+            let at = end(build, &shape, 2.0);
+            assert!(at.x < most + 2e-3 && (at.y - SIZE).abs() < 2e-3, "{shape:?} stops at {at}");
+        }
+        let at = end(|_| (), &shape, 4.0);
+        assert!(at.x > 3.0 && at.y < -1.0, "{shape:?} falls off the end: {at}");
     }
 }

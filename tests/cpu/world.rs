@@ -155,9 +155,12 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     }
 }
 
+/// A call that gives a joint something, by its name.
+type Given = (&'static str, fn(Joint) -> Joint);
+
 #[test]
 fn limits_motors_and_springs_may_be_given_before_the_kind_of_a_joint() {
-    let kinds: [(&str, fn(Joint) -> Joint); 7] = [
+    let kinds: [Given; 7] = [
         ("hinge", |joint| joint.hinge(Vec3::Y)),
         ("slider", |joint| joint.slider(Vec3::Y)),
         ("fixed", Joint::fixed),
@@ -166,7 +169,7 @@ fn limits_motors_and_springs_may_be_given_before_the_kind_of_a_joint() {
         ("elastic", |joint| joint.elastic(2.0, 1.0, 0.5)),
         ("generic", |joint| joint.generic([Axis::LOCKED, Axis::FREE, Axis::FREE], [Axis::LOCKED; 3])),
     ];
-    let given: [(&str, fn(Joint) -> Joint); 4] = [
+    let given: [Given; 4] = [
         ("limits", |joint| joint.limited(0.1, 1.5)),
         ("a motor", |joint| joint.motor(0.3, 20.0)),
         ("a spring", |joint| joint.spring(0.5, 2.0, 0.7)),
