@@ -1,5 +1,5 @@
 // factor_joints: one thread factors one system of joints.
-// Reads joint_systems, joints, axes, bodies, masses. Writes joint_nodes and joint_blocks; no other thread writes those of the same system.
+// Reads joint_systems, joints, axes, joint_impulses, bodies, masses. Writes joint_nodes and joint_blocks; no other thread writes those of the same system.
 // Double: factor_system in src/kernels/joint_system.rs.
 
 // The anchors of a joint as three rows, along the axes of the world: one of them.
@@ -10,8 +10,12 @@ fn anchor_motion(anchors: Anchors, along: vec3f) -> AxisMotion {
 // Row i of a node; zero where there is none.
 fn row_motion(pair: ptr<function, Pair>, joint: Joint, rows: u32, i: u32) -> AxisMotion {
     let axis = axis_of_row(rows, i);
-    if axis == 0u { return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0); }
-    return axis_motion(pair, joint, axes[joint.first_axis + axis - 1u]);
+    let k = joint.first_axis + axis - 1u;
+    // Impulses of axes follow those of joints.
+    if axis == 0u || (is_limit_row(rows, i) && joint_impulses[params.joint_count + k].linear.x == 0.0) {
+        return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0);
+    }
+    return axis_motion(pair, joint, axes[k]);
 }
 
 fn begin_node(node: u32) {

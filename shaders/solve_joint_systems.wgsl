@@ -10,13 +10,18 @@ fn right_of_row(first_axis: u32, rows: u32, i: u32, softness: f32) -> f32 {
     return joint_changes[k].linear.x - joint_impulses[k].linear.x * softness;
 }
 
+// The change of the impulse of a limit, which does not pull: it lets go before.
+fn limited_change(before: f32, change: f32) -> f32 { return select(-before, change, before * (before + change) > 0.0); }
+
 // Keeps the correction of row i of a node.
 fn change_row(first_axis: u32, rows: u32, i: u32, change: f32) {
     let axis = axis_of_row(rows, i);
     if axis == 0u { return; }
     let k = first_axis + axis - 1u;
-    joint_changes[k].linear.x = change;
-    joint_impulses[k].linear.x += change;
+    var own = change;
+    if is_limit_row(rows, i) { own = limited_change(joint_impulses[k].linear.x, change); }
+    joint_changes[k].linear.x = own;
+    joint_impulses[k].linear.x += own;
 }
 
 fn right_of_node(node: u32) -> vec3f {

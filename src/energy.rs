@@ -311,12 +311,14 @@ impl Energy {
             let Account { all, released, is_held, is_refused, .. } = account;
             let members = members.iter().map(|(_, body)| *body as usize);
             taken.energy += if over.is_finite() { over } else { all.after };
-            if over.is_finite() && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into()) {
-                let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
+            let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
+            let is_whole = over.is_finite()
+                && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
+                && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
+            if is_whole {
                 if all.lever > 0.0 && over > COARSE * all.after {
-                    effort.refine(members.clone());
+                    effort.refine(members);
                 }
-                brake(world, problem, members, [over, all.after], from_start);
             } else {
                 taken.refused += 1;
                 *is_refused = true;
@@ -435,11 +437,19 @@ struct RigidMotion {
     center: DVec3,
     drift: DVec3,
     spin: DVec3,
-    kinetic: f64,
+    /// The energies of the two (J).
+    drifting: f64,
+    turning: f64,
+}
+
+impl RigidMotion {
+    fn kinetic(&self) -> f64 {
+        self.drifting + self.turning
+    }
 }
 
 /// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Momenta {
     mass: f64,
     center: DVec3,
@@ -475,8 +485,8 @@ impl Momenta {
         let spin = self.inertia.inverse() * self.angular;
         let spin = if spin.is_finite() { spin } else { DVec3::ZERO };
         let drift = self.linear / self.mass;
-        let kinetic = 0.5 * (self.mass * drift.length_squared() + spin.dot(self.inertia * spin));
-        RigidMotion { center: self.center, drift, spin, kinetic }
+        let drifting = 0.5 * self.mass * drift.length_squared();
+        RigidMotion { center: self.center, drift, spin, drifting, turning: 0.5 * spin.dot(self.inertia * spin) }
     }
 }
 
@@ -503,21 +513,45 @@ fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<
 }
 
 /// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies, and no momentum where nothing holds them: their
-/// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`.
+/// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`. Places may be so wrong that
+/// the turn with this angular momentum has more energy than is left: it gives way, if the energy is more by the share [`COARSE`] at most;
+/// beyond that nothing changes, and the result is false.
 fn brake(
     world: &World,
     problem: &mut StepProblem,
     members: impl Iterator<Item = usize> + Clone,
     [over, kinetic]: [f64; 2],
-    from_start: Option<Momenta>,
-) {
+    from_start: Option<&Momenta>,
+) -> bool {
     let now = now(world, problem, members.clone());
-    let [from, to] = match from_start {
-        None => [RigidMotion::default(); 2],
-        Some(Momenta { linear, angular, .. }) => [now.rigid(), Momenta { linear, angular, ..now }.rigid()],
-    };
-    let (inner, left) = (kinetic - from.kinetic, kinetic - over - to.kinetic);
-    let scale = if inner > 0.0 { (left / inner).clamp(0.0, 1.0).sqrt() } else { 1.0 };
+    let [from, mut to] = rigid_motions(&now, from_start);
+    let (inner, left) = (kinetic - from.kinetic(), kinetic - over - to.drifting);
+    if to.turning > left {
+        if to.turning > left + COARSE * kinetic {
+            return false;
+        }
+        let share = (left.max(0.0) / to.turning).sqrt();
+        (to.spin, to.turning) = (to.spin * share, left.max(0.0));
+    }
+    let scale = if inner > 0.0 { ((left - to.turning) / inner).clamp(0.0, 1.0).sqrt() } else { 1.0 };
+    slow_down(world, problem, members, [from, to], scale);
+    true
+}
+
+/// The rigid motion of some bodies now, and the one with the momentum from the begin of the step; at rest where something holds them.
+fn rigid_motions(now: &Momenta, from_start: Option<&Momenta>) -> [RigidMotion; 2] {
+    let of_start = |&Momenta { linear, angular, .. }: &Momenta| Momenta { linear, angular, ..*now }.rigid();
+    from_start.map_or([RigidMotion::default(); 2], |start| [now.rigid(), of_start(start)])
+}
+
+/// Scales the motion of some bodies against one rigid motion, and gives them another instead of that.
+fn slow_down(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize>,
+    [from, to]: [RigidMotion; 2],
+    scale: f64,
+) {
     for i in members {
         let place = world.bodies[i].center_of_mass().as_dvec3() + Vec3::from(problem.bodies[i].dp).as_dvec3();
         let row = &mut problem.bodies[i];
@@ -551,7 +585,7 @@ fn stand_still(
         }
     }
     if !is_kept {
-        let kinetic = f64::MAX;
-        brake(world, problem, members, [kinetic; 2], (!is_held).then_some(after));
+        let motions = rigid_motions(&now(world, problem, members.clone()), (!is_held).then_some(&after));
+        slow_down(world, problem, members, motions, 0.0);
     }
 }

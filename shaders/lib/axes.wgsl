@@ -78,19 +78,28 @@ const LEAST_LEFT: f32 = -5e17;
 // Whether a row is a lock: neither a limit nor a drive.
 fn is_lock(axis: Axis) -> bool { return LEAST_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
 
+// Where the nearer of the two limits of an axis is.
+struct NearerLimit { is_limit: bool, is_upper: bool, gap: f32, apart: bool }
+
+fn nearer_limit(axis: Axis, motion: AxisMotion) -> NearerLimit {
+    let is_limit = axis.left > LEAST_LEFT;
+    let place = axis.gap + motion.moved;
+    let left = axis.left - motion.moved;
+    let is_upper = is_limit && place > left;
+    let gap = select(place, left, is_upper);
+    return NearerLimit(is_limit, is_upper, gap, is_limit && gap > 0.0);
+}
+
 // Sweeps one axis; with `but_locks` only if it is no lock.
 fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
     let mass = reciprocal(axis_inverse_mass(pair, motion));
 
     // Of two limits the nearer one acts: it pushes the body inwards.
-    let is_limit = axis.left > LEAST_LEFT;
-    let place = axis.gap + motion.moved;
-    let left = axis.left - motion.moved;
-    let is_upper = is_limit && place > left;
-    let sign = select(1.0, -1.0, is_upper);
-    let gap = select(place, left, is_upper);
-    let apart = is_limit && gap > 0.0;
+    let limit = nearer_limit(axis, motion);
+    let gap = limit.gap;
+    let apart = limit.apart;
+    let sign = select(1.0, -1.0, limit.is_upper);
 
     // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
     let is_drive = axis.mass_scale + axis.impulse_scale > 0.0;
@@ -110,7 +119,7 @@ fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: J
     let before = joint_impulses[k].linear.x * sign;
     let wanted = (axis_speed(rules, pair, motion) - axis.speed) * sign;
     let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
-    let least = select(-axis.max_impulse, 0.0, is_limit);
+    let least = select(-axis.max_impulse, 0.0, limit.is_limit);
     var sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
     if but_locks { sum = select(sum, before, is_lock(axis)); }
     let change = (sum - before) * sign;
@@ -126,16 +135,19 @@ fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: J
     }
 }
 
-// The velocity that a lock lacks; none of an axis that is swept.
+// The velocity that a lock lacks, or a limit that holds as one; none of a drive.
 fn measure_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
-    var wanted = axis_speed(rules, pair, motion);
-    if rules.biased {
-        wanted = wanted + (axis.gap + motion.moved) * pass_row.joint.bias_rate;
-    }
-    wanted = select(0.0, wanted, is_lock(axis));
-    note_correction(rules.measured, wanted, 1.0);
-    joint_changes[k].linear.x = wanted * -params.relaxation;
+    let limit = nearer_limit(axis, motion);
+    var rate = 0.0;
+    if rules.biased { rate = pass_row.joint.bias_rate; }
+    // Up to its limit the body goes within this substep.
+    let pull = limit.gap * select(rate, pass_row.inverse_substep, limit.apart);
+    let speed = axis_speed(rules, pair, motion);
+    let wanted = select(speed + pull, speed - pull, limit.is_upper);
+    let of_lock = select(0.0, wanted, is_lock(axis));
+    note_correction(rules.measured, of_lock, 1.0);
+    joint_changes[k].linear.x = select(of_lock, wanted, limit.is_limit) * -params.relaxation;
 }
 
 fn measure_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {

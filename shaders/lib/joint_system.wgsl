@@ -21,7 +21,10 @@ fn right_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u 
 const ANCHORS: u32 = 0xffffffffu;
 
 // One more than the number of the axis that is row i of a node, among those of the joint; 0 for no row.
-fn axis_of_row(rows: u32, i: u32) -> u32 { return (rows >> (8u * i)) & 0xffu; }
+fn axis_of_row(rows: u32, i: u32) -> u32 { return (rows >> (8u * i)) & 0x7fu; }
+
+// Whether row i of a node is a limit: it holds while it bears an impulse, and is not there otherwise.
+fn is_limit_row(rows: u32, i: u32) -> bool { return ((rows >> (8u * i)) & 0x80u) != 0u; }
 
 fn block_times(m: mat3x3f, u: vec3f) -> vec3f { return m[0] * u.x + m[1] * u.y + m[2] * u.z; }
 

@@ -116,6 +116,29 @@ pub fn is_lock<L: Lane>(axis: &Axis<L>) -> L::Mask {
     L::and(L::constant(LEAST_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
 }
 
+/// Where the nearer of the two limits of an axis is.
+#[derive(Clone, Copy)]
+pub(super) struct NearerLimit<L: Lane> {
+    /// Whether the row is a limit, and whether the upper one is nearer.
+    pub is_limit: L::Mask,
+    pub is_upper: L::Mask,
+    /// The way that is left to it; below zero beyond it. Of a lock, its place.
+    pub gap: L,
+    /// Whether the limit is not reached.
+    pub apart: L::Mask,
+}
+
+impl<L: Lane> NearerLimit<L> {
+    #[inline(always)]
+    pub fn of(axis: &Axis<L>, motion: &AxisMotion<L>) -> Self {
+        let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
+        let (place, left) = (axis.gap + motion.moved, axis.left - motion.moved);
+        let is_upper = L::and(is_limit, place.gt(left));
+        let gap = L::select(place, left, is_upper);
+        Self { is_limit, is_upper, gap, apart: L::and(is_limit, gap.gt(L::constant(0.0))) }
+    }
+}
+
 /// Sweeps one axis; with `but_locks` only if it is no lock. Kernels `solve_joints` and `solve_axes`.
 #[inline(always)]
 pub fn solve_axis<L: Lane>(
@@ -132,13 +155,8 @@ pub fn solve_axis<L: Lane>(
     let mass = reciprocal(axis_inverse_mass(pair, &motion));
 
     // Of two limits the nearer one acts: it pushes the body inwards.
-    let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
-    let place = axis.gap + motion.moved;
-    let left = axis.left - motion.moved;
-    let is_upper = L::and(is_limit, place.gt(left));
+    let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
     let sign = L::select(one, L::constant(-1.0), is_upper);
-    let gap = L::select(place, left, is_upper);
-    let apart = L::and(is_limit, gap.gt(zero));
 
     // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
     let is_drive = (axis.mass_scale + axis.impulse_scale).gt(zero);

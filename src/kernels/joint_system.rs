@@ -2,14 +2,15 @@
 //! `shaders/lib/joint_system.wgsl` and of the kernels `factor_joints`, `measure_joints`, `solve_joint_systems` and
 //! `apply_joint_changes`.
 //!
-//! A node of a system is up to three rows of one joint: its anchors, its locks to shift along or its locks to turn about. Limits and drives
-//! are swept (`solve_axes`). Arms and axes turn with their bodies, and the blocks of S with them: S is factored anew where bodies moved. The
+//! A node of a system is up to three rows of one joint: its anchors, its locks and limits to shift along, or those to turn about. Drives are
+//! swept (`solve_axes`), and so are limits until they bear an impulse: from then on they hold as locks do. A limit that would pull is left to
+//! sweeps again: its row goes, and the system is factored without it. Arms and axes turn with their bodies, and the blocks of S with them: S is factored anew where bodies moved. The
 //! order of elimination, the blocks that it fills and the products that each block is made of are lists of the problem (`JointSystems`).
 
 use std::ops::Range;
 
 use super::Rules;
-use super::axis::{AxisMotion, axis_motion, axis_speed, is_lock, select3};
+use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, select3};
 use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Mass, Pair, StepParams, Sym3};
@@ -244,6 +245,14 @@ impl<L: Lane> JointNode<L> {
         }
     }
 
+    /// Takes a row out.
+    #[inline(always)]
+    fn remove(&mut self, i: usize) {
+        let zero = L::default();
+        self.along.0.iter_mut().chain(self.about.iter_mut().flat_map(|block| &mut block.0)).for_each(|c| c[i] = zero);
+        self.turns.iter_mut().for_each(|turns| turns.0[i] = [zero; 4]);
+    }
+
     /// The block of S in its column and the row of another node, which may be the same. `shared` has bit 2 i + j where side i of this
     /// joint is side j of the other.
     #[inline(always)]
@@ -314,19 +323,17 @@ impl<S: Scalar> JointFactors<S> {
     }
 }
 
-/// Factors one system; `load` gives a joint with its bodies, `axis` one of its axes. Kernel `factor_joints`.
+/// Factors one system; `load` gives a joint with its bodies, `axis` one of its axes, with the impulse that it bears. Kernel `factor_joints`.
 #[inline(always)]
 pub fn factor_system<S: Scalar>(
     systems: &JointSystems,
     system: usize,
     load: impl Fn(usize) -> (Joint<S>, Pair<S>),
-    axis: impl Fn(usize, usize) -> Axis<S>,
-    factors: SystemFactors<S>,
+    axis: impl Fn(usize, usize) -> (Axis<S>, S),
+    mut factors: SystemFactors<S>,
 ) {
-    let SystemFactors { nodes, lower, upper } = factors;
-    let [own, blocks] = places(systems, system);
-    let (first_node, first_block) = (own.start, blocks.start);
-    for (node, row) in nodes.iter_mut().zip(&systems.nodes[own.clone()]) {
+    let [own, _] = places(systems, system);
+    for (node, row) in factors.nodes.iter_mut().zip(&systems.nodes[own]) {
         let joint = row.joint as usize;
         let (loaded, pair) = load(joint);
         let mut motions = [AxisMotion::default(); 3];
@@ -334,11 +341,23 @@ pub fn factor_system<S: Scalar>(
             motions = anchor_motions(&pair, &loaded);
         } else {
             for (i, k) in row.axes() {
-                motions[i] = axis_motion(&pair, &loaded, &axis(joint, k));
+                let (axis, impulse) = axis(joint, k);
+                if !row.is_limit(i) || impulse != S::default() {
+                    motions[i] = axis_motion(&pair, &loaded, &axis);
+                }
             }
         }
         *node = JointNode::of(&pair, &motions);
     }
+    factor_blocks(systems, system, &mut factors);
+}
+
+/// Factors one system whose nodes are known.
+#[inline(always)]
+fn factor_blocks<S: Scalar>(systems: &JointSystems, system: usize, factors: &mut SystemFactors<S>) {
+    let SystemFactors { nodes, lower, upper } = factors;
+    let [own, blocks] = places(systems, system);
+    let (first_node, first_block) = (own.start, blocks.start);
     for node in own {
         let column = systems.blocks_of(node);
         let pivot = column.start - first_block;
@@ -381,7 +400,7 @@ pub fn measure_joint<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut P
     wanted * -params.relaxation
 }
 
-/// The velocity that a lock lacks; none of an axis that is swept. Kernel `measure_joints`.
+/// The velocity that a lock lacks, or a limit that holds as one; none of a drive. Kernel `measure_joints`.
 #[inline(always)]
 pub fn measure_axis<L: Lane>(
     rules: Rules,
@@ -391,13 +410,16 @@ pub fn measure_axis<L: Lane>(
     axis: &Axis<L>,
 ) -> L {
     let motion = axis_motion(pair, joint, axis);
-    let mut wanted = axis_speed(rules, pair, &motion);
-    if rules.biased {
-        wanted = wanted + (axis.gap + motion.moved) * params.joint.bias_rate;
-    }
-    wanted = L::select(L::constant(0.0), wanted, is_lock(axis));
-    note_lacking(rules, params, pair, larger(wanted, -wanted));
-    wanted * -params.relaxation
+    let zero = L::constant(0.0);
+    let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
+    let rate = if rules.biased { params.joint.bias_rate } else { zero };
+    // Up to its limit the body goes within this substep.
+    let pull = gap * L::select(rate, params.inverse_substep, apart);
+    let speed = axis_speed(rules, pair, &motion);
+    let wanted = L::select(speed + pull, speed - pull, is_upper);
+    let of_lock = L::select(zero, wanted, is_lock(axis));
+    note_lacking(rules, params, pair, larger(of_lock, -of_lock));
+    L::select(of_lock, wanted, is_limit) * -params.relaxation
 }
 
 /// Notes that a velocity above the tolerance is lacking.
@@ -414,7 +436,66 @@ pub fn solve_system<S: Scalar>(
     problem: &StepProblem,
     system: usize,
     joints: &mut impl JointChanges<S>,
-    factors: SystemFactors<S>,
+    mut factors: SystemFactors<S>,
+) {
+    let systems = &problem.systems;
+    let [own, _] = places(systems, system);
+    // Sweeps may have let go of limits since the system was factored.
+    factors.nodes.iter_mut().for_each(|node| node.right = Vec3::default());
+    let mut changed = let_go(problem, system, joints, &mut factors);
+    loop {
+        if changed {
+            factor_blocks(systems, system, &mut factors);
+        }
+        find_changes(problem, system, joints, &mut factors);
+        changed = let_go(problem, system, joints, &mut factors);
+        if !changed {
+            break;
+        }
+    }
+    for (node, row) in factors.nodes.iter().zip(&systems.nodes[own]) {
+        let Vec3 { x, y, z } = node.right;
+        for (number, change) in problem.numbers_of(row).into_iter().zip([x, y, z]) {
+            if let Some(at) = number {
+                joints.change(at, change);
+            }
+        }
+    }
+}
+
+/// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
+#[inline(always)]
+fn let_go<S: Scalar>(
+    problem: &StepProblem,
+    system: usize,
+    joints: &mut impl JointChanges<S>,
+    factors: &mut SystemFactors<S>,
+) -> bool {
+    let systems = &problem.systems;
+    let [own, blocks] = places(systems, system);
+    let mut any = false;
+    for (node, row) in factors.nodes.iter_mut().zip(&systems.nodes[own]) {
+        let pivot = factors.lower[row.first_block as usize - blocks.start].diagonal();
+        let [held, changes] = [pivot, node.right].map(|Vec3 { x, y, z }| [x, y, z]);
+        for (i, number) in problem.numbers_of(row).into_iter().enumerate() {
+            let Some(at) = number.filter(|_| row.is_limit(i) && held[i] > S::default()) else { continue };
+            let before = joints.impulse(at);
+            if !(before * (before + changes[i]) > S::default()) {
+                node.remove(i);
+                any = true;
+            }
+        }
+    }
+    any
+}
+
+/// Finds the changes of the impulses of one system, the right sides of its nodes.
+#[inline(always)]
+fn find_changes<S: Scalar>(
+    problem: &StepProblem,
+    system: usize,
+    joints: &mut impl JointChanges<S>,
+    factors: &mut SystemFactors<S>,
 ) {
     let systems = &problem.systems;
     let SystemFactors { nodes, lower, .. } = factors;
@@ -444,14 +525,7 @@ pub fn solve_system<S: Scalar>(
             let below = nodes[systems.blocks[at].node as usize - first_node].right;
             change -= lower[at - first_block].transpose_times(below);
         }
-        let change = pivot.backward(change);
-        nodes[node - first_node].right = change;
-        for (number, change) in problem.numbers_of(&systems.nodes[node]).into_iter().zip([change.x, change.y, change.z])
-        {
-            if let Some(at) = number {
-                joints.change(at, change);
-            }
-        }
+        nodes[node - first_node].right = pivot.backward(change);
     }
 }
 

@@ -40,22 +40,23 @@ pub fn drive_count(joint: &Joint) -> usize {
     kinds(joint).filter(|(_, is_drive)| *is_drive).count()
 }
 
-/// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks to turn about, which give a
-/// lever its stiffness, before those to shift along.
+/// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks and limits to turn about, which
+/// give a lever its stiffness, before those to shift along. A point that is locked by equal limits and driven is swept.
 pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
-    let is_lock = |axis: &Axis| match axis.bounds {
-        Bounds::Locked => true,
-        Bounds::Between { min, max } => min >= max && axis.drive == Drive::None,
-        Bounds::Free => false,
+    let is_limit = |axis: &Axis| match axis.bounds {
+        Bounds::Locked => Some(false),
+        Bounds::Between { min, max } if min < max => Some(true),
+        Bounds::Between { .. } => Some(false).filter(|_| axis.drive == Drive::None),
+        Bounds::Free => None,
     };
-    let locks = |are_angles: bool| {
+    let bounds = |are_angles: bool| {
         let rows = (0..).zip(kinds(joint)).filter(move |(_, (i, is_drive))| !is_drive && (*i >= 3) == are_angles);
         let axis = |i: usize| axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        let own: Vec<u32> = rows.filter(|(_, (i, _))| is_lock(axis(*i))).map(|(row, _)| row).collect();
+        let own: Vec<(u32, bool)> = rows.filter_map(|(row, (i, _))| Some((row, is_limit(axis(i))?))).collect();
         NodeRow::rows_of(&own)
     };
-    let shifts = if joint.holds_anchors() { NodeRow::ANCHORS } else { locks(false) };
-    [locks(true), shifts].into_iter().filter(|rows| *rows > 0)
+    let shifts = if joint.holds_anchors() { NodeRow::ANCHORS } else { bounds(false) };
+    [bounds(true), shifts].into_iter().filter(|rows| *rows > 0)
 }
 
 /// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.

@@ -5,7 +5,7 @@ use super::{JointRow, JointSystems, NodeRow, StepProblem};
 use crate::error::Result;
 
 impl StepProblem {
-    /// The anchors and locks of the joints of the direct colors of a block are the rows of its systems, each once; the blocks and products of a
+    /// The anchors, locks and limits of the joints of the direct colors of a block are the rows of its systems, each once; the blocks and products of a
     /// node are those of its system, and products come before the block that they are subtracted from.
     pub(super) fn check_systems(&self) -> Result<()> {
         let JointSystems { begins, softness, nodes, blocks, terms } = &self.systems;
@@ -57,7 +57,7 @@ impl StepProblem {
             solved.sort_unstable();
             if solved != wanted {
                 return refuse(format_args!(
-                    "blocks[{i}]: the rows of its systems are not the anchors and locks of its direct colors"
+                    "blocks[{i}]: the rows of its systems are not the anchors, locks and limits of its direct colors"
                 ));
             }
         }
@@ -72,18 +72,22 @@ impl StepProblem {
         Ok(())
     }
 
-    /// The rows of a joint that systems solve: its anchors, as none, and its locks by their numbers.
-    fn rows_to_solve(&self, joint: u32) -> impl Iterator<Item = (u32, Option<usize>)> {
+    /// The rows of a joint that systems solve: its anchors, as none, and its locks and limits by their numbers, with whether each is a limit.
+    fn rows_to_solve(&self, joint: u32) -> impl Iterator<Item = Solved> {
         let JointRow { first_axis, axis_count, is_loose, .. } = self.joints[joint as usize];
         let axes = &self.axes[first_axis as usize..(first_axis + axis_count) as usize];
-        let locks = axes.iter().enumerate().filter(|(_, axis)| axis.is_lock()).map(|(k, _)| Some(k));
-        Some(None).filter(|_| is_loose == 0.0).into_iter().chain(locks).map(move |row| (joint, row))
+        let bounds = axes.iter().enumerate().filter(|(_, axis)| axis.is_lock() || axis.is_limit());
+        let bounds = bounds.map(|(k, axis)| Some((k, axis.is_limit())));
+        Some(None).filter(|_| is_loose == 0.0).into_iter().chain(bounds).map(move |row| (joint, row))
     }
 }
 
+/// A row of a joint that systems solve.
+type Solved = (u32, Option<(usize, bool)>);
+
 /// The rows of a node, likewise.
-fn rows_of_node(node: &NodeRow) -> impl Iterator<Item = (u32, Option<usize>)> + use<> {
-    let joint = node.joint;
+fn rows_of_node(node: &NodeRow) -> impl Iterator<Item = Solved> + use<> {
+    let node = *node;
     let anchors = Some(None).filter(|_| node.is_of_anchors());
-    anchors.into_iter().chain(node.axes().map(|(_, k)| Some(k))).map(move |row| (joint, row))
+    anchors.into_iter().chain(node.axes().map(move |(i, k)| Some((k, node.is_limit(i))))).map(move |row| (node.joint, row))
 }

@@ -32,7 +32,8 @@ pub struct NodeRow {
     pub first_block: u32,
     /// One past the last block of its column.
     pub end_block: u32,
-    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint; 0 for no row.
+    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint, with [`NodeRow::LIMIT`]; 0 for
+    /// no row.
     pub rows: u32,
 }
 
@@ -51,9 +52,18 @@ impl NodeRow {
     /// The rows of a node that holds the anchors together.
     pub const ANCHORS: u32 = u32::MAX;
 
-    /// The rows of a node of up to three axes.
-    pub fn rows_of(axes: &[u32]) -> u32 {
-        axes.iter().zip(0..3).map(|(axis, i)| (axis + 1) << (8 * i)).sum()
+    /// The bit of a row that is a limit: it holds while it bears an impulse, and is not there otherwise.
+    const LIMIT: u32 = 0x80;
+
+    /// The rows of a node of up to three axes, each with whether it is a limit.
+    pub fn rows_of(axes: &[(u32, bool)]) -> u32 {
+        let row = |&(axis, is_limit): &(u32, bool)| axis + 1 + if is_limit { Self::LIMIT } else { 0 };
+        axes.iter().zip(0..3).map(|(axis, i)| row(axis) << (8 * i)).sum()
+    }
+
+    /// Whether row i is a limit.
+    pub fn is_limit(&self, i: usize) -> bool {
+        !self.is_of_anchors() && self.rows >> (8 * i) & Self::LIMIT != 0
     }
 
     /// Whether its rows are those of the anchors.
@@ -64,7 +74,7 @@ impl NodeRow {
     /// Its rows that are axes, each with the number of the axis among those of the joint.
     pub fn axes(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let rows = if self.is_of_anchors() { 0 } else { self.rows };
-        (0..3).filter_map(move |i| Some((i, (rows >> (8 * i) & 0xff).checked_sub(1)? as usize)))
+        (0..3).filter_map(move |i| Some((i, (rows >> (8 * i) & (Self::LIMIT - 1)).checked_sub(1)? as usize)))
     }
 }
 

@@ -68,8 +68,8 @@ pub struct Verdict {
     pub drift: Option<[f64; 2]>,
     /// The most substeps of a body.
     pub substeps: u32,
-    /// The energy of each step, where asked for: kinetic, potential, of springs, work.
-    pub trace: Vec<[f64; 4]>,
+    /// The energy of each step, where asked for: kinetic, potential, of springs, work, taken by the law; then the steps that it refused.
+    pub trace: Vec<[f64; 6]>,
 }
 
 impl Verdict {
@@ -345,10 +345,13 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     let (mut momenta, mut spins) = (start.momenta, start.spins);
     let (mut drift, mut rounding) = ([0.0_f64; 2], Rounding::default());
     for step in 0..case.steps() {
-        if let Err(e) = simulation.step(case.scene.dt) {
-            verdict.lost = Some(e.to_string());
-            break;
-        }
+        let stats = match simulation.step(case.scene.dt) {
+            Ok(stats) => stats,
+            Err(e) => {
+                verdict.lost = Some(e.to_string());
+                break;
+            }
+        };
         let world = &simulation.world;
         let (now, depth) = overlaps(&simulation);
         if step == 0 {
@@ -409,7 +412,15 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         }
         verdict.substeps = verdict.substeps.max(substeps);
         if traces {
-            verdict.trace.push([motion(&after), if alone { 0.0 } else { after.potential }, springs.energy, work]);
+            let potential = if alone { 0.0 } else { after.potential };
+            verdict.trace.push([
+                motion(&after),
+                potential,
+                springs.energy,
+                work,
+                stats.energy_taken,
+                stats.refused as f64,
+            ]);
         }
         (before, springs_before) = (after, springs);
     }

@@ -120,8 +120,10 @@ impl SystemWork<'_> {
     }
 
     #[inline(always)]
-    fn axis(&self, joint: usize, k: usize) -> Axis<f32> {
-        Axis::load(&self.problem.axes[self.problem.joints[joint].first_axis as usize + k])
+    fn axis(&self, joint: usize, k: usize) -> (Axis<f32>, f32) {
+        let k = self.problem.joints[joint].first_axis as usize + k;
+        let at = ImpulseNumber { row: self.problem.joints.len() + k, component: 0 };
+        (Axis::load(&self.problem.axes[k]), Changes(self).impulse(at))
     }
 }
 

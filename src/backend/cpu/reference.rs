@@ -222,7 +222,10 @@ impl<S: Scalar> Reference<S> {
             let own = factors.of(systems, system);
             if pass.kernel == Kernel::FactorJoints {
                 let load = |joint: usize| (self.rows.joints[joint], self.load_pair(problem.joints[joint].bodies()));
-                let axis = |joint: usize, k: usize| self.rows.axes[problem.joints[joint].first_axis as usize + k];
+                let axis = |joint: usize, k: usize| {
+                    let k = problem.joints[joint].first_axis as usize + k;
+                    (self.rows.axes[k], self.rows.joint_impulses[problem.joints.len() + k].x)
+                };
                 factor_system(systems, system, load, axis, own);
             } else {
                 let impulses = &mut self.rows.joint_impulses;
