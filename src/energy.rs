@@ -67,7 +67,7 @@ struct Entry {
     after: f64,
     /// Work of gravity, forces and drives.
     work: f64,
-    /// What was kept, and what the springs of joints, and of contacts of bodies on joints, hold now.
+    /// What was kept, and what the springs of joints, and of contacts of bodies on joints, hold now, with the energy of lent inertia.
     kept: f64,
     springs: f64,
     /// The most that may be regained of what is lost.
@@ -212,17 +212,17 @@ impl Energy {
         taken
     }
 
-    /// Adds the energy of the inertia that joints lend to bodies in this step.
+    /// Adds the energy of the inertia that joints lent to bodies in this step to that of their springs: it counts only as far as motion lost it, since
+    /// the inertia is gone in the next step.
     fn add_lent_inertia(&mut self, world: &World, problem: &StepProblem) {
         for row in &problem.turning {
             let i = row.body as usize;
             let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
             let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
             let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
-            let energy = |spin: Vec3| 0.5 * spin.as_dvec3().dot(lent * spin.as_dvec3());
-            entry.before += energy(body.angular_velocity);
             // The inertia turns with the body.
-            entry.after += energy(Quat::from_array(problem.bodies[i].dq).inverse() * Vec3::from(problem.bodies[i].w));
+            let spin = (Quat::from_array(problem.bodies[i].dq).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
+            entry.springs += 0.5 * spin.dot(lent * spin);
         }
     }
 

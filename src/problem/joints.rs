@@ -143,9 +143,7 @@ impl JointRows {
             let set = JointSet::new(joints, world, config, substep, |joint| self.sides(joint));
             let gap = set.gap(world, &mut swings);
             self.swept_gap = self.swept_gap.max(gap);
-            if config.joint_solver != JointSolver::Auto || gap > config.max_joint_gap_share {
-                self.decide(&set.joints, gap, config, problem);
-            }
+            self.decide(&set.joints, gap, config, problem);
         }
     }
 
@@ -162,7 +160,8 @@ impl JointRows {
         if problem.systems.add(&nodes, |joint| self.sides(joint), most_terms) {
             nodes.iter().for_each(|(joint, _)| self.systems[*joint as usize] = system);
         } else {
-            let need = SWING * gap / config.max_joint_gap_share;
+            let share = gap / config.max_joint_gap_share;
+            let need = if share > 1.0 { SWING * share } else { 0.0 };
             joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
         }
     }
