@@ -65,37 +65,80 @@ struct Entry {
     /// Kinetic energy when the step began, and at its end.
     before: f64,
     after: f64,
-    /// Work of gravity, forces and drives.
+    /// Work of drives and torques.
     work: f64,
-    /// What was kept, and what the springs of joints, and of contacts of bodies on joints, hold now, with the energy of lent inertia.
+    /// Work of gravity and forces, by how far bodies went and by their mean velocities: the larger counts, of a whole island. In one whose
+    /// bodies fly about, the work on each by itself would not add up to that on all.
+    pushed: [f64; 2],
+    /// What may be regained of what was lost before, and the most of that from this step on.
+    reserve: f64,
+    slack: f64,
+    /// What was kept by the springs of joints, and of contacts of bodies on joints, and what they hold now, with the energy of lent inertia.
     kept: f64,
     springs: f64,
-    /// The most that may be regained of what is lost.
-    slack: f64,
     /// What is as slow as this counts as rest.
     rest: f64,
     /// What the rounding of velocities may add in this step.
     rounding: f64,
     /// The longest lever of a joint (m).
     lever: f64,
+    common: Common,
+}
+
+/// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times both measures of their ways (kg m).
+#[derive(Clone, Copy, Debug, Default)]
+struct Common {
+    mass: f64,
+    momenta: [DVec3; 2],
+    force: DVec3,
+    moved: [DVec3; 2],
+}
+
+impl Common {
+    fn add(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.force += other.force;
+        for i in 0..2 {
+            self.momenta[i] += other.momenta[i];
+            self.moved[i] += other.moved[i];
+        }
+    }
 }
 
 impl Entry {
     /// What motion leaves; below zero where constraints made energy.
     fn left(&self) -> f64 {
-        self.before + self.work + self.kept - self.after
+        self.given() - self.after
+    }
+
+    /// What motion had, and got.
+    fn given(&self) -> f64 {
+        self.before + self.work + self.pushed[0].max(self.pushed[1]) + self.reserve + self.kept
     }
 
     fn add(&mut self, other: &Self) {
         self.before += other.before;
         self.after += other.after;
         self.work += other.work;
+        self.pushed = [0, 1].map(|i| self.pushed[i] + other.pushed[i]);
+        self.reserve += other.reserve;
         self.kept += other.kept;
         self.springs += other.springs;
         self.slack += other.slack;
         self.rest += other.rest;
         self.rounding += other.rounding;
         self.lever = self.lever.max(other.lever);
+        self.common.add(&other.common);
+    }
+
+    /// Leaves out the motion that all have in common: nothing within changes it.
+    fn leave_out_common(&mut self) {
+        let Common { mass, momenta, force, moved } = self.common;
+        let [before, after] = momenta.map(|momentum| 0.5 * momentum.length_squared() / mass);
+        (self.before, self.after) = (self.before - before, self.after - after);
+        self.pushed = [0, 1].map(|i| self.pushed[i] - force.dot(moved[i]) / mass);
+        self.slack = REGAINED * self.after.max(0.0) + self.rest;
+        self.reserve = self.reserve.min(self.slack);
     }
 }
 
@@ -179,7 +222,8 @@ impl Energy {
         self.kept.resize(world.bodies.len(), Kept::default());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
-            kept: self.kept[i].sum(),
+            reserve: self.kept[i].reserve.into(),
+            kept: self.kept[i].springs.into(),
             ..entry(body, i, problem, dt.into(), substep(i))
         };
         world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
@@ -207,7 +251,7 @@ impl Energy {
             let of_island = Kept::of(all, all.left() + released);
             let share = |of: f64, sum: f64| if sum > 0.0 { (of / sum) as f32 } else { 0.0 };
             kept.springs = of_island.springs * share(entry.springs, all.springs);
-            kept.reserve = of_island.reserve * share(entry.slack, all.slack);
+            kept.reserve = of_island.reserve * share(entry.common.mass, all.common.mass);
         }
         taken
     }
@@ -253,6 +297,8 @@ impl Energy {
         for (&root, entry) in self.islands.roots().iter().zip(&self.entries) {
             self.accounts[root as usize].all.add(entry);
         }
+        let free = self.accounts.iter_mut().filter(|account| !account.is_held && account.all.common.mass > 0.0);
+        free.for_each(|account| account.all.leave_out_common());
     }
 
     /// Adds what the springs of contacts hold now that touch bodies on joints. Joints and contacts may push against each other without an end, so
@@ -328,7 +374,7 @@ impl Energy {
             }
             // Nothing is left.
             *released = 0.0;
-            all.after = all.before + all.work + all.kept;
+            all.after = all.given();
         }
         if taken.refused > 0 {
             self.forget_impulses(problem);
@@ -355,10 +401,6 @@ impl Energy {
 }
 
 impl Kept {
-    fn sum(&self) -> f64 {
-        f64::from(self.reserve) + f64::from(self.springs)
-    }
-
     /// What is kept where so much is left.
     fn of(entry: &Entry, left: f64) -> Self {
         let springs = left.min(entry.springs).max(0.0);
@@ -398,8 +440,10 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let [v_0, w_0] = [body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
     let acceleration = Vec3::from(mass.acceleration).as_dvec3();
     let way = Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep);
-    let pushed = m * acceleration.dot(way).max(acceleration.dot((v + v_0) * (0.5 * dt)));
-    let turned = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
+    let moved = [way, (v + v_0) * (0.5 * dt)].map(|way| m * way);
+    let pushed = moved.map(|moved| acceleration.dot(moved));
+    let common = Common { mass: m, momenta: [m * v_0, m * v], force: m * acceleration, moved };
+    let work = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
     let turn = product(Quat::from_array(row.dq), body.rotation);
     let spin = product(turn, body.mass.principal_frame).as_dquat().inverse() * w;
     let after = 0.5 * (m * v.length_squared() + (body.mass.principal_inertia.as_dvec3() * spin * spin).element_sum());
@@ -409,7 +453,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let slack = REGAINED * after + rest;
     // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less.
     let rounding = after * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
-    Entry { before: body.kinetic_energy(), after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
+    Entry { before: body.kinetic_energy(), after, work, pushed, slack, rest, rounding, common, ..Entry::default() }
 }
 
 /// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
@@ -437,15 +481,8 @@ struct RigidMotion {
     center: DVec3,
     drift: DVec3,
     spin: DVec3,
-    /// The energies of the two (J).
-    drifting: f64,
+    /// The energy of the spin (J).
     turning: f64,
-}
-
-impl RigidMotion {
-    fn kinetic(&self) -> f64 {
-        self.drifting + self.turning
-    }
 }
 
 /// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
@@ -485,8 +522,7 @@ impl Momenta {
         let spin = self.inertia.inverse() * self.angular;
         let spin = if spin.is_finite() { spin } else { DVec3::ZERO };
         let drift = self.linear / self.mass;
-        let drifting = 0.5 * self.mass * drift.length_squared();
-        RigidMotion { center: self.center, drift, spin, drifting, turning: 0.5 * spin.dot(self.inertia * spin) }
+        RigidMotion { center: self.center, drift, spin, turning: 0.5 * spin.dot(self.inertia * spin) }
     }
 }
 
@@ -512,7 +548,7 @@ fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<
     all
 }
 
-/// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies, and no momentum where nothing holds them: their
+/// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies (where nothing holds them, of that beside their common motion), and no momentum where nothing holds them: their
 /// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`. Places may be so wrong that
 /// the turn with this angular momentum has more energy than is left: it gives way, if the energy is more by the share [`COARSE`] at most;
 /// beyond that nothing changes, and the result is false.
@@ -525,7 +561,7 @@ fn brake(
 ) -> bool {
     let now = now(world, problem, members.clone());
     let [from, mut to] = rigid_motions(&now, from_start);
-    let (inner, left) = (kinetic - from.kinetic(), kinetic - over - to.drifting);
+    let (inner, left) = (kinetic - from.turning, kinetic - over);
     if to.turning > left {
         if to.turning > left + COARSE * kinetic {
             return false;
