@@ -451,9 +451,10 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let size = Some(f64::from(body.smallest_half_extent())).filter(|size| size.is_finite()).unwrap_or(0.0);
     let rest = ROUNDING * m * acceleration.length() * size;
     let slack = REGAINED * after + rest;
-    // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less.
-    let rounding = after * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
-    Entry { before: body.kinetic_energy(), after, work, pushed, slack, rest, rounding, common, ..Entry::default() }
+    let before = body.kinetic_energy();
+    // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less. Energy that constraints made does not count.
+    let rounding = after.min(before + pushed[0].max(pushed[1]).max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
+    Entry { before, after, work, pushed, slack, rest, rounding, common, ..Entry::default() }
 }
 
 /// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
