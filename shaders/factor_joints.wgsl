@@ -49,34 +49,7 @@ fn begin_node(node: u32) {
 }
 
 fn factor_system(system: u32) {
-    let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);
-    for (var node = first; node < end; node++) { begin_node(node); }
-    for (var node = first; node < end; node++) {
-        let pivot = first_block_of_node(node);
-        let end_block = end_block_of_node(node);
-        for (var at = pivot; at < end_block; at++) {
-            var block = coupling(node, node_of_block(at), select(shared_of_block(at), OWN_SIDES, at == pivot));
-            let own = diagonal_of(block);
-            if at == pivot {
-                let softness = (own.x + own.y + own.z) * softness_of_system(system);
-                joint_nodes[node].softness = softness;
-                block = with_diagonal(block, softness);
-            }
-            let end_term = end_term_of_block(at);
-            for (var term = first_term_of_block(at); term < end_term; term++) {
-                let left = joint_blocks[left_of_term(term)].lower;
-                block = block_less(block, product_with_transpose(left, joint_blocks[right_of_term(term)].upper));
-            }
-            if at == pivot {
-                joint_blocks[at].lower = factored_pivot(block, own);
-            } else {
-                let factors = joint_blocks[pivot].lower;
-                let inverse = diagonal_of(factors);
-                let upper = block_over(block, factors);
-                joint_blocks[at].lower = mat3x3f(upper[0] * inverse.x, upper[1] * inverse.y, upper[2] * inverse.z);
-                joint_blocks[at].upper = upper;
-            }
-        }
-    }
+    for (var node = begin_of_system(system); node < end; node++) { begin_node(node); }
+    factor_blocks(system);
 }

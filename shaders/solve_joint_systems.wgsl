@@ -1,5 +1,5 @@
 // solve_joint_systems: one thread solves one system of joints.
-// Reads joint_systems, joint_blocks, joints. Writes joint_nodes, joint_changes, joint_impulses; no other thread writes those of the same
+// Reads joint_systems, joints. Writes joint_blocks, joint_nodes, joint_changes, joint_impulses; no other thread writes those of the same
 // system. Double: solve_system in src/kernels/joint_system.rs.
 
 // The velocity that row i of a node lacks, less what its softness gives way by; 0 where there is no row.
@@ -10,18 +10,13 @@ fn right_of_row(first_axis: u32, rows: u32, i: u32, softness: f32) -> f32 {
     return joint_changes[k].linear.x - joint_impulses[k].linear.x * softness;
 }
 
-// The change of the impulse of a limit, which does not pull: it lets go before.
-fn limited_change(before: f32, change: f32) -> f32 { return select(-before, change, before * (before + change) > 0.0); }
-
 // Keeps the correction of row i of a node.
 fn change_row(first_axis: u32, rows: u32, i: u32, change: f32) {
     let axis = axis_of_row(rows, i);
     if axis == 0u { return; }
     let k = first_axis + axis - 1u;
-    var own = change;
-    if is_limit_row(rows, i) { own = limited_change(joint_impulses[k].linear.x, change); }
-    joint_changes[k].linear.x = own;
-    joint_impulses[k].linear.x += own;
+    joint_changes[k].linear.x = change;
+    joint_impulses[k].linear.x += change;
 }
 
 fn right_of_node(node: u32) -> vec3f {
@@ -52,8 +47,40 @@ fn change_node(node: u32, change: vec3f) {
     change_row(first, rows, 2u, change.z);
 }
 
-fn solve_system(rules: Rules, system: u32) {
-    if is_converged(rules.measured) { return; }
+// Takes row i of a node out if it is a limit that holds, and bears no impulse or would pull; whether it did.
+fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: f32, change: f32) -> bool {
+    if !is_limit_row(rows, i) || !(held > 0.0) { return false; }
+    let before = joint_impulses[first_axis + axis_of_row(rows, i) - 1u].linear.x;
+    if before * (before + change) > 0.0 { return false; }
+    for (var column = 0u; column < 3u; column++) {
+        joint_nodes[node].along[column][i] = 0.0;
+        joint_nodes[node].about_a[column][i] = 0.0;
+        joint_nodes[node].about_b[column][i] = 0.0;
+    }
+    joint_nodes[node].turn_a[i] = vec3f(0.0);
+    joint_nodes[node].turn_b[i] = vec3f(0.0);
+    return true;
+}
+
+// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
+fn let_go(system: u32) -> bool {
+    var any = false;
+    let end = begin_of_system(system + 1u);
+    for (var node = begin_of_system(system); node < end; node++) {
+        let rows = rows_of_node(node);
+        if rows == ANCHORS { continue; }
+        let first = params.joint_count + joints[joint_of_node(node)].first_axis;
+        let held = diagonal_of(joint_blocks[first_block_of_node(node)].lower);
+        let change = joint_nodes[node].right;
+        any = let_go_of_row(node, first, rows, 0u, held.x, change.x) || any;
+        any = let_go_of_row(node, first, rows, 1u, held.y, change.y) || any;
+        any = let_go_of_row(node, first, rows, 2u, held.z, change.z) || any;
+    }
+    return any;
+}
+
+// Finds the changes of the impulses of one system, the right sides of its nodes.
+fn find_changes(system: u32) {
     let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);
     for (var node = first; node < end; node++) { joint_nodes[node].right = right_of_node(node); }
@@ -75,8 +102,22 @@ fn solve_system(rules: Rules, system: u32) {
         for (var at = pivot + 1u; at < end_block; at++) {
             change -= transposed_block_times(joint_blocks[at].lower, joint_nodes[node_of_block(at)].right);
         }
-        change = backward(factors, change);
-        joint_nodes[node].right = change;
-        change_node(node, change);
+        joint_nodes[node].right = backward(factors, change);
     }
+}
+
+fn solve_system(rules: Rules, system: u32) {
+    if is_converged(rules.measured) { return; }
+    let first = begin_of_system(system);
+    let end = begin_of_system(system + 1u);
+    // Sweeps may have let go of limits since the system was factored.
+    for (var node = first; node < end; node++) { joint_nodes[node].right = vec3f(0.0); }
+    var changed = let_go(system);
+    loop {
+        if changed { factor_blocks(system); }
+        find_changes(system);
+        changed = let_go(system);
+        if !changed { break; }
+    }
+    for (var node = first; node < end; node++) { change_node(node, joint_nodes[node].right); }
 }

@@ -15,8 +15,8 @@ use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
-use crate::math::rotation::product;
-use crate::problem::{ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
+use crate::math::rotation::{product, unit};
+use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
@@ -265,7 +265,7 @@ impl Energy {
             let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
             let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
             // The inertia turns with the body.
-            let spin = (Quat::from_array(problem.bodies[i].dq).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
+            let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
             entry.springs += 0.5 * spin.dot(lent * spin);
         }
     }
@@ -444,7 +444,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let pushed = moved.map(|moved| acceleration.dot(moved));
     let common = Common { mass: m, momenta: [m * v_0, m * v], force: m * acceleration, moved };
     let work = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
-    let turn = product(Quat::from_array(row.dq), body.rotation);
+    let turn = product(turn_of(row), body.rotation);
     let spin = product(turn, body.mass.principal_frame).as_dquat().inverse() * w;
     let after = 0.5 * (m * v.length_squared() + (body.mass.principal_inertia.as_dvec3() * spin * spin).element_sum());
     // A body without shapes has no size.
@@ -474,6 +474,11 @@ fn is_in_reach(
     let fastest = members.clone().map(speed).fold(0.0, f64::max);
     let reach = (2.0 * fastest + f64::from(config.push_limit)) * dt + lever;
     members.into_iter().all(|i| Vec3::from(problem.bodies[i].dp).as_dvec3().length() <= reach)
+}
+
+/// How far a body turned in the step, as its pose will have it.
+fn turn_of(row: &BodyRow) -> Quat {
+    unit(Quat::from_array(row.dq))
 }
 
 /// The motion that some bodies have as one rigid body.
@@ -532,7 +537,7 @@ fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize
     let body = |i: usize| {
         let row = &problem.bodies[i];
         let [v, w, way] = [row.v, row.w, row.dp].map(|u| Vec3::from(u).as_dvec3());
-        (i, world.bodies[i].center_of_mass().as_dvec3() + way, [v, w], Quat::from_array(row.dq))
+        (i, world.bodies[i].center_of_mass().as_dvec3() + way, [v, w], turn_of(row))
     };
     Momenta::of(world, members.map(body))
 }
