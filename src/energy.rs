@@ -65,11 +65,8 @@ struct Entry {
     /// Kinetic energy when the step began, and at its end.
     before: f64,
     after: f64,
-    /// Work of drives and torques.
+    /// Work of gravity, forces and drives.
     work: f64,
-    /// Work of gravity and forces, by how far bodies went and by their mean velocities: the larger counts, of a whole island. In one whose
-    /// bodies fly about, the work on each by itself would not add up to that on all.
-    pushed: [f64; 2],
     /// What may be regained of what was lost before, and the most of that from this step on.
     reserve: f64,
     slack: f64,
@@ -85,23 +82,21 @@ struct Entry {
     common: Common,
 }
 
-/// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times both measures of their ways (kg m).
+/// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times their ways (kg m).
 #[derive(Clone, Copy, Debug, Default)]
 struct Common {
     mass: f64,
     momenta: [DVec3; 2],
     force: DVec3,
-    moved: [DVec3; 2],
+    moved: DVec3,
 }
 
 impl Common {
     fn add(&mut self, other: &Self) {
         self.mass += other.mass;
         self.force += other.force;
-        for i in 0..2 {
-            self.momenta[i] += other.momenta[i];
-            self.moved[i] += other.moved[i];
-        }
+        self.moved += other.moved;
+        self.momenta = [0, 1].map(|i| self.momenta[i] + other.momenta[i]);
     }
 }
 
@@ -113,14 +108,13 @@ impl Entry {
 
     /// What motion had, and got.
     fn given(&self) -> f64 {
-        self.before + self.work + self.pushed[0].max(self.pushed[1]) + self.reserve + self.kept
+        self.before + self.work + self.reserve + self.kept
     }
 
     fn add(&mut self, other: &Self) {
         self.before += other.before;
         self.after += other.after;
         self.work += other.work;
-        self.pushed = [0, 1].map(|i| self.pushed[i] + other.pushed[i]);
         self.reserve += other.reserve;
         self.kept += other.kept;
         self.springs += other.springs;
@@ -135,8 +129,11 @@ impl Entry {
     fn leave_out_common(&mut self) {
         let Common { mass, momenta, force, moved } = self.common;
         let [before, after] = momenta.map(|momentum| 0.5 * momentum.length_squared() / mass);
+        let whole = self.before.max(f64::MIN_POSITIVE);
         (self.before, self.after) = (self.before - before, self.after - after);
-        self.pushed = [0, 1].map(|i| self.pushed[i] - force.dot(moved[i]) / mass);
+        self.work -= force.dot(moved) / mass;
+        // Rounding of the velocity of all acts on the motion beside it.
+        self.rounding *= (self.before.max(0.0) / whole).sqrt().min(1.0);
         self.slack = REGAINED * self.after.max(0.0) + self.rest;
         self.reserve = self.reserve.min(self.slack);
     }
@@ -440,10 +437,10 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let [v_0, w_0] = [body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
     let acceleration = Vec3::from(mass.acceleration).as_dvec3();
     let way = Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep);
-    let moved = [way, (v + v_0) * (0.5 * dt)].map(|way| m * way);
-    let pushed = moved.map(|moved| acceleration.dot(moved));
+    let moved = m * way;
+    let pushed = acceleration.dot(moved);
     let common = Common { mass: m, momenta: [m * v_0, m * v], force: m * acceleration, moved };
-    let work = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
+    let turned = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
     let turn = product(turn_of(row), body.rotation);
     let spin = product(turn, body.mass.principal_frame).as_dquat().inverse() * w;
     let after = 0.5 * (m * v.length_squared() + (body.mass.principal_inertia.as_dvec3() * spin * spin).element_sum());
@@ -453,8 +450,8 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let slack = REGAINED * after + rest;
     let before = body.kinetic_energy();
     // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less. Energy that constraints made does not count.
-    let rounding = after.min(before + pushed[0].max(pushed[1]).max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
-    Entry { before, after, work, pushed, slack, rest, rounding, common, ..Entry::default() }
+    let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
+    Entry { before, after, work: pushed + turned, slack, rest, rounding, common, ..Entry::default() }
 }
 
 /// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
