@@ -37,6 +37,8 @@ pub struct JointRows {
     swept_gap: f32,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
+    /// What turns opens joints by, over the promised gap: this times ω² (s²).
+    gap_of_turns: f32,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
 }
@@ -53,7 +55,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     needs,
-} scratch { graph, lent });
+} scratch { graph, gap_of_turns, lent });
 
 /// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
@@ -110,6 +112,7 @@ impl JointRows {
     /// Chooses the joints that are solved at once, unless they are chosen: one that is swept pulls its gap shut softly, and would gain energy if it
     /// were solved at once from a later step on. `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
+        self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
@@ -230,8 +233,23 @@ impl JointRows {
     }
 
     /// Whether any joint needs more than class 0 gives.
-    pub fn are_above(&self) -> bool {
-        self.needs.iter().any(|&need| need > 1.0)
+    pub fn are_above(&self, world: &World) -> bool {
+        (0..self.joints.len()).any(|joint| self.need(world, joint) > 1.0)
+    }
+
+    /// The gap that a joint would have in class 0, over the promised one: that at rest, or that of its turning arms. Arms turn, and centers of mass go
+    /// straight: in a substep h that opens a joint by (h ω)²/2 of an arm, however it is solved.
+    fn need(&self, world: &World, joint: usize) -> f32 {
+        let Joint { body_a, anchor_a, body_b, anchor_b, .. } = self.joints[joint];
+        let (mut arms, mut opened) = (0.0, 0.0);
+        for (body, anchor) in [(Some(body_a), anchor_a), (body_b, anchor_b)] {
+            if let Some(body) = body.and_then(|body| world.body(body)) {
+                let arm = anchor.distance(body.mass.center);
+                (arms, opened) = (arms + arm, opened + arm * body.angular_velocity.length_squared());
+            }
+        }
+        let of_turns = if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 };
+        self.needs.get(joint).copied().unwrap_or(0.0).max(of_turns)
     }
 
     /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
@@ -244,7 +262,7 @@ impl JointRows {
         };
         awake.map(move |(i, joint)| {
             let (a, b) = joint.indices();
-            let need = self.needs.get(i).copied().unwrap_or(0.0);
+            let need = self.need(world, i);
             Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
         })
     }
