@@ -48,8 +48,8 @@ fn change_node(node: u32, change: vec3f) {
 }
 
 // Takes row i of a node out if it is a limit that holds, and bears no impulse or would pull; whether it did.
-fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: f32, change: f32) -> bool {
-    if !is_limit_row(rows, i) || !(held > 0.0) { return false; }
+fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: bool, change: f32) -> bool {
+    if !is_limit_row(rows, i) || !held { return false; }
     let before = joint_impulses[first_axis + axis_of_row(rows, i) - 1u].linear.x;
     if before * (before + change) > 0.0 { return false; }
     for (var column = 0u; column < 3u; column++) {
@@ -63,7 +63,8 @@ fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: f32, chang
 }
 
 // Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
-fn let_go(system: u32) -> bool {
+// In a system that is new, all hold.
+fn let_go(system: u32, is_new: bool) -> bool {
     var any = false;
     let end = begin_of_system(system + 1u);
     for (var node = begin_of_system(system); node < end; node++) {
@@ -72,9 +73,9 @@ fn let_go(system: u32) -> bool {
         let first = params.joint_count + joints[joint_of_node(node)].first_axis;
         let held = diagonal_of(joint_blocks[first_block_of_node(node)].lower);
         let change = joint_nodes[node].right;
-        any = let_go_of_row(node, first, rows, 0u, held.x, change.x) || any;
-        any = let_go_of_row(node, first, rows, 1u, held.y, change.y) || any;
-        any = let_go_of_row(node, first, rows, 2u, held.z, change.z) || any;
+        any = let_go_of_row(node, first, rows, 0u, is_new || held.x > 0.0, change.x) || any;
+        any = let_go_of_row(node, first, rows, 1u, is_new || held.y > 0.0, change.y) || any;
+        any = let_go_of_row(node, first, rows, 2u, is_new || held.z > 0.0, change.z) || any;
     }
     return any;
 }
@@ -112,11 +113,12 @@ fn solve_system(rules: Rules, system: u32) {
     let end = begin_of_system(system + 1u);
     // Sweeps may have let go of limits since the system was factored.
     for (var node = first; node < end; node++) { joint_nodes[node].right = vec3f(0.0); }
-    var changed = let_go(system);
+    let is_new = 0.0 > joint_nodes[first].softness;
+    var changed = let_go(system, is_new) || is_new;
     loop {
         if changed { factor_blocks(system); }
         find_changes(system);
-        changed = let_go(system);
+        changed = let_go(system, false);
         if !changed { break; }
     }
     for (var node = first; node < end; node++) { change_node(node, joint_nodes[node].right); }

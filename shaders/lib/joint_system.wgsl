@@ -17,6 +17,9 @@ fn end_term_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] 
 fn left_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term]; }
 fn right_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term + 1u]; }
 
+// The softness of a node whose system is not factored since it began.
+const NOT_FACTORED: f32 = -1.0;
+
 // The rows of a node that holds the anchors of a joint together.
 const ANCHORS: u32 = 0xffffffffu;
 

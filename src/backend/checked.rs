@@ -61,7 +61,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             | Kernel::IntegratePositions { .. } => (bodies, None),
             Kernel::IntegrateTorques { .. } => (if problem.torques.is_empty() { 0..0 } else { bodies }, None),
             Kernel::IntegrateGyroscopic { .. } => (inertias, None),
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => (systems, None),
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => (systems, None),
             Kernel::TurnInertias => (turning, None),
             _ => (0..0, None),
         };

@@ -75,7 +75,7 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::WarmStartJoints { axes: false },
         Kernel::WarmStartJoints { axes: true },
         Kernel::TurnInertias,
-        Kernel::FactorJoints,
+        Kernel::BeginSystems,
     ];
     for (first, measured) in [(true, true), (true, false), (false, true), (false, false)] {
         all.push(Kernel::Extrapolate { first, measured });
@@ -116,7 +116,7 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
         Kernel::SolveAxes(_) | Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
             problem.blocks[0].direct_joints()
         }
-        Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
+        Kernel::BeginSystems | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,
         Kernel::ClearImpulses
         | Kernel::SumImpulses { .. }
@@ -181,7 +181,7 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         let [begin, end] = changes.map(|passes| if rules.from_start { passes } else { Vec::new() });
         return vec![[begin, sweep, end].concat()];
     }
-    if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
+    if matches!(kernel, Kernel::TurnInertias | Kernel::BeginSystems) {
         return vec![system_sweep(Rules::default(), problem)];
     }
     // A warm start applies the impulses since it last ran.
@@ -202,7 +202,7 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
 
 /// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
-    let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
+    let (turn, factor) = (Kernel::TurnInertias, Kernel::BeginSystems);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
     let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
     let rules = Rules { axes: true, ..rules };

@@ -134,8 +134,9 @@ fn solve_joints_at_once(random: &mut Random, problem: &mut StepProblem) {
     let mut nodes = Vec::new();
     for (row, joint) in problem.joints.iter().zip(0..) {
         let axes = &problem.axes[row.first_axis as usize..(row.first_axis + row.axis_count) as usize];
-        let locks: Vec<u32> = (0..).zip(axes).filter(|(_, axis)| axis.is_lock()).map(|(k, _)| k).collect();
-        nodes.extend(locks.chunks(3).map(|locks| (joint, NodeRow::rows_of(locks))));
+        let bounds = (0..).zip(axes).filter(|(_, axis)| axis.is_lock() || axis.is_limit());
+        let bounds: Vec<(u32, bool)> = bounds.map(|(k, axis)| (k, axis.is_limit())).collect();
+        nodes.extend(bounds.chunks(3).map(|bounds| (joint, NodeRow::rows_of(bounds))));
         nodes.extend(Some((joint, NodeRow::ANCHORS)).filter(|_| row.is_loose == 0.0));
     }
     let side = |body: u32| Some(body).filter(|&body| is_movable(body));

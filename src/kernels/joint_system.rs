@@ -1,5 +1,5 @@
 //! All joints of a connected set of bodies, solved at once: S λ = -u by S = L D Lᵀ in blocks of 3 x 3. Doubles of
-//! `shaders/lib/joint_system.wgsl` and of the kernels `factor_joints`, `measure_joints`, `solve_joint_systems` and
+//! `shaders/lib/joint_system.wgsl` and of the kernels `begin_systems`, `measure_joints`, `solve_joint_systems` and
 //! `apply_joint_changes`.
 //!
 //! A node of a system is up to three rows of one joint: its anchors, its locks and limits to shift along, or those to turn about. Drives are
@@ -209,6 +209,9 @@ pub fn anchor_motions<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [AxisMotion<
     [motion(vec3(less, zero, zero)), motion(vec3(zero, less, zero)), motion(vec3(zero, zero, less))]
 }
 
+/// The softness of a node whose system is not factored since it began.
+const NOT_FACTORED: f64 = -1.0;
+
 /// Up to three rows of a joint while its system is factored. Double of the WGSL struct `JointNode`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointNode<L> {
@@ -220,7 +223,7 @@ pub struct JointNode<L> {
     pub turns: [Block<L>; 2],
     /// Inverse masses of a and b.
     pub inv_masses: [L; 2],
-    /// The velocity that a row gives way by per impulse; 0 of a rigid joint.
+    /// The velocity that a row gives way by per impulse; 0 of a rigid joint, [`NOT_FACTORED`] before it is known.
     pub softness: L,
     /// The right side, then the correction.
     pub right: Vec3<L>,
@@ -240,7 +243,7 @@ impl<L: Lane> JointNode<L> {
                 Block::of(turn(b, x.about_b), turn(b, y.about_b), turn(b, z.about_b)),
             ],
             inv_masses: [a.inv_mass, b.inv_mass],
-            softness: L::default(),
+            softness: L::constant(NOT_FACTORED),
             right: Vec3::default(),
         }
     }
@@ -323,14 +326,15 @@ impl<S: Scalar> JointFactors<S> {
     }
 }
 
-/// Factors one system; `load` gives a joint with its bodies, `axis` one of its axes, with the impulse that it bears. Kernel `factor_joints`.
+/// Lets one system begin where its bodies are: writes the rows of its nodes, which the next solution factors. `load` gives a joint with its bodies,
+/// `axis` one of its axes. Kernel `begin_systems`.
 #[inline(always)]
-pub fn factor_system<S: Scalar>(
+pub fn begin_system<S: Scalar>(
     systems: &JointSystems,
     system: usize,
     load: impl Fn(usize) -> (Joint<S>, Pair<S>),
-    axis: impl Fn(usize, usize) -> (Axis<S>, S),
-    mut factors: SystemFactors<S>,
+    axis: impl Fn(usize, usize) -> Axis<S>,
+    factors: SystemFactors<S>,
 ) {
     let [own, _] = places(systems, system);
     for (node, row) in factors.nodes.iter_mut().zip(&systems.nodes[own]) {
@@ -341,15 +345,11 @@ pub fn factor_system<S: Scalar>(
             motions = anchor_motions(&pair, &loaded);
         } else {
             for (i, k) in row.axes() {
-                let (axis, impulse) = axis(joint, k);
-                if !row.is_limit(i) || impulse != S::default() {
-                    motions[i] = axis_motion(&pair, &loaded, &axis);
-                }
+                motions[i] = axis_motion(&pair, &loaded, &axis(joint, k));
             }
         }
         *node = JointNode::of(&pair, &motions);
     }
-    factor_blocks(systems, system, &mut factors);
 }
 
 /// Factors one system whose nodes are known.
@@ -442,13 +442,14 @@ pub fn solve_system<S: Scalar>(
     let [own, _] = places(systems, system);
     // Sweeps may have let go of limits since the system was factored.
     factors.nodes.iter_mut().for_each(|node| node.right = Vec3::default());
-    let mut changed = let_go(problem, system, joints, &mut factors);
+    let is_new = S::default() > factors.nodes[0].softness;
+    let mut changed = let_go(problem, system, is_new, joints, &mut factors) || is_new;
     loop {
         if changed {
             factor_blocks(systems, system, &mut factors);
         }
         find_changes(problem, system, joints, &mut factors);
-        changed = let_go(problem, system, joints, &mut factors);
+        changed = let_go(problem, system, false, joints, &mut factors);
         if !changed {
             break;
         }
@@ -463,11 +464,13 @@ pub fn solve_system<S: Scalar>(
     }
 }
 
-/// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
+/// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any. In a
+/// system that is new, all hold.
 #[inline(always)]
 fn let_go<S: Scalar>(
     problem: &StepProblem,
     system: usize,
+    is_new: bool,
     joints: &mut impl JointChanges<S>,
     factors: &mut SystemFactors<S>,
 ) -> bool {
@@ -478,7 +481,7 @@ fn let_go<S: Scalar>(
         let pivot = factors.lower[row.first_block as usize - blocks.start].diagonal();
         let [held, changes] = [pivot, node.right].map(|Vec3 { x, y, z }| [x, y, z]);
         for (i, number) in problem.numbers_of(row).into_iter().enumerate() {
-            let Some(at) = number.filter(|_| row.is_limit(i) && held[i] > S::default()) else { continue };
+            let Some(at) = number.filter(|_| row.is_limit(i) && (is_new || held[i] > S::default())) else { continue };
             let before = joints.impulse(at);
             if !(before * (before + changes[i]) > S::default()) {
                 node.remove(i);

@@ -44,8 +44,8 @@ pub enum Kernel {
     },
     /// Inertia of bodies that turned; over `turning`.
     TurnInertias,
-    /// Factors the joints that are solved at once; over systems.
-    FactorJoints,
+    /// Joints that are solved at once begin where their bodies are; over systems.
+    BeginSystems,
     /// Impulses that the joints carry; over joint colors.
     WarmStartJoints {
         /// Whether joints have axes.
@@ -103,7 +103,7 @@ impl Kernel {
             Self::SumImpulses { .. } => "sum_impulses",
             Self::SumJointImpulses { .. } => "sum_joint_impulses",
             Self::TurnInertias => "turn_inertias",
-            Self::FactorJoints => "factor_joints",
+            Self::BeginSystems => "begin_systems",
             Self::WarmStartJoints { .. } => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
             Self::BeginSweep { .. } => "begin_sweep",
@@ -132,7 +132,7 @@ impl Kernel {
                 | Self::IntegrateGyroscopic { .. }
                 | Self::IntegratePositions { .. }
                 | Self::TurnInertias
-                | Self::FactorJoints
+                | Self::BeginSystems
                 | Self::SolveJointSystems(_)
         )
     }

@@ -216,7 +216,7 @@ impl StepPlan {
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn.
         let carried = shared.accumulated && joint_colors.is_empty() && !from_start;
-        self.over_colors(Kernel::FactorJoints, block, systems);
+        self.over_colors(Kernel::BeginSystems, block, systems);
         for substep in 0..substeps {
             let warm_start = carried && substep > 0;
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
@@ -236,7 +236,7 @@ impl StepPlan {
             self.sweeps(sweeps(config.iterations), biased);
             self.over_colors(Kernel::IntegratePositions { from_start }, block, bodies);
             self.over_colors(Kernel::TurnInertias, block, turning);
-            self.over_colors(Kernel::FactorJoints, block, systems);
+            self.over_colors(Kernel::BeginSystems, block, systems);
             self.sweeps(sweeps(config.relax), shared);
             if substep + 1 < substeps {
                 self.sum_impulses(problem, block, substep);

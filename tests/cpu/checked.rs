@@ -234,7 +234,7 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
         assert!(known && !line.contains('\n'), "{start}: {line}");
     }
     // A pass over systems goes over their color and no other.
-    for wanted in [Kernel::FactorJoints, Kernel::TurnInertias] {
+    for wanted in [Kernel::BeginSystems, Kernel::TurnInertias] {
         let at = plan.passes.iter().position(|pass| pass.kernel == wanted).expect("a pass");
         let mut passes = plan.passes.clone();
         passes[at].colors = 0..1;

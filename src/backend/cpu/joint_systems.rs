@@ -9,7 +9,7 @@ use super::lane_layout::{ImpulsePlace, LaneLayout};
 use super::lane_rows::SharedImpulses;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use crate::kernels::joint_system::{
-    Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
+    Block, JointChanges, JointFactors, JointNode, SystemFactors, begin_system, places, solve_system,
 };
 use crate::kernels::{Axis, Joint, Mass, Pair, Sym3};
 use crate::lanes::{Lanes, Shared, Work};
@@ -75,8 +75,8 @@ impl<'a> SharedFactors<'a> {
 
 /// A pass over systems.
 pub(super) struct SystemWork<'a> {
-    /// Whether it factors, and does not solve.
-    pub factors_only: bool,
+    /// Whether systems begin, and are not solved.
+    pub begins: bool,
     pub problem: &'a StepProblem,
     pub layout: &'a SystemLayout,
     /// The slots of the bodies of the problem.
@@ -94,8 +94,8 @@ impl Work for SystemWork<'_> {
         for system in self.layout.rows.rows[range].iter().map(|&system| system as usize) {
             // SAFETY: tasks have different systems: `Threads::spread_each` cuts their range.
             let factors = unsafe { self.factors.of(systems, system) };
-            if self.factors_only {
-                factor_system(systems, system, |joint| self.load(joint), |joint, k| self.axis(joint, k), factors);
+            if self.begins {
+                begin_system(systems, system, |joint| self.load(joint), |joint, k| self.axis(joint, k), factors);
             } else {
                 solve_system(self.problem, system, &mut Changes(self), factors);
             }
@@ -120,10 +120,8 @@ impl SystemWork<'_> {
     }
 
     #[inline(always)]
-    fn axis(&self, joint: usize, k: usize) -> (Axis<f32>, f32) {
-        let k = self.problem.joints[joint].first_axis as usize + k;
-        let at = ImpulseNumber { row: self.problem.joints.len() + k, component: 0 };
-        (Axis::load(&self.problem.axes[k]), Changes(self).impulse(at))
+    fn axis(&self, joint: usize, k: usize) -> Axis<f32> {
+        Axis::load(&self.problem.axes[self.problem.joints[joint].first_axis as usize + k])
     }
 }
 

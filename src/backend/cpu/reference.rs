@@ -9,7 +9,7 @@ use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
     start_of,
 };
-use crate::kernels::joint_system::{JointChanges, JointFactors, factor_system, solve_system, turned_inertia};
+use crate::kernels::joint_system::{JointChanges, JointFactors, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
 use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
@@ -155,7 +155,7 @@ impl<S: Scalar> Reference<S> {
                     self.rows.masses[row.body as usize].inv_inertia = turned_inertia(Sym3 { x, yz }, q);
                 }
             }
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
             Kernel::WarmStartJoints { .. }
             | Kernel::SolveJoints(_)
             | Kernel::SolveAxes(_)
@@ -220,13 +220,10 @@ impl<S: Scalar> Reference<S> {
         self.joint_changes.resize(self.rows.joint_impulses.len(), Vec3::default());
         for system in places(problem, pass) {
             let own = factors.of(systems, system);
-            if pass.kernel == Kernel::FactorJoints {
+            if pass.kernel == Kernel::BeginSystems {
                 let load = |joint: usize| (self.rows.joints[joint], self.load_pair(problem.joints[joint].bodies()));
-                let axis = |joint: usize, k: usize| {
-                    let k = problem.joints[joint].first_axis as usize + k;
-                    (self.rows.axes[k], self.rows.joint_impulses[problem.joints.len() + k].x)
-                };
-                factor_system(systems, system, load, axis, own);
+                let axis = |joint: usize, k: usize| self.rows.axes[problem.joints[joint].first_axis as usize + k];
+                begin_system(systems, system, load, axis, own);
             } else {
                 let impulses = &mut self.rows.joint_impulses;
                 let mut changes = Changes { changes: &mut self.joint_changes, impulses };

@@ -96,9 +96,9 @@ impl SharedStep<'_> {
                 let work = TurningWork { rows: &self.turning[first..end], bodies };
                 spread(0..(end - first).div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
             }
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => {
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => {
                 let work = SystemWork {
-                    factors_only: kernel == Kernel::FactorJoints,
+                    begins: kernel == Kernel::BeginSystems,
                     problem: self.problem,
                     layout: self.systems,
                     slots: &self.partition.slots,

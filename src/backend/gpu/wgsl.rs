@@ -136,15 +136,15 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (of_joints!(axes, "warm_start_joints"), Over::Colors, "warm_start_joint(row)".into())
         }
         Kernel::TurnInertias => (&[part!("turn_inertias")], Over::Colors, "turn_inertia(row)".into()),
-        Kernel::FactorJoints => {
+        Kernel::BeginSystems => {
             let parts = &[
                 part!("lib/pair"),
                 part!("lib/joint"),
                 part!("lib/axes"),
                 part!("lib/joint_system"),
-                part!("factor_joints"),
+                part!("begin_systems"),
             ];
-            (parts, Over::Colors, "factor_system(row)".into())
+            (parts, Over::Colors, "begin_system(row)".into())
         }
         Kernel::MeasureJoints(rules) => {
             (of_joints!(true, "measure_joints"), Over::Colors, with("measure_joint", rules))

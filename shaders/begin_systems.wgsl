@@ -1,6 +1,6 @@
-// factor_joints: one thread factors one system of joints.
-// Reads joint_systems, joints, axes, joint_impulses, bodies, masses. Writes joint_nodes and joint_blocks; no other thread writes those of the same system.
-// Double: factor_system in src/kernels/joint_system.rs.
+// begin_systems: one thread lets one system of joints begin where its bodies are. The next solution factors it.
+// Reads joint_systems, joints, axes, bodies, masses. Writes joint_nodes; no other thread writes those of the same system.
+// Double: begin_system in src/kernels/joint_system.rs.
 
 // The anchors of a joint as three rows, along the axes of the world: one of them.
 fn anchor_motion(anchors: Anchors, along: vec3f) -> AxisMotion {
@@ -10,12 +10,8 @@ fn anchor_motion(anchors: Anchors, along: vec3f) -> AxisMotion {
 // Row i of a node; zero where there is none.
 fn row_motion(pair: ptr<function, Pair>, joint: Joint, rows: u32, i: u32) -> AxisMotion {
     let axis = axis_of_row(rows, i);
-    let k = joint.first_axis + axis - 1u;
-    // Impulses of axes follow those of joints.
-    if axis == 0u || (is_limit_row(rows, i) && joint_impulses[params.joint_count + k].linear.x == 0.0) {
-        return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0);
-    }
-    return axis_motion(pair, joint, axes[k]);
+    if axis == 0u { return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0); }
+    return axis_motion(pair, joint, axes[joint.first_axis + axis - 1u]);
 }
 
 fn begin_node(node: u32) {
@@ -46,10 +42,10 @@ fn begin_node(node: u32) {
     );
     joint_nodes[node].mass_a = pair.mass_a.inv_mass;
     joint_nodes[node].mass_b = pair.mass_b.inv_mass;
+    joint_nodes[node].softness = NOT_FACTORED;
 }
 
-fn factor_system(system: u32) {
+fn begin_system(system: u32) {
     let end = begin_of_system(system + 1u);
     for (var node = begin_of_system(system); node < end; node++) { begin_node(node); }
-    factor_blocks(system);
 }
