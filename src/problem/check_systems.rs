@@ -89,5 +89,8 @@ type Solved = (u32, Option<(usize, bool)>);
 fn rows_of_node(node: &NodeRow) -> impl Iterator<Item = Solved> + use<> {
     let node = *node;
     let anchors = Some(None).filter(|_| node.is_of_anchors());
-    anchors.into_iter().chain(node.axes().map(move |(i, k)| Some((k, node.is_limit(i))))).map(move |row| (node.joint, row))
+    anchors
+        .into_iter()
+        .chain(node.axes().map(move |(i, k)| Some((k, node.is_limit(i)))))
+        .map(move |row| (node.joint, row))
 }

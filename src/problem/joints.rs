@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::Vec3;
 
 use super::axes;
-use super::joint_sets::JointSet;
+use super::joint_sets::gap_of_sweeps;
 use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
@@ -141,12 +141,10 @@ impl JointRows {
                 members.entry(islands.root(body)).or_default().push(joint as u32);
             }
         }
-        let mut swings = vec![0.0; world.bodies.len()];
         for joints in members.into_values() {
-            let set = JointSet::new(joints, world, config, substep, |joint| self.sides(joint));
-            let gap = set.gap(world, &mut swings);
+            let gap = gap_of_sweeps(&joints, world, config, substep, |joint| self.sides(joint));
             self.swept_gap = self.swept_gap.max(gap);
-            self.decide(&set.joints, gap, config, problem);
+            self.decide(&joints, gap, config, problem);
         }
     }
 

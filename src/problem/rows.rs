@@ -269,7 +269,7 @@ impl AxisRow {
     /// Whether it is a limit: of two bounds that differ.
     pub(crate) fn is_limit(&self) -> bool {
         self.left > 0.5 * NO_LIMIT
-}
+    }
 
     /// Whether the row is a lock: neither a limit nor a drive.
     pub fn is_lock(&self) -> bool {
