@@ -108,16 +108,29 @@ impl Manifold {
         self.count == 0
     }
 
-    /// Brings separations from where the surfaces meet to where the bodies begin: until they meet, the center of b goes on by `drift` as seen from that of a,
-    /// and each body turns.
-    pub(super) fn carry_back(&mut self, drift: Vec3, turns: [Quat; 2]) {
+    /// How the points move along the normal where the center of b goes on by `drift` as seen from that of a, and each body turns.
+    fn movement(&self, drift: Vec3, turns: [Quat; 2]) -> impl Fn(&ManifoldPoint) -> f32 + use<> {
         let vector = |v: Vec3| math::Vec3::<f32>::load(v.to_array());
         let [turn_a, turn_b] = turns.map(|turn| math::Quat::load(turn.to_array()));
         let normal = vector(self.normal);
         let movement = NormalMovement::new(normal, vector(drift), turn_a, turn_b);
         let movement = movement.round(normal, self.radius_a, self.radius_b);
+        move |point| movement.between(vector(point.r_a), vector(point.r_b))
+    }
+
+    /// Brings separations from where the surfaces meet to where the bodies begin: until they meet, the bodies move by `drift` and `turns`.
+    pub(super) fn carry_back(&mut self, drift: Vec3, turns: [Quat; 2]) {
+        let movement = self.movement(drift, turns);
+        self.points[..self.count as usize].iter_mut().for_each(|point| point.separation -= movement(point));
+    }
+
+    /// Brings the points so far apart that they do not touch where the bodies moved by `drift` and `turns`, and the points by `next` more along the normal,
+    /// a function of their arms.
+    pub(super) fn give_way(&mut self, drift: Vec3, turns: [Quat; 2], next: impl Fn(Vec3, Vec3) -> f32) {
+        let movement = self.movement(drift, turns);
         for point in &mut self.points[..self.count as usize] {
-            point.separation -= movement.between(vector(point.r_a), vector(point.r_b));
+            let least = -movement(point) - next(point.r_a, point.r_b);
+            point.separation = point.separation.max(least);
         }
     }
 
