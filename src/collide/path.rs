@@ -93,14 +93,15 @@ impl Narrow<'_> {
             .map(|(side, c)| Swept::new(&self.colliders[c as usize], bodies[side], &ways[side]));
         let met = impact(a, b, size, Until::Meet, true);
         // Joints, and others in a heap, hold a body off its free way.
-        let is_led = || bodies.iter().any(|body| body.tied == 1.0) || bodies.iter().all(|body| body.gravity_scale > 0.0);
+        let is_led =
+            || bodies.iter().any(|body| body.tied == 1.0) || bodies.iter().all(|body| body.gravity_scale > 0.0);
         let stays = |time: f32| going.is_seen() && (!going.is_far() || is_led() || self.is_held_up(pair, &ways, time));
         let met = match met {
             Some(met) if stays(met.time) => return None,
             Some(met) if going.is_seen() || !self.is_held_up(pair, &ways, met.time) => met,
             _ => {
                 track.predicted = ANEW;
-                pair.manifolds.iter_mut().for_each(|manifold| self.give_way(manifold, bodies));
+                pair.manifolds.iter_mut().for_each(|manifold| self.give_way(manifold, bodies, TOUCHING * size));
                 return None;
             }
         };
@@ -182,8 +183,8 @@ impl Narrow<'_> {
         })
     }
 
-    /// Brings a contact so far off that it does not act where its bodies go on freely.
-    fn give_way(&self, manifold: &mut Manifold, [a, b]: [&BodyState; 2]) {
+    /// Brings a contact so far off that it does not act where its bodies go on freely: they stay apart by `gap`, more than rounding.
+    fn give_way(&self, manifold: &mut Manifold, [a, b]: [&BodyState; 2], gap: f32) {
         let substep = self.margins.substep;
         let count = (self.margins.dt / substep).round() as u32;
         let (v, pull, normal) = (b.v - a.v, b.pull - a.pull, manifold.normal);
@@ -196,7 +197,7 @@ impl Narrow<'_> {
             manifold.give_way(drift, turns, |r_a, r_b| {
                 let swerve = swerve(a, r_a) + swerve(b, r_b);
                 let on = (v + next * pull + b.w.cross(r_b) - a.w.cross(r_a)).dot(normal) - then * swerve;
-                substep * on.min(0.0) - 0.5 * then * then * swerve
+                substep * on.min(0.0) - 0.5 * then * then * swerve - gap
             });
         }
     }
