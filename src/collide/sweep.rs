@@ -187,8 +187,6 @@ const DEEPER: f32 = 0.002;
 const STUCK: f32 = 0.35;
 /// How deep something may be and still be held, relative to the same.
 const DEEPEST: f32 = 0.9;
-/// How far a step to a root goes.
-const BEFORE: f32 = 1.0 - 1e-4;
 /// Most pieces of a way.
 const PIECES: usize = 256;
 
@@ -339,7 +337,7 @@ impl Search<'_> {
             let stood = [a.at(pieces.time), b.at(pieces.time)];
             let apart = stood[1].center - stood[0].center;
             let near = NEAR * size + rounding(b.way, apart) + rounding(a.way, apart);
-            let normal = self.direction(&stood, known, pieces.least.map_or(2.0 * near, |least| least + near));
+            let normal = self.direction(&stood, known, pieces.least.map_or(2.0 * near, |least| least + 2.0 * near));
             let bound = |time: f32| {
                 let d_a = normal + time * normal.cross(a.way.turn);
                 let d_b = normal + time * normal.cross(b.way.turn);
@@ -483,16 +481,16 @@ impl Pieces {
         }
         // The chord of a concave function lies below it; a little before its root, rounding does not matter.
         for _ in 0..4 {
-            let next = time + (late - time) * (BEFORE * above / (above - below));
+            if above < 0.5 * near {
+                break;
+            }
+            let next = time + (late - time) * ((above - 0.25 * near) / (above - below));
             let value = bound(next) - least;
             if value < 0.0 {
                 (late, below) = (next, value);
                 continue;
             }
             (time, above) = (next, value);
-            if above < 0.5 * near {
-                break;
-            }
             // Behind the root, but nearer.
             let other = 0.5 * (time + late);
             let value = bound(other) - least;
