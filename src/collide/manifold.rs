@@ -109,7 +109,7 @@ impl Manifold {
     }
 
     /// How the points move along the normal where the center of b goes on by `drift` as seen from that of a, and each body turns.
-    fn movement(&self, drift: Vec3, turns: [Quat; 2]) -> impl Fn(&ManifoldPoint) -> f32 + use<> {
+    pub(super) fn movement(&self, drift: Vec3, turns: [Quat; 2]) -> impl Fn(&ManifoldPoint) -> f32 + use<> {
         let vector = |v: Vec3| math::Vec3::<f32>::load(v.to_array());
         let [turn_a, turn_b] = turns.map(|turn| math::Quat::load(turn.to_array()));
         let normal = vector(self.normal);
@@ -124,14 +124,10 @@ impl Manifold {
         self.points[..self.count as usize].iter_mut().for_each(|point| point.separation -= movement(point));
     }
 
-    /// Brings the points so far apart that they do not touch where the bodies moved by `drift` and `turns`, and the points by `next` more along the normal,
-    /// a function of their arms.
-    pub(super) fn give_way(&mut self, drift: Vec3, turns: [Quat; 2], next: impl Fn(Vec3, Vec3) -> f32) {
-        let movement = self.movement(drift, turns);
-        for point in &mut self.points[..self.count as usize] {
-            let least = -movement(point) - next(point.r_a, point.r_b);
-            point.separation = point.separation.max(least);
-        }
+    /// Brings the points at least so far apart.
+    pub(super) fn give_way(&mut self, least: [f32; MAX_POINTS]) {
+        let points = self.points[..self.count as usize].iter_mut().zip(least);
+        points.for_each(|(point, least)| point.separation = point.separation.max(least));
     }
 
     /// Takes over the slot of the same contact one step earlier: points match by feature and, where that fails (two aligned boxes

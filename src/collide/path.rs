@@ -7,11 +7,11 @@ use glam::Vec3;
 
 use super::collider::{BodyState, FARTHEST};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
-use super::manifold::Manifold;
+use super::manifold::{MAX_POINTS, Manifold};
 use super::narrow::Narrow;
 use super::pair::{Pair, PairScratch, Update};
 use super::pairs::Track;
-use super::sweep::{Station, Swept, Until, Way, impact};
+use super::sweep::{Station, Swept, Until, Way, impact, overlap_at_end};
 use crate::lanes::InstructionSet;
 
 /// How far bodies approach in a step before their contact is that of the time at which they meet, relative to the smallest half extent of the
@@ -91,6 +91,13 @@ impl Narrow<'_> {
         let ways = bodies.map(|body| Way::free(body, step));
         let [a, b] = [(0, pair.collider_a), (1, pair.collider_b)]
             .map(|(side, c)| Swept::new(&self.colliders[c as usize], bodies[side], &ways[side]));
+        let free = |manifold: &Manifold| self.free_separations(manifold, bodies, TOUCHING * size);
+        let acts = |manifold: &Manifold| {
+            manifold.points().iter().zip(free(manifold)).any(|(point, least)| point.separation < least)
+        };
+        if going.is_seen() && (!pair.manifolds.iter().any(acts) || !going.is_far() && overlap_at_end(a, b)) {
+            return None;
+        }
         let met = impact(a, b, size, Until::Meet, true);
         // Joints, and others in a heap, hold a body off its free way.
         let is_led =
@@ -101,7 +108,7 @@ impl Narrow<'_> {
             Some(met) if going.is_seen() || !self.is_held_up(pair, &ways, met.time) => met,
             _ => {
                 track.predicted = ANEW;
-                pair.manifolds.iter_mut().for_each(|manifold| self.give_way(manifold, bodies, TOUCHING * size));
+                pair.manifolds.iter_mut().for_each(|manifold| manifold.give_way(free(manifold)));
                 return None;
             }
         };
@@ -183,22 +190,26 @@ impl Narrow<'_> {
         })
     }
 
-    /// Brings a contact so far off that it does not act where its bodies go on freely: they stay apart by `gap`, more than rounding.
-    fn give_way(&self, manifold: &mut Manifold, [a, b]: [&BodyState; 2], gap: f32) {
+    /// The least separations of the points of a contact with which it does not act where its bodies go on freely, and come no nearer than `gap`.
+    fn free_separations(&self, manifold: &Manifold, [a, b]: [&BodyState; 2], gap: f32) -> [f32; MAX_POINTS] {
         let substep = self.margins.substep;
         let count = (self.margins.dt / substep).round() as u32;
         let (v, pull, normal) = (b.v - a.v, b.pull - a.pull, manifold.normal);
+        let mut least = [f32::NEG_INFINITY; MAX_POINTS];
         // The velocities that the last substep leaves are held against the next one.
         for k in 0..=count {
             let (then, next) = (k as f32 * substep, (k + 1) as f32 * substep);
             let drift = then * (v + 0.5 * next * pull);
             let turns = [a, b].map(|body| Way::free(body, then).turned(1.0));
+            let movement = manifold.movement(drift, turns);
             let swerve = |body: &BodyState, arm: Vec3| SWERVE * body.w.length_squared() * arm.cross(normal).length();
-            manifold.give_way(drift, turns, |r_a, r_b| {
-                let swerve = swerve(a, r_a) + swerve(b, r_b);
-                let on = (v + next * pull + b.w.cross(r_b) - a.w.cross(r_a)).dot(normal) - then * swerve;
-                substep * on.min(0.0) - 0.5 * then * then * swerve - gap
-            });
+            for (least, point) in least.iter_mut().zip(manifold.points()) {
+                let swerve = swerve(a, point.r_a) + swerve(b, point.r_b);
+                let on = v + next * pull + b.w.cross(point.r_b) - a.w.cross(point.r_a);
+                let on = substep * (on.dot(normal) - then * swerve).min(0.0);
+                *least = least.max(gap - movement(point) - on + 0.5 * then * then * swerve);
+            }
         }
+        least
     }
 }

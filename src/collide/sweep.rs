@@ -9,11 +9,13 @@ use glam::{Quat, Vec3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use parry3d::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
+use parry3d::query::intersection_test;
 use parry3d::shape::{Ball, PolygonalFeatureMap, Shape, SupportMap, Triangle};
 
 use super::collider::{BodyState, ColliderInfo};
 use super::solid::{Magnified, Solid, magnification};
 use crate::math::rotation::{about, product, unit, vector_of};
+use crate::world::placed;
 
 /// Where a body is at a time: its center of mass, and its rotation.
 #[derive(Clone, Copy, Debug)]
@@ -275,6 +277,15 @@ pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: 
         });
     }
     first
+}
+
+/// Whether two shapes overlap at the end of their ways: what is cheaper to ask than when they meet.
+pub(super) fn overlap_at_end(a: Swept, b: Swept) -> bool {
+    let [at, of] = [a, b].map(|side| {
+        let Station { center, rotation } = side.way.at(1.0);
+        placed(Pose::from_parts(center, rotation), side.local)
+    });
+    intersection_test(&at, a.shape, &of, b.shape).is_ok_and(|answer| answer.intersecting)
 }
 
 /// The same for a half-space, whose body stays.
