@@ -4,6 +4,7 @@
 //! from the begin of the step to its end still passes through fixed geometry, the body stays where the two meet, and the next step has their contact.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 use parry3d::bounding_volume::BoundingVolume;
@@ -16,6 +17,7 @@ use super::detector::Detector;
 use super::sensors::{Overlap, Visitors};
 use super::sweep::{Impact, Station, Swept, Until, Way, impact};
 use super::world_contacts::{WorldContacts, box_reaches_plane, key};
+use crate::graph::Islands;
 use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed};
 
@@ -42,7 +44,7 @@ impl Extent {
     fn is_far(self, then: &BodyState, now: &Body) -> bool {
         let shift = now.center_of_mass().distance(then.center);
         let turn = 2.0 * product(now.rotation, then.rotation.inverse()).xyz().length();
-        shift + turn * (self.reach + then.center.distance(then.position)) > FAR * self.thin && then.tied == 0.0
+        shift + turn * (self.reach + then.center.distance(then.position)) > FAR * self.thin
     }
 }
 
@@ -92,7 +94,7 @@ impl Detector {
         let far = self.far_bodies(world, activity);
         let is_dynamic = |&&i: &&u32| world.bodies[i as usize].kind == BodyKind::Dynamic;
         let ends = far.par_iter().filter(is_dynamic).filter_map(|&i| Some((i, self.end(world, i, dt)?)));
-        let ends: Vec<(u32, End)> = ends.collect();
+        let ends = self.hold_joints(world, ends.collect(), dt);
         for (i, End { at: Station { center, rotation }, share, against }) in ends {
             let body = &mut world.bodies[i as usize];
             body.linear_velocity -= body.linear_velocity.dot(against).min(0.0) * against;
@@ -101,6 +103,44 @@ impl Detector {
             body.linear_velocity -= (1.0 - share) * dt * self.moving[i as usize].pull;
         }
         far
+    }
+
+    /// Where bodies are stopped, of which some are: what joints hold together stays together, each body where its way is when the first of them is
+    /// stopped.
+    fn hold_joints(&self, world: &World, mut ends: Vec<(u32, End)>, dt: f32) -> Vec<(u32, End)> {
+        let is_tied = |i: u32| self.moving[i as usize].tied == 1.0;
+        if !ends.iter().any(|&(i, _)| is_tied(i)) {
+            return ends;
+        }
+        let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+        let mut islands = Islands::default();
+        islands.reset(world.bodies.len());
+        for (a, b) in world.joints.iter().filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
+            if is_dynamic(a) && is_dynamic(b) {
+                islands.join(a as u32, b as u32);
+            }
+        }
+        let roots = islands.roots();
+        let mut first: BTreeMap<u32, f32> = BTreeMap::new();
+        for (i, end) in &ends {
+            let share = first.entry(roots[*i as usize]).or_insert(1.0);
+            *share = share.min(end.share);
+        }
+        let mut against: BTreeMap<u32, (f32, Vec3)> = BTreeMap::new();
+        ends.retain(|&(i, end)| {
+            if is_tied(i) {
+                against.insert(i, (end.share, end.against));
+            }
+            !is_tied(i)
+        });
+        let held = (0..).zip(roots).filter(|&(i, _)| is_tied(i) && is_dynamic(i as usize));
+        ends.extend(held.filter_map(|(i, root)| {
+            let share = *first.get(root)?;
+            let own = against.get(&i).filter(|own| own.0 == share);
+            let against = own.map_or(Vec3::ZERO, |own| own.1);
+            Some((i, End { at: self.way_of(world, i, dt).at(share), share, against }))
+        }));
+        ends
     }
 
     /// Where a body is stopped; none where it goes on.
