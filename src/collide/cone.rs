@@ -51,11 +51,9 @@ impl FacetCone {
 impl NormalConstraints for FacetCone {
     fn project_local_normal_mut(&self, d: &mut Vec3) -> bool {
         let is_in_front = d.dot(self.face) >= 0.0;
-        let normal = nearest(&self.directions, *d).unwrap_or(self.face);
-        // Rounding alone chooses among normals that are all across the direction: what it comes from is beside the triangle.
-        let is_near = normal.dot(*d) > ACROSS;
-        *d = normal;
-        is_in_front && is_near
+        // Rounding alone would choose among normals that are all across the direction.
+        *d = nearest(&self.directions, *d).filter(|normal| normal.dot(*d) > ACROSS).unwrap_or(self.face);
+        is_in_front
     }
 }
 
