@@ -6,6 +6,8 @@ use parry3d::shape::TrianglePseudoNormals;
 
 /// How far a direction in a cone may be outside of it by rounding.
 const ROUNDING: f32 = 1e-6;
+/// Cosine of the angle from which on a direction is across a normal.
+const ACROSS: f32 = 1e-3;
 
 /// The unit vector in the cone of some directions that is nearest to `d`; one of them where all are across it, and none without any. The
 /// directions have unit length and are in one half-space.
@@ -49,7 +51,8 @@ impl FacetCone {
 impl NormalConstraints for FacetCone {
     fn project_local_normal_mut(&self, d: &mut Vec3) -> bool {
         let is_in_front = d.dot(self.face) >= 0.0;
-        *d = nearest(&self.directions, *d).unwrap_or(*d);
+        // Rounding alone would choose among normals that are all across the direction.
+        *d = nearest(&self.directions, *d).filter(|normal| normal.dot(*d) > ACROSS).unwrap_or(self.face);
         is_in_front
     }
 }

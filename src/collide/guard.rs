@@ -4,6 +4,7 @@
 //! from the begin of the step to its end still passes through fixed geometry, the body stays where the two meet, and the next step has their contact.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 use parry3d::bounding_volume::BoundingVolume;
@@ -16,6 +17,7 @@ use super::detector::Detector;
 use super::sensors::{Overlap, Visitors};
 use super::sweep::{Impact, Station, Swept, Until, Way, impact};
 use super::world_contacts::{WorldContacts, box_reaches_plane, key};
+use crate::graph::Islands;
 use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed};
 
@@ -42,7 +44,7 @@ impl Extent {
     fn is_far(self, then: &BodyState, now: &Body) -> bool {
         let shift = now.center_of_mass().distance(then.center);
         let turn = 2.0 * product(now.rotation, then.rotation.inverse()).xyz().length();
-        shift + turn * (self.reach + then.center.distance(then.position)) > FAR * self.thin && then.tied == 0.0
+        shift + turn * (self.reach + then.center.distance(then.position)) > FAR * self.thin
     }
 }
 
@@ -55,6 +57,8 @@ struct End {
     /// The normal against which it no longer moves, or zero: that of a surface that it touched when the step began, and that its contact could not keep
     /// it off, because the body turns by much in a step.
     against: Vec3,
+    /// The velocity of that surface (m/s).
+    pace: Vec3,
 }
 
 /// The way that a body took.
@@ -87,20 +91,55 @@ impl Detector {
     }
 
     /// Stops what moved far where its way passes through fixed geometry, after a step of `dt` seconds that left the bodies as they are in `world`; returns
-    /// the bodies that moved far. What is stopped keeps its velocity, less what gravity gave it for the rest of the step.
-    pub fn hold(&mut self, world: &mut World, dt: f32, activity: &[Activity]) -> Vec<u32> {
+    /// the bodies that moved far, and those that joints hold and that were stopped. What is stopped keeps its velocity, less what gravity gave it for the rest of the step.
+    pub fn hold(&mut self, world: &mut World, dt: f32, activity: &[Activity]) -> (Vec<u32>, Vec<usize>) {
         let far = self.far_bodies(world, activity);
         let is_dynamic = |&&i: &&u32| world.bodies[i as usize].kind == BodyKind::Dynamic;
         let ends = far.par_iter().filter(is_dynamic).filter_map(|&i| Some((i, self.end(world, i, dt)?)));
-        let ends: Vec<(u32, End)> = ends.collect();
-        for (i, End { at: Station { center, rotation }, share, against }) in ends {
+        let ends = self.hold_joints(world, ends.collect(), dt);
+        for &(i, End { at: Station { center, rotation }, share, against, pace }) in &ends {
             let body = &mut world.bodies[i as usize];
-            body.linear_velocity -= body.linear_velocity.dot(against).min(0.0) * against;
+            body.linear_velocity -= (body.linear_velocity - pace).dot(against).min(0.0) * against;
+            // As seen from the body, its spin stays, and with it the energy.
+            body.angular_velocity = rotation * (body.rotation.inverse() * body.angular_velocity);
             body.rotation = rotation;
             body.position = center - rotation * body.mass.center;
             body.linear_velocity -= (1.0 - share) * dt * self.moving[i as usize].pull;
         }
-        far
+        let tied = ends.iter().map(|(i, _)| *i as usize).filter(|&i| self.moving[i].tied == 1.0);
+        (far, tied.collect())
+    }
+
+    /// Where bodies are stopped, of which some are: what joints hold together stays together, each body where its way is when the first of them is
+    /// stopped.
+    fn hold_joints(&self, world: &World, mut ends: Vec<(u32, End)>, dt: f32) -> Vec<(u32, End)> {
+        let is_tied = |i: u32| self.moving[i as usize].tied == 1.0;
+        if !ends.iter().any(|&(i, _)| is_tied(i)) {
+            return ends;
+        }
+        let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+        let mut islands = Islands::default();
+        islands.reset(world.bodies.len());
+        for (a, b) in world.joints.iter().filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
+            if is_dynamic(a) && is_dynamic(b) {
+                islands.join(a as u32, b as u32);
+            }
+        }
+        let roots = islands.roots();
+        let mut first: BTreeMap<u32, f32> = BTreeMap::new();
+        for (i, end) in &ends {
+            let share = first.entry(roots[*i as usize]).or_insert(1.0);
+            *share = share.min(end.share);
+        }
+        let own: BTreeMap<u32, End> = ends.iter().copied().collect();
+        ends.retain(|&(i, _)| !is_tied(i));
+        let held = (0..).zip(roots).filter(|&(i, _)| is_tied(i) && is_dynamic(i as usize));
+        ends.extend(held.filter_map(|(i, root)| {
+            let share = *first.get(root)?;
+            let end = || End { at: self.way_of(world, i, dt).at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO };
+            Some((i, own.get(&i).filter(|end| end.share == share).copied().unwrap_or_else(end)))
+        }));
+        ends
     }
 
     /// Where a body is stopped; none where it goes on.
@@ -108,21 +147,21 @@ impl Detector {
         let (then, now) = (&self.moving[i as usize], &world.bodies[i as usize]);
         let mut way = way(then, now, dt);
         let mut end = None;
-        if now.swept
-            && let Some((Impact { time, .. }, other)) = self.first_on(world, i, &way, dt, true)
-        {
+        if let Some((Impact { time, normal, is_deep }, other)) = self.first_on(world, i, &way, dt, true) {
             // It goes on with what it met.
             let Station { center, rotation } = way.at(time);
             let other = self.way_of(world, other, dt);
             let center = center + (1.0 - time) * other.shift;
             way = Way::between(way.begin, Station { center, rotation }, time * way.turn);
-            end = Some(End { at: Station { center, rotation }, share: time, against: Vec3::ZERO });
+            let against = if is_deep { normal } else { Vec3::ZERO };
+            end = Some(End { at: Station { center, rotation }, share: time, against, pace: other.shift / dt });
         }
         match self.first_on(world, i, &way, dt, false) {
             Some((Impact { time, normal, is_deep }, _)) => Some(End {
                 at: way.at(time),
                 share: end.map_or(time, |end| time * end.share),
                 against: if is_deep { normal } else { Vec3::ZERO },
+                pace: Vec3::ZERO,
             }),
             None => end,
         }
@@ -132,7 +171,7 @@ impl Detector {
         way(&self.moving[i as usize], &world.bodies[i as usize], dt)
     }
 
-    /// What a body meets first on its way, and when: what moves, or what is fixed.
+    /// What a body meets first on its way, and when: what moves, or what is fixed. Of what can be pushed only a body that is marked meets any.
     fn first_on(&self, world: &World, i: u32, way: &Way, dt: f32, moves: bool) -> Option<(Impact, u32)> {
         let (known, then) = (self.known[i as usize], &self.moving[i as usize]);
         let part = &self.worlds[known.world as usize];
@@ -143,11 +182,13 @@ impl Detector {
                 let is_fixed = self.is_still(world, other.body);
                 let pair = key(i, other.body);
                 let groups = [i, other.body].map(|body| self.groups[body as usize]);
-                if other.body == i || is_fixed == moves || !groups[0].meets(groups[1]) || self.jointed.contains(&pair) {
+                let is_pushed = self.kinds[other.body as usize] == BodyKind::Dynamic;
+                let is_met = is_fixed != moves && (!is_pushed || world.bodies[i as usize].swept);
+                if other.body == i || !is_met || !groups[0].meets(groups[1]) || self.jointed.contains(&pair) {
                     return;
                 }
                 let others = self.way_of(world, other.body, dt);
-                let until = if moves { Until::Touch } else { Until::Deep };
+                let until = if is_pushed { Until::Touch } else { Until::Deep };
                 let standing = Swept::new(other, &self.moving[other.body as usize], &others);
                 let found = impact(standing, own, c.size, until, true);
                 // What gets too deep stays where the surfaces meet. A way may be a little inside where a body turns off a surface within the step.

@@ -10,6 +10,7 @@ use super::flush::Neighbors;
 use super::manifold::Manifold;
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
+use super::path::Going;
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
 use crate::lanes::{InstructionSet, WIDTH, Wide};
 use crate::panics::blaming;
@@ -44,8 +45,8 @@ struct Scratch {
     events: Vec<Event>,
     cuboid_pairs: Vec<CuboidPair>,
     cuboids: CuboidScratch,
-    /// The events whose bodies go far, with the manifolds that their pairs had.
-    far: Vec<(u32, Vec<Manifold>)>,
+    /// The events whose contacts are held against the ways of their bodies, with the manifolds that the pairs had of those that go far.
+    going: Vec<(u32, Going, Vec<Manifold>)>,
 }
 
 /// A pair that the test found not to stay as it is.
@@ -64,14 +65,14 @@ impl Narrow<'_> {
 
     fn update_with(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
         let PairChunk { first, pairs, tracks } = chunk;
-        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids, far } = scratch;
+        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids, going } = scratch;
         let set = InstructionSet::default();
         tests.clear();
         let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results: Mutex::new(tests) };
         set.run(&test, 0..tracks.len().div_ceil(WIDTH));
         events.clear();
         cuboid_pairs.clear();
-        far.clear();
+        going.clear();
         for (group, tested) in tests.iter().enumerate() {
             if tested.verdict == Wide([REUSED; WIDTH]) && tested.changes == Wide::default() {
                 continue;
@@ -93,8 +94,9 @@ impl Narrow<'_> {
                     let prediction = tested.prediction.0[lane];
                     track.then = bodies.map(Placed::of);
                     track.predicted = prediction;
-                    if self.goes_far(track) {
-                        far.push((events.len() as u32, pair.manifolds.clone()));
+                    if let Some(goes) = self.going(track) {
+                        let before = if goes.is_far() { pair.manifolds.clone() } else { Vec::new() };
+                        going.push((events.len() as u32, goes, before));
                     }
                     let places = [pair.collider_a, pair.collider_b];
                     if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
@@ -118,12 +120,13 @@ impl Narrow<'_> {
             event.update =
                 Some(pair.take_over(self.sides(pair), prediction, write, Some(&self.neighbors), pair_scratch));
         });
-        for (number, before) in far.drain(..) {
+        for (number, goes, before) in going.drain(..) {
             let event = &mut events[number as usize];
             let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
             let update = event.update.unwrap_or_else(|| pair.part());
             let bodies = [pair.body_a, pair.body_b];
-            let far = blaming(bodies, || self.follow_ways(pair, track, before, (&mut *pair_scratch, &mut *cuboids)));
+            let scratch = (&mut *pair_scratch, &mut *cuboids);
+            let far = blaming(bodies, || self.follow_ways(pair, track, (goes, before), scratch));
             event.update = Some(far.unwrap_or(update));
         }
         let finish = |event: &Event| {

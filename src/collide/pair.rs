@@ -125,18 +125,6 @@ impl Pair {
         self.manifolds.iter_mut().for_each(Manifold::end);
     }
 
-    /// Ends the manifolds that `ends` names; whether those are any.
-    pub(super) fn end_some(&mut self, ends: impl Fn(&Manifold) -> bool) -> bool {
-        let before = self.manifolds.len();
-        self.manifolds.retain(|manifold| manifold.slot != NO_SLOT || !ends(manifold));
-        let mut any = self.manifolds.len() < before;
-        for manifold in self.manifolds.iter_mut().filter(|manifold| ends(manifold)) {
-            manifold.end();
-            any = true;
-        }
-        any
-    }
-
     /// Ends all manifolds of two colliders that do not touch.
     pub(super) fn part(&mut self) -> Update {
         if self.manifolds.is_empty() {

@@ -7,86 +7,112 @@ use glam::Vec3;
 
 use super::collider::{BodyState, FARTHEST};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
-use super::manifold::Manifold;
+use super::manifold::{MAX_POINTS, Manifold};
 use super::narrow::Narrow;
 use super::pair::{Pair, PairScratch, Update};
 use super::pairs::Track;
-use super::sweep::{Station, Swept, Until, Way, impact};
+use super::sweep::{Station, Swept, Until, Way, impact, overlap_at_end};
 use crate::lanes::InstructionSet;
 
-/// How far bodies approach in a step before their contact is held against their ways, relative to the smallest half extent of the thinner shape.
-const SHORT: f32 = 0.1;
-/// How far before the contact is that of the time at which they meet, relative to the same.
+/// How far bodies approach in a step before their contact is that of the time at which they meet, relative to the smallest half extent of the
+/// thinner shape.
 const FAR: f32 = 0.5;
-/// The turn up to which a plane is seen as far ahead as a body gets (rad).
+/// The turn up to which a half-space is seen as far ahead as a body gets (rad).
 const MOST_TURN: f32 = 0.5;
-/// The gap up to which surfaces touch, relative to the smallest half extent of the thinner shape.
+/// How fast the spin of a body that nothing touches may change, over the square of the spin: the moments of inertia about two axes differ by no more than
+/// the third, so that none of the three equations of Euler has a factor above 1.
+const SWERVE: f32 = 0.58;
+/// The gap up to which surfaces touch, relative to the same.
 const TOUCHING: f32 = 2e-3;
 
 /// The distance up to which a pair was predicted that its next step computes anew in any case.
 pub(super) const ANEW: f32 = 0.0;
 
+/// How a pair goes on in the step.
+#[derive(Clone, Copy)]
+pub(super) struct Going {
+    /// How far its bodies may approach (m).
+    approach: f32,
+    size: f32,
+}
+
+impl Going {
+    /// Whether the bodies may get so far that the contact is that of the time at which they meet.
+    pub fn is_far(self) -> bool {
+        self.approach > FAR * self.size
+    }
+
+    /// Whether contacts are sought as far as the bodies approach.
+    fn is_seen(self) -> bool {
+        self.approach <= 2.0 * self.size
+    }
+}
+
 impl Narrow<'_> {
-    /// How far the bodies of a pair may approach in the step (m), and how far they turn (rad).
-    fn approach(&self, track: &Track) -> (f32, f32) {
+    /// How a pair goes on whose contacts may act though its bodies do not touch: those have to be held against the ways of the bodies.
+    pub(super) fn going(&self, track: &Track) -> Option<Going> {
         let [a, b] = track.bodies.map(|body| &self.moving[body as usize]);
-        let dt = self.margins.dt;
+        let (dt, size) = (self.margins.dt, track.size);
         let shift = (b.v - a.v) + 0.5 * dt * (b.pull - a.pull);
-        (dt * (shift.length() + track.reach_b * (b.w - a.w).length()), dt * (a.w.length() + b.w.length()))
+        let approach = dt * (shift.length() + track.reach_b * (b.w - a.w).length());
+        let turn = dt * (a.w.length() + b.w.length());
+        let goes = approach > TOUCHING * size && approach < FARTHEST && (track.unbounded == 0.0 || turn > 0.0);
+        // A half-space is where its contact is, however far off.
+        let is_near = track.unbounded != 0.0 && turn <= MOST_TURN;
+        goes.then_some(Going { approach: if is_near { 0.0 } else { approach }, size })
     }
 
-    /// Whether a pair that is computed has to be held against the ways of its bodies.
-    pub(super) fn goes_far(&self, track: &Track) -> bool {
-        let (approach, turn) = self.approach(track);
-        let is_tied = track.bodies.iter().any(|&body| self.moving[body as usize].tied == 1.0);
-        !is_tied
-            && approach > FAR * track.size
-            && approach > SHORT * track.size
-            && approach < FARTHEST
-            && (track.unbounded == 0.0 || turn > MOST_TURN)
-    }
-
-    /// Brings the contacts of a pair that goes far to where its bodies meet; `before` are those that it had before it was computed. None if they stay as
-    /// they were computed.
+    /// Brings the contacts of a pair to the ways of its bodies. Where the bodies meet far off, the contact is that of there; `before` are those that the
+    /// pair had before it was computed. Where they do not meet, no contact acts. None if the contacts stay about as they were computed.
     pub(super) fn follow_ways(
         &self,
         pair: &mut Pair,
         track: &mut Track,
-        before: Vec<Manifold>,
+        (going, before): (Going, Vec<Manifold>),
         (scratch, cuboids): (&mut PairScratch, &mut CuboidScratch),
     ) -> Option<Update> {
-        let (approach, turn) = self.approach(track);
-        let going_on = || pair.manifolds.iter().filter(|manifold| !manifold.has_ended());
-        if going_on().flat_map(|manifold| manifold.points()).any(|point| point.separation <= TOUCHING * pair.size) {
+        let size = pair.size;
+        let points = || pair.manifolds.iter().flat_map(|manifold| manifold.points());
+        if points().any(|point| point.separation <= TOUCHING * size) {
             return None;
         }
         let bodies = track.bodies.map(|body| &self.moving[body as usize]);
-        let size = pair.size;
-        let acts =
-            |manifold: &Manifold| !manifold.has_ended() && (turn > MOST_TURN || self.acts(manifold, size, bodies));
-        let is_seen = approach <= 2.0 * pair.size;
-        // Joints, and others in a heap, hold a body off its free way.
-        let is_tied =
-            bodies.into_iter().any(|body| body.tied == 1.0) || bodies.into_iter().all(|body| body.gravity_scale > 0.0);
-        if is_seen && (is_tied || !going_on().any(acts)) {
+        let within = |time: f32| pair.manifolds.iter().any(|manifold| self.may_act(manifold, bodies, time));
+        let step = self.margins.dt + self.margins.substep;
+        if going.is_seen() && !within(step) {
+            // A contact that is reused is held against no ways.
+            let reused = self.margins.recycle * size / going.approach;
+            if within(step + self.margins.dt * reused) {
+                track.predicted = ANEW;
+            }
             return None;
         }
         // The last substep leaves velocities that the next one may go on with.
-        let ways = bodies.map(|body| Way::free(body, self.margins.dt + self.margins.substep));
+        let ways = bodies.map(|body| Way::free(body, step));
         let [a, b] = [(0, pair.collider_a), (1, pair.collider_b)]
             .map(|(side, c)| Swept::new(&self.colliders[c as usize], bodies[side], &ways[side]));
-        let prediction = track.predicted;
-        let Some(met) = impact(a, b, pair.size, Until::Meet, true) else {
-            track.predicted = ANEW;
-            return pair.end_some(acts).then_some(Update::Reshaped);
+        let free = |manifold: &Manifold| self.free_separations(manifold, bodies, TOUCHING * size);
+        let acts = |manifold: &Manifold| {
+            manifold.points().iter().zip(free(manifold)).any(|(point, least)| point.separation < least)
         };
-        if is_seen && (approach <= FAR * pair.size || self.is_held_up(pair, &ways, met.time)) {
+        if going.is_seen() && (!pair.manifolds.iter().any(acts) || !going.is_far() && overlap_at_end(a, b)) {
             return None;
         }
-        if !is_seen && self.is_held_up(pair, &ways, met.time) {
-            track.predicted = ANEW;
-            return pair.end_some(acts).then_some(Update::Reshaped);
-        }
+        let met = impact(a, b, size, Until::Meet, true);
+        // Joints, and others in a heap, hold a body off its free way.
+        let is_led =
+            || bodies.iter().any(|body| body.tied == 1.0) || bodies.iter().all(|body| body.gravity_scale > 0.0);
+        let stays = |time: f32| going.is_seen() && (!going.is_far() || is_led() || self.is_held_up(pair, &ways, time));
+        let met = match met {
+            Some(met) if stays(met.time) => return None,
+            Some(met) if going.is_seen() || !self.is_held_up(pair, &ways, met.time) => met,
+            _ => {
+                track.predicted = ANEW;
+                pair.manifolds.iter_mut().for_each(|manifold| manifold.give_way(free(manifold)));
+                return None;
+            }
+        };
+        let prediction = track.predicted;
         track.predicted = ANEW;
         let moved = |side: usize| {
             let (body, Station { center, rotation }) = (bodies[side], ways[side].at(met.time));
@@ -153,18 +179,37 @@ impl Narrow<'_> {
         is_earlier(0) || is_earlier(1)
     }
 
-    /// Whether the bodies would cross the plane of a contact within the step or the substep after it, and go on beside the plane so far that the surfaces may
-    /// be elsewhere by then.
-    fn acts(&self, manifold: &Manifold, size: f32, [a, b]: [&BodyState; 2]) -> bool {
-        let dt = self.margins.dt + self.margins.substep;
-        let shift = |body: &BodyState, arm: Vec3| dt * (body.v + 0.5 * dt * body.pull + body.w.cross(arm));
-        // A surface that turns about the middle of a body goes nowhere.
-        let go = shift(b, Vec3::ZERO) - shift(a, Vec3::ZERO);
-        let beside = (go - go.dot(manifold.normal) * manifold.normal).length() > SHORT * size;
+    /// Whether the bodies may cross the plane of a contact within a time.
+    fn may_act(&self, manifold: &Manifold, [a, b]: [&BodyState; 2], time: f32) -> bool {
+        let shift = |body: &BodyState, arm: Vec3| time * (body.v + 0.5 * time * body.pull + body.w.cross(arm));
+        // An arm that turns goes straight but for a half of this, and about an axis that stays but for less than the other.
+        let bend = |body: &BodyState, arm: Vec3| time * time * body.w.length_squared() * arm.length();
         manifold.points().iter().any(|point| {
-            let shift = shift(b, point.r_b) - shift(a, point.r_a);
-            let along = shift.dot(manifold.normal);
-            point.separation + along < 0.0 && beside
+            let along = (shift(b, point.r_b) - shift(a, point.r_a)).dot(manifold.normal);
+            point.separation + along < bend(a, point.r_a) + bend(b, point.r_b)
         })
+    }
+
+    /// The least separations of the points of a contact with which it does not act where its bodies go on freely, and come no nearer than `gap`.
+    fn free_separations(&self, manifold: &Manifold, [a, b]: [&BodyState; 2], gap: f32) -> [f32; MAX_POINTS] {
+        let substep = self.margins.substep;
+        let count = (self.margins.dt / substep).round() as u32;
+        let (v, pull, normal) = (b.v - a.v, b.pull - a.pull, manifold.normal);
+        let mut least = [f32::NEG_INFINITY; MAX_POINTS];
+        // The velocities that the last substep leaves are held against the next one.
+        for k in 0..=count {
+            let (then, next) = (k as f32 * substep, (k + 1) as f32 * substep);
+            let drift = then * (v + 0.5 * next * pull);
+            let turns = [a, b].map(|body| Way::free(body, then).turned(1.0));
+            let movement = manifold.movement(drift, turns);
+            let swerve = |body: &BodyState, arm: Vec3| SWERVE * body.w.length_squared() * arm.cross(normal).length();
+            for (least, point) in least.iter_mut().zip(manifold.points()) {
+                let swerve = swerve(a, point.r_a) + swerve(b, point.r_b);
+                let on = v + next * pull + b.w.cross(point.r_b) - a.w.cross(point.r_a);
+                let on = substep * (on.dot(normal) - then * swerve).min(0.0);
+                *least = least.max(gap - movement(point) - on + 0.5 * then * then * swerve);
+            }
+        }
+        least
     }
 }

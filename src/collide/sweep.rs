@@ -9,11 +9,13 @@ use glam::{Quat, Vec3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use parry3d::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
+use parry3d::query::intersection_test;
 use parry3d::shape::{Ball, PolygonalFeatureMap, Shape, SupportMap, Triangle};
 
 use super::collider::{BodyState, ColliderInfo};
 use super::solid::{Magnified, Solid, magnification};
 use crate::math::rotation::{about, product, unit, vector_of};
+use crate::world::placed;
 
 /// Where a body is at a time: its center of mass, and its rotation.
 #[derive(Clone, Copy, Debug)]
@@ -187,8 +189,6 @@ const DEEPER: f32 = 0.002;
 const STUCK: f32 = 0.35;
 /// How deep something may be and still be held, relative to the same.
 const DEEPEST: f32 = 0.9;
-/// How far a step to a root goes.
-const BEFORE: f32 = 1.0 - 1e-4;
 /// Most pieces of a way.
 const PIECES: usize = 256;
 
@@ -279,6 +279,15 @@ pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: 
     first
 }
 
+/// Whether two shapes overlap at the end of their ways: what is cheaper to ask than when they meet.
+pub(super) fn overlap_at_end(a: Swept, b: Swept) -> bool {
+    let [at, of] = [a, b].map(|side| {
+        let Station { center, rotation } = side.way.at(1.0);
+        placed(Pose::from_parts(center, rotation), side.local)
+    });
+    intersection_test(&at, a.shape, &of, b.shape).is_ok_and(|answer| answer.intersecting)
+}
+
 /// The same for a half-space, whose body stays.
 fn with_plane(plane: &Swept, normal: Vec3, b: &Mover, size: f32, until: Until) -> Option<Impact> {
     let point = plane.way.begin.center + plane.way.begin.rotation * plane.local.translation;
@@ -339,7 +348,7 @@ impl Search<'_> {
             let stood = [a.at(pieces.time), b.at(pieces.time)];
             let apart = stood[1].center - stood[0].center;
             let near = NEAR * size + rounding(b.way, apart) + rounding(a.way, apart);
-            let normal = self.direction(&stood, known, pieces.least.map_or(2.0 * near, |least| least + near));
+            let normal = self.direction(&stood, known, pieces.least.map_or(2.0 * near, |least| least + 2.0 * near));
             let bound = |time: f32| {
                 let d_a = normal + time * normal.cross(a.way.turn);
                 let d_b = normal + time * normal.cross(b.way.turn);
@@ -483,16 +492,16 @@ impl Pieces {
         }
         // The chord of a concave function lies below it; a little before its root, rounding does not matter.
         for _ in 0..4 {
-            let next = time + (late - time) * (BEFORE * above / (above - below));
+            if above < 0.5 * near {
+                break;
+            }
+            let next = time + (late - time) * ((above - 0.25 * near) / (above - below));
             let value = bound(next) - least;
             if value < 0.0 {
                 (late, below) = (next, value);
                 continue;
             }
             (time, above) = (next, value);
-            if above < 0.5 * near {
-                break;
-            }
             // Behind the root, but nearer.
             let other = 0.5 * (time + late);
             let value = bound(other) - least;

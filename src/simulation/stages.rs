@@ -404,7 +404,9 @@ impl Stages {
         let Self { energy, effort, key, problem, .. } = self;
         let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
-        let far = self.detector.hold(world, dt, self.sleep.activity());
+        let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
+        // Where joints stand is where they were within the step: what their springs held at its end is not there.
+        self.energy.follow_bodies(world, &stopped);
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
         if self.detector.has_sensors() || !self.events.inside().is_empty() {

@@ -1,7 +1,7 @@
 //! Nothing passes through fixed geometry, and nothing touches from afar.
 
 use drystone::stages::random::SplitMix64;
-use drystone::{Body, BodyHandle, Event, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Event, Joint, Reference, Shape, Simulation, SolverConfig, World};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
@@ -106,12 +106,9 @@ fn hills() -> Shape {
     Shape::height_field(&rows, Vec3::new(4.0 * HALF, 1.0, 4.0 * HALF)).expect("hills")
 }
 
-/// Where a body that was shot is in the end, if it is where it must not be.
-fn shoot(number: u64, meshes: &[Shape; 3]) -> Option<String> {
-    let mut random = Random(SplitMix64::new(number));
-    let room = ROOMS[(number % 6) as usize];
-    let mut world = if random.unit() < 0.3 { weightless() } else { World::new() };
-    let thick = if room == Room::Sheets { 0.001 } else { random.scale(0.05, 1.0) };
+/// A world with a room whose walls are so thick (m), if they are boxes.
+fn room(room: Room, thick: f32, meshes: &[Shape; 3]) -> World {
+    let mut world = World::new();
     for inward in SIDES {
         let [x, y, z] = (-HALF * inward).to_array();
         match room {
@@ -130,31 +127,46 @@ fn shoot(number: u64, meshes: &[Shape; 3]) -> Option<String> {
             Room::Mesh | Room::FineMesh => continue,
         };
     }
+    world
+}
+
+/// Whether a place is outside of a room.
+fn is_outside(room: Room, center: Vec3) -> bool {
+    let is_below = room == Room::HeightField && center.y < height(center.x, center.z) - 0.1;
+    center.abs().max_element() > HALF || is_below
+}
+
+/// Where a body that was shot is in the end, if it is where it must not be.
+fn shoot(number: u64, meshes: &[Shape; 3]) -> Option<String> {
+    let mut random = Random(SplitMix64::new(number));
+    let kind = ROOMS[(number % 6) as usize];
+    let gravity = if random.unit() < 0.3 { Vec3::ZERO } else { World::new().gravity };
+    let thick = if kind == Room::Sheets { 0.001 } else { random.scale(0.05, 1.0) };
+    let mut world = World { gravity, ..room(kind, thick, meshes) };
     let shape = random.shape();
     let (thin, radius) = (shape.smallest_half_extent(), shape.bounding_radius());
     let space = HALF - 0.1 - radius;
     let [x, y, z] = (space * random.vector()).to_array();
-    let y = if room == Room::HeightField { 0.5 + radius + 2.0 * random.unit() } else { y };
+    let y = if kind == Room::HeightField { 0.5 + radius + 2.0 * random.unit() } else { y };
     let rotation = Quat::from_xyzw(random.both(), random.both(), random.both(), random.both()).normalize();
     let (speed, spin) = (random.scale(1.0, 1000.0), random.scale(0.1, 100.0));
     let restitution = (1.9 * random.unit() - 0.95).max(0.0);
     let shot = Body::dynamic().shape(shape).position(x, y, z).rotation(rotation).friction(random.unit());
     let shot = shot.velocity(speed * random.direction(), spin * random.direction()).restitution(restitution);
-    let what = format!("shot {number} at {speed} m/s and {spin} rad/s in a room of {room:?}, {:?}", shot.colliders[0]);
+    let what = format!("shot {number} at {speed} m/s and {spin} rad/s in a room of {kind:?}, {:?}", shot.colliders[0]);
     let shot = world.insert(shot);
     let mut simulation = simulation(world);
     for step in 0..60 {
         simulation.step(DT).expect("a step");
         let center = body(&simulation, shot).center_of_mass();
-        let is_below = room == Room::HeightField && center.y < height(center.x, center.z) - 0.1;
-        if center.abs().max_element() > HALF || is_below {
+        if is_outside(kind, center) {
             return Some(format!("{what}: is at {center} after step {step}"));
         }
     }
     let shot = body(&simulation, shot);
     let (low, high) = shot.colliders[0].bounds(shot.position, shot.rotation);
     let beyond = (high - HALF).max(-HALF - low);
-    let beyond = if room == Room::HeightField { beyond.with_y(high.y - HALF) } else { beyond };
+    let beyond = if kind == Room::HeightField { beyond.with_y(high.y - HALF) } else { beyond };
     let deep = beyond.max_element() > 0.5 * thin;
     deep.then(|| format!("{what}: ends {beyond} deep in the walls, {thin} m thin"))
 }
@@ -175,6 +187,165 @@ fn of_2000_shots_at_up_to_1000_meters_a_second_none_leaves_its_room() {
 #[ignore = "takes minutes: cargo test --test cpu of_100000 -- --ignored"]
 fn of_100000_shots_none_leaves_its_room() {
     no_shot_passes(1_000_000..1_100_000);
+}
+
+impl Random {
+    fn rotation(&mut self) -> Quat {
+        Quat::from_xyzw(self.both(), self.both(), self.both(), self.both()).normalize()
+    }
+
+    /// A body of one to three shapes.
+    fn compound(&mut self) -> Body {
+        let count = 1 + (2.9 * self.unit()) as usize;
+        let body = (0..count).fold(Body::dynamic(), |body, _| {
+            let (shape, at) = (self.shape(), 0.3 * self.vector());
+            body.shape_at(shape, at, self.rotation())
+        });
+        body.friction(self.unit()).restitution((1.9 * self.unit() - 0.95).max(0.0))
+    }
+}
+
+/// Two to six bodies at once, of one to three shapes each, some tied to the one before, in a room through whose middle a slab is driven.
+fn crowd(number: u64, meshes: &[Shape; 3]) -> Option<String> {
+    let mut random = Random(SplitMix64::new(number));
+    let kind = ROOMS[(number % 6) as usize];
+    let gravity = if random.unit() < 0.3 { Vec3::ZERO } else { World::new().gravity };
+    let thick = if kind == Room::Sheets { 0.001 } else { random.scale(0.05, 1.0) };
+    let mut world = World { gravity, ..room(kind, thick, meshes) };
+    let slab = world.insert(Body::kinematic().shape(Shape::cuboid(0.1, 1.0, 1.0)).position(0.0, 2.0, 0.0));
+    let pace = random.scale(0.5, 20.0);
+    let mut shots: Vec<BodyHandle> = Vec::new();
+    for _ in 0..2 + (4.9 * random.unit()) as usize {
+        let [x, y, z] = (2.5 * random.vector()).to_array();
+        let (x, y) = (x + 1.2 * x.signum(), if kind == Room::HeightField { 1.8 + y.abs() } else { y });
+        let (speed, spin) = (random.scale(1.0, 1000.0), random.scale(0.1, 100.0));
+        let shot = random.compound().position(x, y, z).rotation(random.rotation());
+        let shot = world.insert(shot.velocity(speed * random.direction(), spin * random.direction()));
+        if let Some(&before) = shots.last().filter(|_| random.unit() < 0.3) {
+            let [a, b] = [before, shot].map(|body| world.body(body).expect("a body"));
+            let middle = a.position.midpoint(b.position);
+            let anchors = [a, b].map(|body| body.rotation.inverse() * (middle - body.position));
+            world.join(Joint::new(before, anchors[0], shot, anchors[1]));
+        }
+        shots.push(shot);
+    }
+    let mut simulation = simulation(world);
+    for step in 0..60 {
+        let way = if step % 20 < 10 { pace } else { -pace };
+        simulation.world.body_mut(slab).expect("a slab").linear_velocity = way.min(6.0) * Vec3::X;
+        simulation.step(DT).expect("a step");
+        for (k, &shot) in shots.iter().enumerate() {
+            let center = body(&simulation, shot).center_of_mass();
+            if is_outside(kind, center) {
+                let all = shots.iter().map(|&shot| body(&simulation, shot)).collect::<Vec<_>>();
+                let tied = simulation.world.joints.iter().count();
+                return Some(format!(
+                    "crowd {number}, {kind:?}: {k} of {}, {tied} tied, is at {center} after step {step}",
+                    all.len()
+                ));
+            }
+        }
+    }
+    None
+}
+
+fn none_leaves_its_crowd(numbers: std::ops::Range<u64>) {
+    let meshes = [room_of_triangles(1), room_of_triangles(12), hills()];
+    let count = numbers.end - numbers.start;
+    let passed: Vec<String> = numbers.into_par_iter().filter_map(|number| crowd(number, &meshes)).collect();
+    assert!(passed.is_empty(), "{} of {count} crowds:\n{}", passed.len(), passed.join("\n"));
+}
+
+#[test]
+fn of_500_crowds_of_compounds_and_joints_beside_a_slab_that_is_driven_none_leaves_its_room() {
+    none_leaves_its_crowd(0..500);
+}
+
+#[test]
+#[ignore = "takes minutes: cargo test --test cpu of_20000_crowds -- --ignored"]
+fn of_20000_crowds_none_leaves_its_room() {
+    none_leaves_its_crowd(5_000_000..5_020_000);
+}
+
+/// A wall that is driven at up to 10 m/s either way, and what flies against it.
+#[test]
+fn nothing_passes_a_wall_that_is_driven() {
+    let passes = |number: u64| {
+        let mut random = Random(SplitMix64::new(number));
+        let mut world = weightless();
+        let pace = 10.0 * random.both();
+        let wall = Body::kinematic().shape(Shape::cuboid(0.05, 50.0, 50.0)).velocity(pace * Vec3::X, Vec3::ZERO);
+        let wall = world.insert(wall);
+        let aside = 0.3 * random.vector();
+        let (speed, spin) = (random.scale(30.0, 1000.0), random.scale(0.1, 100.0));
+        let shot = random.compound().position(-3.0, 0.0, 0.0).rotation(random.rotation());
+        let shot = world.insert(shot.velocity(speed * (Vec3::X + aside).normalize(), spin * random.direction()));
+        let mut simulation = simulation(world);
+        for step in 0..20 {
+            simulation.step(DT).expect("a step");
+            let [shot, wall] = [shot, wall].map(|of| body(&simulation, of));
+            let (at, x) = (shot.center_of_mass(), wall.position.x);
+            if at.x > x && at.y.abs().max(at.z.abs()) < 49.0 {
+                return Some(format!(
+                    "shot {number} at {speed} m/s, wall at {pace} m/s: {at} in step {step}, wall at {x}"
+                ));
+            }
+        }
+        None
+    };
+    let passed: Vec<String> = (0..300).into_par_iter().filter_map(passes).collect();
+    assert!(passed.is_empty(), "{} of 300:\n{}", passed.len(), passed.join("\n"));
+}
+
+/// Bodies in a row, each tied to the one before, that fly at a wall: links of a chain, or the limbs of a puppet.
+#[test]
+fn what_joints_hold_together_passes_through_no_wall_and_gains_no_energy() {
+    let mesh = {
+        let corners = [(-60.0, -60.0), (60.0, -60.0), (60.0, 60.0), (-60.0, 60.0)].map(|(y, z)| Vec3::new(0.0, y, z));
+        Shape::mesh(corners.into(), vec![[0, 2, 1], [0, 3, 2]]).expect("a square")
+    };
+    let slab = |half: f32| Body::fixed().shape(Shape::cuboid(half, 60.0, 60.0)).position(half, 0.0, 0.0);
+    let plane = || Body::fixed().shape(Shape::half_space(Vec3::NEG_X));
+    let walls = [plane(), slab(0.5), slab(0.0005), Body::fixed().shape(mesh)];
+    for (wall, speed) in walls.iter().flat_map(|wall| [30.0, 100.0, 300.0].map(|speed| (wall, speed))) {
+        for number in 0..12 {
+            let mut random = Random(SplitMix64::new(number));
+            let mut world = if number % 2 == 0 { weightless() } else { World::new() };
+            world.add(wall.clone());
+            let (turn, spin) = (random.rotation(), 5.0 * random.vector());
+            let velocity = speed * (Vec3::X + 0.5 * random.vector()).normalize();
+            let links: Vec<BodyHandle> = (0..8)
+                .map(|k| {
+                    let arm = turn * (0.24 * k as f32 * Vec3::Y);
+                    let [x, y, z] = (arm - 6.0 * Vec3::X).to_array();
+                    let shape = if k == 3 { Shape::cuboid(0.15, 0.08, 0.1) } else { Shape::capsule(0.08, 0.03) };
+                    let link = Body::dynamic().shape(shape).position(x, y, z).rotation(turn);
+                    world.insert(link.velocity(velocity + spin.cross(arm), spin))
+                })
+                .collect();
+            for pair in links.windows(2) {
+                world.join(Joint::new(pair[0], 0.12 * Vec3::Y, pair[1], -0.12 * Vec3::Y));
+            }
+            let mut simulation = simulation(world);
+            let energy = |simulation: &Simulation| {
+                let gravity = f64::from(simulation.world.gravity.length());
+                let of = |link: &Body| link.kinetic_energy() + gravity * f64::from(link.mass.mass * link.position.y);
+                links.iter().map(|&link| of(body(simulation, link))).sum::<f64>()
+            };
+            let begin = energy(&simulation);
+            for step in 0..60 {
+                simulation.step(DT).expect("a step");
+                let what = format!("chain {number} at {speed} m/s on {:?}, step {step}", wall.colliders[0].shape);
+                for &link in &links {
+                    let at = body(&simulation, link).position;
+                    assert!(at.x < 0.0 || at.y.abs().max(at.z.abs()) > 59.0, "{what}: {at}");
+                }
+                assert!(energy(&simulation) < 1.01 * begin, "{what}: {} J of {begin}", energy(&simulation));
+            }
+            // A tenth of a link: those at the ends still whirl.
+            assert!(simulation.world.joint_gap() < 0.024, "chain {number}: {} m apart", simulation.world.joint_gap());
+        }
+    }
 }
 
 #[test]
@@ -301,6 +472,60 @@ fn what_passes_without_touching_keeps_its_velocity() {
                 let from = Vec3::new(1.5 + gap, -4.0 - 0.13 * k as f32 * speed * DT, 0.0);
                 let worst = deflection(&cube(), from, Vec3::Y * speed, Vec3::Z * 50.0, 9.0);
                 assert!(worst < 1e-3, "at {speed} m/s, {gap} m beside the cube: {worst}");
+            }
+        }
+    }
+}
+
+/// Balls, boxes and capsules, still and spinning, at all speeds, beside what is fixed, driven or can be pushed.
+#[test]
+fn what_passes_close_by_keeps_its_velocity() {
+    let cube = Shape::cuboid(1.0, 1.0, 1.0);
+    let corner = |i: u32| {
+        Vec3::new([-1.0, 1.0][(i & 1) as usize], [-1.0, 1.0][(i >> 1 & 1) as usize], [-1.0, 1.0][(i >> 2) as usize])
+    };
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let mesh = Shape::mesh((0..8).map(corner).collect(), triangles).expect("a cube");
+    let plane = Body::fixed().shape(Shape::half_space(Vec3::X)).position(1.0, 0.0, 0.0);
+    let of = |body: Body| body.shape(cube.clone());
+    let others = [of(Body::fixed()), Body::fixed().shape(mesh), of(Body::dynamic()), of(Body::kinematic()), plane];
+    let aslant = Quat::from_rotation_z(std::f32::consts::FRAC_PI_4);
+    let brick = Shape::cuboid(0.5, 0.5, 0.5);
+    let diagonal = 0.5 * std::f32::consts::SQRT_2;
+    let travelers = [
+        (Shape::ball(0.5), 0.5, Quat::IDENTITY, Vec3::ZERO),
+        (brick.clone(), 0.5, Quat::IDENTITY, Vec3::ZERO),
+        (brick.clone(), diagonal, aslant, Vec3::ZERO),
+        (brick.clone(), diagonal, aslant, 6.0 * Vec3::Z),
+        (brick, diagonal, aslant, 40.0 * Vec3::Z),
+        (Shape::capsule(0.3, 0.2), 0.5, Quat::from_rotation_x(0.7), 20.0 * Vec3::Z),
+        (Shape::cuboid(0.1, 0.1, 0.1), 0.1 * 3.0_f32.sqrt(), aslant, Vec3::new(7.0, 3.0, -5.0)),
+    ];
+    for (other, (shape, reach, rotation, spin)) in
+        others.iter().flat_map(|other| travelers.iter().map(move |t| (other, t)))
+    {
+        for (speed, gap) in
+            [2.0, 5.0, 20.0, 60.0_f32].into_iter().flat_map(|speed| [0.005, 0.05].map(|gap| (speed, gap)))
+        {
+            for k in 0..4 {
+                let mut world = weightless();
+                let other = world.insert(other.clone());
+                let from = -3.0 - 0.26 * k as f32 * speed * DT;
+                let traveler =
+                    Body::dynamic().shape(shape.clone()).rotation(*rotation).position(1.0 + reach + gap, from, 0.1);
+                let traveler = world.insert(traveler.velocity(Vec3::Y * speed, *spin));
+                let mut simulation = simulation(world);
+                for _ in 0..(6.0 / (speed * DT)) as usize + 1 {
+                    simulation.step(DT).expect("a step");
+                }
+                let [other, traveler] = [other, traveler].map(|of| body(&simulation, of));
+                let lost = (traveler.linear_velocity - Vec3::Y * speed).length().max(other.linear_velocity.length());
+                assert!(
+                    lost < 1e-3 * speed,
+                    "{shape:?} at {speed} m/s, {spin} rad/s, {gap} m beside {:?}: {lost}",
+                    other.colliders[0].shape
+                );
             }
         }
     }
