@@ -40,6 +40,15 @@ pub fn drive_count(joint: &Joint) -> usize {
     kinds(joint).filter(|(_, is_drive)| *is_drive).count()
 }
 
+/// The most force of the drives of a joint (N), where what turns pushes at the lever `arm` (m).
+pub(super) fn driving_force(joint: &Joint, arm: f32) -> f32 {
+    let load = |(i, axis): (usize, &Axis)| {
+        let (Drive::Motor { max_load, .. } | Drive::Spring { max_load, .. }) = axis.drive else { return 0.0 };
+        if (3..6).contains(&i) { max_load / arm } else { max_load }
+    };
+    axes_of(joint).map(load).sum()
+}
+
 /// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks to turn about, which give a
 /// lever its stiffness, before those to shift along.
 pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {

@@ -204,11 +204,21 @@ impl ContactRows {
         &'a self,
         world: &'a World,
         detector: &'a Detector,
+        config: &'a SolverConfig,
+        dt: f32,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
+        let substep = Substep::new(config, dt / config.substeps as f32);
+        let inverse_mass = |body: u32| (body != IMMOVABLE).then(|| world.bodies[body as usize].mass.mass.recip());
+        let force = move |slot: &Slot, a: Option<f32>, b: Option<f32>| {
+            let springs = if a.is_some() && b.is_some() { substep.movable } else { substep.fixed };
+            let sag = substep.length * springs.compliance() * (a.unwrap_or(0.0) + b.unwrap_or(0.0));
+            config.promised_sag(slot.size) / sag
+        };
         let any_driven = world.bodies.iter().any(Body::is_driven);
-        let all = (0..).zip(self.slots.all.iter().zip(&self.slots.edges)).filter(|(_, (slot, _))| slot.takes_part);
-        all.map(move |(row, (slot, edge))| {
+        let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
+        all.map(move |(slot, edge)| {
             let (mut a, mut b) = (edge.a, edge.b);
+            let force = force(slot, inverse_mass(a), inverse_mass(b));
             if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
                 let pair = detector.pair(slot.world, slot.pair);
                 for (end, body) in [(&mut a, pair.body_a), (&mut b, pair.body_b)] {
@@ -217,17 +227,8 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need, is_joint: false, row }
+            Interface { a, b, need: slot.need, force, is_joint: false }
         })
-    }
-
-    /// How deep the surfaces of a contact overlap where its bodies are now, over the sag that the settings promise. A look at the rows would not
-    /// do: a device may have them.
-    pub fn overlap(&self, row: u32, world: &World, detector: &Detector, config: &SolverConfig) -> f32 {
-        let slot = &self.slots.all[row as usize];
-        let pair = detector.pair(slot.world, slot.pair);
-        let overlaps = pair.overlaps(&pair.manifolds[slot.manifold as usize], world).map(|(overlap, _)| overlap);
-        overlaps.fold(0.0, f32::max) / config.promised_sag(slot.size)
     }
 
     /// The contacts that take part and jam, ascending.

@@ -244,9 +244,10 @@ impl JointRows {
             _ => IMMOVABLE,
         };
         awake.map(move |(i, joint)| {
+            let force = axes::driving_force(joint, world.bodies[joint.indices().0].smallest_half_extent());
             let (a, b) = joint.indices();
             let need = self.needs.get(i).copied().unwrap_or(0.0);
-            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
+            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, is_joint: true }
         })
     }
 
