@@ -244,7 +244,7 @@ impl JointRows {
             _ => IMMOVABLE,
         };
         awake.map(move |(i, joint)| {
-            let force = axes::driving_force(joint, world.bodies[joint.indices().0].smallest_half_extent());
+            let force = axes::driving_force(joint, world);
             let (a, b) = joint.indices();
             let need = self.needs.get(i).copied().unwrap_or(0.0);
             Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, is_joint: true }
