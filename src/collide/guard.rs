@@ -96,6 +96,8 @@ impl Detector {
         for (i, End { at: Station { center, rotation }, share, against }) in ends {
             let body = &mut world.bodies[i as usize];
             body.linear_velocity -= body.linear_velocity.dot(against).min(0.0) * against;
+            // The spin turns with the body: its energy is that of the pose.
+            body.angular_velocity = rotation * (body.rotation.inverse() * body.angular_velocity);
             body.rotation = rotation;
             body.position = center - rotation * body.mass.center;
             body.linear_velocity -= (1.0 - share) * dt * self.moving[i as usize].pull;
