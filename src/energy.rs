@@ -28,6 +28,9 @@ const MOST_ROUNDINGS: f64 = 16.0;
 
 /// The share of its energy that an island with joints may make in a step without shorter substeps from then on.
 const COARSE: f64 = 0.1;
+/// What shorter substeps have to leave of that share before an island takes them again. Joints and contacts that push against each other make the more,
+/// the shorter the substeps are.
+const HELPS: f32 = 0.5;
 
 /// The accounts of all islands.
 #[derive(Debug, Default)]
@@ -55,9 +58,11 @@ struct Kept {
     reserve: f32,
     /// What the springs of its joints and of their bodies hold.
     springs: f32,
+    /// The share of its energy that its island made when it last took shorter substeps for that; 0 before.
+    made: f32,
 }
 
-crate::saved::fields!(Kept { reserve, springs });
+crate::saved::fields!(Kept { reserve, springs, made });
 
 /// What a body, or an island, has in a step (J).
 #[derive(Clone, Copy, Debug, Default)]
@@ -185,8 +190,10 @@ impl Saved for Energy {
         self.kept.resize(bodies, Kept::default());
         archive.runs(bodies, |i, archive| {
             self.kept[i].walk(archive)?;
-            let Kept { reserve, springs } = self.kept[i];
-            ensure(reserve >= 0.0 && springs >= 0.0, || format!("body {i} keeps {reserve} J and {springs} J"))
+            let Kept { reserve, springs, made } = self.kept[i];
+            ensure(reserve >= 0.0 && springs >= 0.0 && made >= 0.0, || {
+                format!("body {i} keeps {reserve} J and {springs} J, after {made}")
+            })
         })
     }
 }
@@ -233,7 +240,8 @@ impl Energy {
         springs::add_work_of_drives(&mut self.entries, problem, world, substep);
         let is_fine = |entry: &Entry| entry.left() + entry.rounding >= entry.springs;
         if self.entries.iter().all(is_fine) {
-            self.kept.iter_mut().zip(&self.entries).for_each(|(kept, entry)| *kept = Kept::of(entry, entry.left()));
+            let all = self.kept.iter_mut().zip(&self.entries);
+            all.for_each(|(kept, entry)| *kept = Kept { made: kept.made, ..Kept::of(entry, entry.left()) });
             return Taken::default();
         }
         self.join(problem);
@@ -359,8 +367,11 @@ impl Energy {
                 && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
                 && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
             if is_whole {
-                if all.lever > 0.0 && over > COARSE * all.after {
-                    effort.refine(members);
+                let share = (over / all.after) as f32;
+                let before = members.clone().map(|i| self.kept[i].made).fold(0.0, f32::max);
+                let helped = before == 0.0 || share < HELPS * before;
+                if all.lever > 0.0 && over > COARSE * all.after && helped && effort.refine(members.clone()) {
+                    members.for_each(|i| self.kept[i].made = share);
                 }
             } else {
                 taken.refused += 1;
@@ -401,7 +412,7 @@ impl Kept {
     /// What is kept where so much is left.
     fn of(entry: &Entry, left: f64) -> Self {
         let springs = left.min(entry.springs).max(0.0);
-        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32 }
+        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32, made: 0.0 }
     }
 }
 

@@ -21,6 +21,8 @@ pub fn every_rules() -> Vec<Rules> {
                 friction_first: has(2),
                 accumulated: has(3),
                 round: has(4),
+                // Meets each of the others on both sides.
+                as_one: has(0) ^ has(1) ^ has(4),
                 measured: has(5),
                 driven: has(6),
                 passes: 1 + u8::from(has(6)),

@@ -230,6 +230,7 @@ impl fmt::Display for Kernel {
                 (r.friction_first, "first"),
                 (!r.accumulated, "clamped per correction"),
                 (r.round, "round"),
+                (r.as_one, "as one"),
                 (r.driven, "driven"),
                 (r.passes > 1, "repeated"),
                 (r.measured, "measured"),

@@ -41,6 +41,8 @@ struct Sweeps<'a> {
     /// Those groups, if any joint has a limit or a drive.
     swept_axes: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
+    /// Contacts whose points are struck together.
+    struck: &'a [Range<u32>],
     /// Contacts whose friction jams.
     jamming: &'a [Range<u32>],
 }
@@ -147,6 +149,7 @@ impl StepPlan {
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.rules.clamping == Clamping::Accumulated,
             round: contacts.round,
+            as_one: false,
             driven: false,
             passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
@@ -188,7 +191,7 @@ impl StepPlan {
         let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
         let (contacts, joints, direct) =
             (groups(&contact_colors), groups(&own.swept_joints()), groups(&own.direct_joints()));
-        let [swept_once, jamming] = own.contacts_by_jamming().map(|colors| groups(&colors));
+        let [swept_once, struck, jamming] = own.contacts_by_kind().map(|colors| groups(&colors));
         // A color without rows needs no pass.
         let kept = |color: &'_ Range<u32>| !problem.rows_of(color).is_empty();
         let [bodies, inertias, systems, turning] =
@@ -207,6 +210,7 @@ impl StepPlan {
             direct: &direct,
             swept_axes: if has_swept_axes { &direct } else { &[] },
             contacts: &swept_once,
+            struck: &struck,
             jamming: &jamming,
         };
         // Friction needs some sweep to happen in.
@@ -281,6 +285,7 @@ impl StepPlan {
             direct: &[],
             swept_axes: &[],
             contacts: &contacts,
+            struck: &[],
             jamming: &[],
         };
         plan.sweeps(sweeps, rules);
@@ -319,6 +324,7 @@ impl StepPlan {
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
+            self.over_colors(Kernel::SolveContacts(Rules { as_one: true, ..rules }), block, sweeps.struck);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {

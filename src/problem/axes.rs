@@ -15,7 +15,7 @@ use std::f32::consts::{PI, TAU};
 use super::NodeRow;
 use super::rows::{AxisRow, NO_LIMIT};
 use super::softness::softness;
-use crate::world::{Axis, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear};
+use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
 
 /// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
 /// some otherwise.
@@ -38,6 +38,36 @@ pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
 /// How many rows of a joint are of drives; they stand before the others.
 pub fn drive_count(joint: &Joint) -> usize {
     kinds(joint).filter(|(_, is_drive)| *is_drive).count()
+}
+
+/// The most force of the drives of a joint as it stands (N): that of a motor, and what the deflection of a spring gives. What turns pushes at the
+/// smallest half extent of body a.
+pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
+    if axes_of(joint).all(|(_, axis)| axis.drive == Drive::None) {
+        return 0.0;
+    }
+    let (a, b) = joint.indices();
+    let dynamic = [Some(a), b].into_iter().flatten().map(|body| &world.bodies[body]);
+    let (mass, inertia) = dynamic
+        .filter(|body| body.kind == BodyKind::Dynamic)
+        .map(|body| &body.mass)
+        .fold((f32::INFINITY, f32::INFINITY), |(mass, inertia), of| {
+            (of.mass.min(mass), of.principal_inertia.max_element().min(inertia))
+        });
+    let position = world.joint_motion(joint).position;
+    let load = |(i, axis): (usize, &Axis)| {
+        let is_angle = i >= 3;
+        let load = match axis.drive {
+            Drive::None => 0.0,
+            Drive::Motor { max_load, .. } => max_load,
+            Drive::Spring { target, frequency, max_load, .. } => {
+                let stiffness = if is_angle { inertia } else { mass } * (TAU * frequency).powi(2);
+                max_load.min(stiffness * (position[i] - target).abs())
+            }
+        };
+        if is_angle { load / world.bodies[a].smallest_half_extent() } else { load }
+    };
+    axes_of(joint).map(load).sum()
 }
 
 /// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks and limits to turn about, which

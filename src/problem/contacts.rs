@@ -36,6 +36,10 @@ pub struct ContactRows {
     poses: Vec<PoseRow>,
     /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
     jams: Vec<bool>,
+    /// The contacts of this step whose points are struck together, ascending.
+    struck: Vec<u32>,
+    /// Whether each body may be faster anywhere than half of the threshold of restitution; none where a joint holds it.
+    fast: Vec<Option<bool>>,
     /// The classes of bodies that the rows were written for.
     classes: Vec<u8>,
     /// What all materials have in common; none where one may have changed.
@@ -58,7 +62,7 @@ crate::saved::cloned!(ContactRows {
     materials,
     sums,
     carry,
-} scratch { graph, poses, new_bodies });
+} scratch { graph, poses, struck, fast, new_bodies });
 
 /// What the materials of a world have in common.
 #[derive(Clone, Copy, Debug)]
@@ -204,11 +208,21 @@ impl ContactRows {
         &'a self,
         world: &'a World,
         detector: &'a Detector,
+        config: &'a SolverConfig,
+        dt: f32,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
+        let substep = Substep::new(config, dt / config.substeps as f32);
+        let inverse_mass = |body: u32| (body != IMMOVABLE).then(|| world.bodies[body as usize].mass.mass.recip());
+        let force = move |slot: &Slot, a: Option<f32>, b: Option<f32>| {
+            let springs = if a.is_some() && b.is_some() { substep.movable } else { substep.fixed };
+            let sag = substep.length * springs.compliance() * (a.unwrap_or(0.0) + b.unwrap_or(0.0));
+            config.promised_sag(slot.size) / sag
+        };
         let any_driven = world.bodies.iter().any(Body::is_driven);
-        let all = (0..).zip(self.slots.all.iter().zip(&self.slots.edges)).filter(|(_, (slot, _))| slot.takes_part);
-        all.map(move |(row, (slot, edge))| {
+        let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
+        all.map(move |(slot, edge)| {
             let (mut a, mut b) = (edge.a, edge.b);
+            let force = force(slot, inverse_mass(a), inverse_mass(b));
             if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
                 let pair = detector.pair(slot.world, slot.pair);
                 for (end, body) in [(&mut a, pair.body_a), (&mut b, pair.body_b)] {
@@ -217,17 +231,8 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need, is_joint: false, row }
+            Interface { a, b, need: slot.need, force, is_joint: false }
         })
-    }
-
-    /// How deep the surfaces of a contact overlap where its bodies are now, over the sag that the settings promise. A look at the rows would not
-    /// do: a device may have them.
-    pub fn overlap(&self, row: u32, world: &World, detector: &Detector, config: &SolverConfig) -> f32 {
-        let slot = &self.slots.all[row as usize];
-        let pair = detector.pair(slot.world, slot.pair);
-        let overlaps = pair.overlaps(&pair.manifolds[slot.manifold as usize], world).map(|(overlap, _)| overlap);
-        overlaps.fold(0.0, f32::max) / config.promised_sag(slot.size)
     }
 
     /// The contacts that take part and jam, ascending.
@@ -236,6 +241,47 @@ impl ContactRows {
             return Vec::new();
         }
         self.slots.taking_part().filter(|&row| self.jams[row as usize]).collect()
+    }
+
+    /// The contacts that take part and whose points are struck together, ascending.
+    pub fn struck(&self) -> &[u32] {
+        &self.struck
+    }
+
+    /// Notes the contacts of several points whose surfaces meet, in their mean, at more than the threshold of restitution. A joint hands a blow
+    /// on, so that the masses of two bodies do not tell what they give; these contacts are swept as others.
+    fn note_struck(&mut self, world: &World, detector: &Detector, threshold: f32) {
+        let is_fast = |body: &Body| {
+            // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
+            let square = 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
+            let speed = body.linear_velocity.length() + body.angular_velocity.length() * square.sqrt();
+            2.0 * speed > threshold || body.is_driven()
+        };
+        self.fast.clear();
+        self.fast.extend(world.bodies.iter().map(|body| Some(is_fast(body))));
+        for joint in world.joints.iter().filter(|joint| !joint.holds_nothing()) {
+            let (a, b) = joint.indices();
+            [Some(a), b].into_iter().flatten().for_each(|body| self.fast[body] = None);
+        }
+        let fast = &self.fast;
+        let is_struck = |slot: &Slot| {
+            let pair = detector.pair(slot.world, slot.pair);
+            let bodies = [pair.body_a, pair.body_b].map(|body| body as usize);
+            if !matches!(bodies.map(|body| fast[body]), [Some(true), Some(_)] | [Some(_), Some(true)]) {
+                return false;
+            }
+            let manifold = &pair.manifolds[slot.manifold as usize];
+            let [a, b] = bodies.map(|body| &world.bodies[body]);
+            let at = |body: &Body, arm: Vec3| body.linear_velocity + body.angular_velocity.cross(arm);
+            let speeds = manifold.points().iter().map(|p| (at(b, p.r_b) - at(a, p.r_a)).dot(manifold.normal));
+            let count = manifold.points().len() as f32;
+            count > 1.0 && speeds.sum::<f32>() < -threshold * count
+        };
+        self.struck.clear();
+        if fast.contains(&Some(true)) {
+            let slots = (0..).zip(&self.slots.all).filter(|(_, slot)| slot.takes_part && is_struck(slot));
+            self.struck.extend(slots.map(|(row, _)| row));
+        }
     }
 
     /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
@@ -291,6 +337,7 @@ impl ContactRows {
             warm_start: config.warm_start.into(),
         };
         self.note_written(detector);
+        self.note_struck(world, detector, config.restitution_threshold);
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
         let Self { slots, carry, patches, computed, poses, jams, classes, .. } = self;
         let pose = |body: &Body| PoseRow {

@@ -259,9 +259,10 @@ impl JointRows {
             _ => IMMOVABLE,
         };
         awake.map(move |(i, joint)| {
+            let force = axes::driving_force(joint, world);
             let (a, b) = joint.indices();
             let need = self.need(world, i);
-            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
+            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, is_joint: true }
         })
     }
 

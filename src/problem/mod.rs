@@ -231,6 +231,7 @@ impl StepProblem {
             substeps: 1,
             substep,
             contacts,
+            struck: contact_colors,
             jamming: contact_colors,
             joints,
             direct,

@@ -311,11 +311,10 @@ impl Stages {
             }
             let has_new_bodies = contacts.note_new_bodies(world);
             let asleep = sleep.asleep();
-            let of_contacts = || contacts.interfaces(world, detector);
+            let of_contacts = || contacts.interfaces(world, detector, config, dt);
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above(world);
-            let overlap = |row: u32| contacts.overlap(row, world, detector, config);
-            effort.follow(world, asleep, config, dt, is_above, (interfaces, overlap)) || has_new_bodies
+            effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         })
     }
 

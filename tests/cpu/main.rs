@@ -38,6 +38,7 @@ mod effort;
 mod energy;
 mod forged;
 mod graph;
+mod impacts;
 mod inertia;
 #[cfg(feature = "serde")]
 mod lanes;

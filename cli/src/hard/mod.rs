@@ -86,6 +86,12 @@ impl Setup<'_> {
         Simulation::new(world, self.config.clone(), (self.open)()?)
     }
 
+    /// A simulation whose bodies fall asleep, as they do at the defaults.
+    fn sleeping(&self, world: World) -> Result<Simulation> {
+        let config = self.config.clone().with(|c| c.sleep_after = SolverConfig::default().sleep_after);
+        Simulation::new(world, config, (self.open)()?)
+    }
+
     fn run(&self, spec: &str, steps: u32) -> Result<Outcome> {
         self.outcome(Scene::find_spec(spec)?.world, steps)
     }
@@ -191,6 +197,13 @@ const CASES: &[Case] = &[
         "release",
         "a load of 100 times the mass of a ball is removed from two balls: they stay in place",
         motions::release,
+    ),
+    case("press", "presses stand 5, 10 and 35 cm deep in a crate: it lies still and sleeps", contacts::held),
+    case("ragdolls", "twenty ragdolls fall on the floor: all sleep within 5 s", motions::ragdolls),
+    case(
+        "car",
+        "a car whose wheels reach 5, 10 and 20 cm into it: no energy but that of its motors",
+        contacts::jammed_car,
     ),
 ];
 

@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
 use drystone::config::Friction;
 use drystone::stats::largest;
-use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World};
+use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World, metrics};
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const LINKS: usize = 100;
@@ -185,5 +185,15 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     simulation.world.bodies[top].position = Vec3::new(50.0, 0.5, 0.0);
     let highest = largest(LEAST, watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
     checks.at_most("rise of the ball under the load above its place [mm]", 1e3 * (highest - 1.5), 5.0);
+    Ok(())
+}
+
+/// Twenty ragdolls lie on the floor: nothing drives them.
+pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    let mut simulation = setup.sleeping(Scene::find("ragdolls", &[])?.world)?;
+    let speeds = watch(&mut simulation, 300, |world| metrics::fastest(world).0)?;
+    checks.at_most("speed in the fifth second [m/s]", largest(LEAST, speeds[240..].iter().copied()), 0.05);
+    let asleep = (0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count();
+    checks.at_most("parts awake after 5 s", (simulation.world.dynamic_count() - asleep) as f64, 0.0);
     Ok(())
 }

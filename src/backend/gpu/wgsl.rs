@@ -167,9 +167,11 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
             (parts, Over::Colors, with("solve_contact", rules))
         }
-        Kernel::ApplyRestitution(rules) => {
-            (&[part!("lib/pair"), part!("apply_restitution")], Over::Colors, with("restitute_contact", rules))
-        }
+        Kernel::ApplyRestitution(rules) => (
+            &[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")],
+            Over::Colors,
+            with("restitute_contact", rules),
+        ),
     }
 }
 
@@ -181,6 +183,7 @@ fn rules_text(rules: Rules) -> String {
         friction_first,
         accumulated,
         round,
+        as_one,
         passes,
         driven,
         measured,
@@ -197,7 +200,7 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {as_one}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
     )
 }
 

@@ -75,6 +75,8 @@ impl ContactRows {
             computed,
             poses: _,
             jams,
+            struck: _,
+            fast: _,
             classes,
             materials,
             new_bodies: _,

@@ -261,9 +261,17 @@ pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "car",
         summary: "a car on sprung wheels drives over bumps: it reaches its speed and stays upright",
-        parameters: &[Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]")],
-        bodies: |_| 5.0,
-        build: |v| Ok(machines::car(v[0] as f32)),
+        parameters: &[
+            Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]"),
+            Parameter::real(
+                "inside",
+                0.0,
+                (0.0, 0.2),
+                "how far the wheels reach into the chassis, and collide with it [m]",
+            ),
+        ],
+        bodies: |v| if v[1] > 0.0 { 9.0 } else { 5.0 },
+        build: |v| Ok(machines::car(v[0] as f32, v[1] as f32)),
     },
     Entry {
         name: "ragdoll",
@@ -271,6 +279,20 @@ pub static CATALOGUE: &[Entry] = &[
         parameters: &[Parameter::whole("n", 1, (1.0, 1000.0), "number of ragdolls")],
         bodies: |v| 11.0 * v[0],
         build: |v| Ok(machines::ragdoll(v[0] as usize)),
+    },
+    Entry {
+        name: "ragdolls",
+        summary: "n ragdolls, each turned another way, fall on the floor: all come to rest and sleep",
+        parameters: &[Parameter::whole("n", 20, (1.0, 1000.0), "number of ragdolls")],
+        bodies: |v| 11.0 * v[0],
+        build: |v| Ok(machines::ragdolls(v[0] as usize)),
+    },
+    Entry {
+        name: "press",
+        summary: "a press stands inside of a crate on the floor: the crate is held and lies still",
+        parameters: &[Parameter::real("depth", 0.05, (0.0, 0.4), "how deep the press is in the crate [m]")],
+        bodies: |_| 2.0,
+        build: |v| Ok(machines::press(v[0] as f32)),
     },
     Entry {
         name: "arch",
