@@ -47,18 +47,32 @@ fn change_node(node: u32, change: vec3f) {
     change_row(first, rows, 2u, change.z);
 }
 
+fn without_row(m: mat3x3f, i: u32) -> mat3x3f {
+    let out = vec3<bool>(i == 0u, i == 1u, i == 2u);
+    let zero = vec3f(0.0);
+    return mat3x3f(select(m[0], zero, out), select(m[1], zero, out), select(m[2], zero, out));
+}
+
+fn without_column(m: mat3x3f, i: u32) -> mat3x3f {
+    let zero = vec3f(0.0);
+    return mat3x3f(select(m[0], zero, i == 0u), select(m[1], zero, i == 1u), select(m[2], zero, i == 2u));
+}
+
 // Takes row i of a node out if it is a limit that holds, and bears no impulse or would pull; whether it did.
 fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: bool, change: f32) -> bool {
     if !is_limit_row(rows, i) || !held { return false; }
     let before = joint_impulses[first_axis + axis_of_row(rows, i) - 1u].linear.x;
     if before * (before + change) > 0.0 { return false; }
-    for (var column = 0u; column < 3u; column++) {
-        joint_nodes[node].along[column][i] = 0.0;
-        joint_nodes[node].about_a[column][i] = 0.0;
-        joint_nodes[node].about_b[column][i] = 0.0;
-    }
-    joint_nodes[node].turn_a[i] = vec3f(0.0);
-    joint_nodes[node].turn_b[i] = vec3f(0.0);
+    let along = joint_nodes[node].along;
+    let about_a = joint_nodes[node].about_a;
+    let about_b = joint_nodes[node].about_b;
+    let turn_a = joint_nodes[node].turn_a;
+    let turn_b = joint_nodes[node].turn_b;
+    joint_nodes[node].along = without_row(along, i);
+    joint_nodes[node].about_a = without_row(about_a, i);
+    joint_nodes[node].about_b = without_row(about_b, i);
+    joint_nodes[node].turn_a = without_column(turn_a, i);
+    joint_nodes[node].turn_b = without_column(turn_b, i);
     return true;
 }
 

@@ -271,7 +271,7 @@ impl Energy {
             let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
             // The inertia turns with the body.
             let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
-            entry.springs += 0.5 * spin.dot(lent * spin);
+            entry.springs += (0.5 * spin.dot(lent * spin)).max(0.0);
         }
     }
 

@@ -19,7 +19,7 @@ use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
-use crate::world::{Body, World};
+use crate::world::{Body, BodyKind, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
 #[derive(Debug, Default)]
@@ -255,7 +255,7 @@ impl ContactRows {
             // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
             let square = 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
             let speed = body.linear_velocity.length() + body.angular_velocity.length() * square.sqrt();
-            2.0 * speed > threshold || body.is_driven()
+            body.kind != BodyKind::Fixed && (2.0 * speed > threshold || body.is_driven())
         };
         self.fast.clear();
         self.fast.extend(world.bodies.iter().map(|body| Some(is_fast(body))));
@@ -272,7 +272,11 @@ impl ContactRows {
             }
             let manifold = &pair.manifolds[slot.manifold as usize];
             let [a, b] = bodies.map(|body| &world.bodies[body]);
-            let at = |body: &Body, arm: Vec3| body.linear_velocity + body.angular_velocity.cross(arm);
+            // The velocity of a fixed body means nothing.
+            let at = |body: &Body, arm: Vec3| match body.kind {
+                BodyKind::Fixed => Vec3::ZERO,
+                _ => body.linear_velocity + body.angular_velocity.cross(arm),
+            };
             let speeds = manifold.points().iter().map(|p| (at(b, p.r_b) - at(a, p.r_a)).dot(manifold.normal));
             let count = manifold.points().len() as f32;
             count > 1.0 && speeds.sum::<f32>() < -threshold * count

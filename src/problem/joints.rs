@@ -236,7 +236,7 @@ impl JointRows {
     }
 
     /// The gap that a joint would have in class 0, over the promised one: that at rest, or that of its turning arms. Arms turn, and centers of mass go
-    /// straight: in a substep h that opens a joint by (h ω)²/2 of an arm, however it is solved.
+    /// straight: in a substep h that opens a joint that is solved at once by (h ω)²/2 of an arm.
     fn need(&self, world: &World, joint: usize) -> f32 {
         let Joint { body_a, anchor_a, body_b, anchor_b, .. } = self.joints[joint];
         let (mut arms, mut opened) = (0.0, 0.0);
@@ -246,7 +246,9 @@ impl JointRows {
                 (arms, opened) = (arms + arm, opened + arm * body.angular_velocity.length_squared());
             }
         }
-        let of_turns = if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 };
+        // Springs of swept joints would change their stiffness as bodies turn.
+        let is_direct = self.systems.get(joint).is_some_and(|&system| system != SWEPT);
+        let of_turns = if is_direct && arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 };
         self.needs.get(joint).copied().unwrap_or(0.0).max(of_turns)
     }
 

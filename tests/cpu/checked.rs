@@ -108,7 +108,7 @@ fn inertias_of_another_block(problem: &mut StepProblem) {
 
 #[test]
 fn what_is_not_there_is_refused_by_row_and_field() {
-    let (problem, plan) = step(&[]);
+    let (problem, plan) = step(&["joint_solver=sweeps"]);
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
@@ -257,7 +257,7 @@ fn a_joint_color_with_a_body_twice_is_refused() {
 
 #[test]
 fn passes_over_colors_that_are_not_there_are_refused() {
-    let (problem, plan) = step(&[]);
+    let (problem, plan) = step(&["joint_solver=sweeps"]);
     let of = |wanted: fn(Kernel) -> bool| plan.passes.iter().position(|p| wanted(p.kernel)).expect("a pass");
     let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
     let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));

@@ -60,7 +60,7 @@ impl Group {
         all
     }
 
-    /// Refuses any of the worlds that breaks one of some laws: finite, energy, gap, momentum, spin.
+    /// Refuses any of the worlds that breaks one of some laws: finite, energy, lasting, gap, momentum, spin.
     #[track_caller]
     fn keeps(&self, laws: &[&str]) {
         let cases = self.cases();
@@ -108,6 +108,11 @@ fn joints_without_contacts_keep_the_momentum() {
     group().keeps(&["momentum"]);
     group().preset(Preset::Fast).keeps(&["momentum"]);
     Group { rate: 30, ..group() }.keeps(&["momentum"]);
+}
+
+#[test]
+fn no_world_that_nothing_drives_ends_above_its_start() {
+    Group::new(&[Family::Plain], EVERY).keeps(&["finite", "lasting"]);
 }
 
 /// The reference and the lanes have the same bits, and so the same verdict.

@@ -2,10 +2,10 @@
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-use glam::{EulerRot, Quat, Vec3};
+use glam::{Quat, Vec3};
 
 use super::common::floor;
-use crate::math::rotation::{about, arc};
+use crate::math::rotation::{about, arc, product};
 use crate::scenes::scene::Scene;
 use crate::world::{Axis, Body, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
 
@@ -215,7 +215,8 @@ pub(super) fn ragdolls(n: usize) -> Scene {
     };
     let mut world = floor(12.0, 12.0 + 0.4 * n as f32);
     for i in 0..n {
-        let turn = Quat::from_euler(EulerRot::XYZ, 0.7 * (i as f32 + 1.0), 1.3 * i as f32, 0.9 * i as f32);
+        let turns = [(Vec3::X, 0.7 * (i as f32 + 1.0)), (Vec3::Y, 1.3 * i as f32), (Vec3::Z, 0.9 * i as f32)];
+        let turn = turns.into_iter().fold(Quat::IDENTITY, |turn, (axis, angle)| product(turn, about(axis, angle)));
         let hips = Vec3::new(2.0 * (i % 5) as f32 - 4.0, 1.5, 2.0 * (i / 5) as f32 - 0.2 * n as f32);
         add_ragdoll(&mut world, |part| hips + turn * (part - Vec3::Y), turn, |_| Vec3::ZERO, axes);
     }

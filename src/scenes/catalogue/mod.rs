@@ -291,7 +291,7 @@ pub static CATALOGUE: &[Entry] = &[
         name: "press",
         summary: "a press stands inside of a crate on the floor: the crate is held and lies still",
         parameters: &[Parameter::real("depth", 0.05, (0.0, 0.4), "how deep the press is in the crate [m]")],
-        bodies: |_| 2.0,
+        bodies: |_| 1.0,
         build: |v| Ok(machines::press(v[0] as f32)),
     },
     Entry {
