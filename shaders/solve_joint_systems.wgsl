@@ -47,10 +47,12 @@ fn change_node(node: u32, change: vec3f) {
     change_row(first, rows, 2u, change.z);
 }
 
+fn without_number(u: vec3f, i: u32) -> vec3f {
+    return vec3f(select(u.x, 0.0, i == 0u), select(u.y, 0.0, i == 1u), select(u.z, 0.0, i == 2u));
+}
+
 fn without_row(m: mat3x3f, i: u32) -> mat3x3f {
-    let out = vec3<bool>(i == 0u, i == 1u, i == 2u);
-    let zero = vec3f(0.0);
-    return mat3x3f(select(m[0], zero, out), select(m[1], zero, out), select(m[2], zero, out));
+    return mat3x3f(without_number(m[0], i), without_number(m[1], i), without_number(m[2], i));
 }
 
 fn without_column(m: mat3x3f, i: u32) -> mat3x3f {
