@@ -61,6 +61,9 @@ const CONTACTS: u32 = 600;
 const IDLE: usize = 5;
 /// Joints of a random problem.
 const JOINTS: u32 = 300;
+/// Those of them that are solved at once. One thread factors them again and again, and llvmpipe ends the loops of a program after 65,535
+/// iterations.
+const JOINTS_AT_ONCE: usize = 60;
 
 fn is_movable(body: u32) -> bool {
     !body.is_multiple_of(5)
@@ -129,10 +132,10 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     problem
 }
 
-/// Puts all joints into one system, and lets the inertia of half of the bodies turn.
+/// Puts some joints into one system, and lets the inertia of half of the bodies turn.
 fn solve_joints_at_once(random: &mut Random, problem: &mut StepProblem) {
     let mut nodes = Vec::new();
-    for (row, joint) in problem.joints.iter().zip(0..) {
+    for (row, joint) in problem.joints.iter().zip(0..).take(JOINTS_AT_ONCE) {
         let axes = &problem.axes[row.first_axis as usize..(row.first_axis + row.axis_count) as usize];
         let bounds = (0..).zip(axes).filter(|(_, axis)| axis.is_lock() || axis.is_limit());
         let bounds: Vec<(u32, bool)> = bounds.map(|(k, axis)| (k, axis.is_limit())).collect();

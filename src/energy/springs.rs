@@ -121,7 +121,7 @@ pub(super) fn add_work_of_drives(
                 work += held(0) - held(1);
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
-                work += speeds.into_iter().chain([axis.speed]).map(|speed| impulse * speed).fold(0.0, f64::max);
+                work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
             }
         }
         entries[body as usize].work += work;
