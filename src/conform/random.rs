@@ -61,9 +61,9 @@ const CONTACTS: u32 = 600;
 const IDLE: usize = 5;
 /// Joints of a random problem.
 const JOINTS: u32 = 300;
-/// Those of them that are solved at once. One thread factors them again and again, and llvmpipe ends the loops of a program after 65,535
+/// The most of them that are solved at once. One thread factors them again and again, and llvmpipe ends the loops of a program after 65,535
 /// iterations.
-const JOINTS_AT_ONCE: usize = 60;
+const JOINTS_AT_ONCE: u32 = 60;
 
 fn is_movable(body: u32) -> bool {
     !body.is_multiple_of(5)
@@ -101,6 +101,9 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     }
     problem.totals = problem.impulses.iter().rev().copied().collect();
     let (joints, coloring) = colored(random, JOINTS);
+    // The last colors are solved at once.
+    let direct = coloring.offsets.iter().take_while(|&&first| JOINTS - first > JOINTS_AT_ONCE).count();
+    let at_once = coloring.order[coloring.offsets[direct] as usize..].to_vec();
     problem.colors.extend(coloring.offsets[1..].iter().map(|end| end + CONTACTS));
     problem.order.extend(coloring.order);
     for bodies in joints {
@@ -127,15 +130,17 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     problem.joint_totals = problem.joint_impulses.iter().rev().copied().collect();
     problem.convergence = ConvergenceRow { moving: random.below(2), done: 0, sweeps: 3, planned: 5 };
     problem.params = params(&problem, patches);
-    solve_joints_at_once(random, &mut problem);
+    solve_at_once(random, &mut problem, &at_once);
     problem.in_one_block(contact_colors, substep());
+    problem.blocks[0].direct = contact_colors + direct as u32;
     problem
 }
 
 /// Puts some joints into one system, and lets the inertia of half of the bodies turn.
-fn solve_joints_at_once(random: &mut Random, problem: &mut StepProblem) {
+fn solve_at_once(random: &mut Random, problem: &mut StepProblem, joints: &[u32]) {
     let mut nodes = Vec::new();
-    for (row, joint) in problem.joints.iter().zip(0..).take(JOINTS_AT_ONCE) {
+    for &joint in joints {
+        let row = &problem.joints[joint as usize];
         let axes = &problem.axes[row.first_axis as usize..(row.first_axis + row.axis_count) as usize];
         let bounds = (0..).zip(axes).filter(|(_, axis)| axis.is_lock() || axis.is_limit());
         let bounds: Vec<(u32, bool)> = bounds.map(|(k, axis)| (k, axis.is_limit())).collect();

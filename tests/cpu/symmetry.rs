@@ -354,7 +354,8 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
         ("four-bar", 300, 1e-6, 5e-5),
         ("drawbridge", 120, 3e-5, 3e-4),
         ("car", 30, 1e-4, 5e-5),
-        ("ragdoll", 20, 1e-5, 3e-4),
+        // Rounding decides whether a limit is reached in a substep or in the next one.
+        ("ragdoll", 20, 6e-4, 3e-4),
     ] {
         assert_apart(&format!("{spec} turned"), &Case::scene(spec), &cycle(), steps, by_cycle);
         assert_apart(&format!("{spec} moved"), &Case::scene(spec), &away(), steps, by_way);

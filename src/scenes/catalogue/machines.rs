@@ -166,7 +166,8 @@ pub(super) fn ragdoll(n: usize) -> Scene {
     const STEPS: usize = 12;
     const TREAD: f32 = 0.3;
     const RISE: f32 = 0.18;
-    let half_width = 0.8 * n as f32;
+    // Room beside them: one that turns as it falls does not leave the stairs.
+    let half_width = 0.8 * n as f32 + 1.2;
     let mut world = floor(12.0, half_width);
     let height = RISE * STEPS as f32;
     let landing = Shape::cuboid(1.0, 0.5 * height, half_width);
