@@ -86,7 +86,9 @@ pub(super) fn convex_contact(
     let mut across = None;
     let mut consider = |d: Vec3, of_b: bool| {
         let distance = along(d);
-        let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - TRUE * size;
+        // Of several faces, the one across which the solids are furthest apart.
+        let slack = if across.is_none() { TRUE * size } else { 0.0 };
+        let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - slack;
         if is_same || is_better(distance, best, found_is_true) {
             (best, found_is_true, across) = (distance, true, Some((d, of_b)));
         }
@@ -220,6 +222,7 @@ fn deepest(manifold: &ParryManifold) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Quat;
     use parry3d::math::Vector;
 
     /// A wedge of a ring between two angles, inner radius 0.9 and outer 1, 0.5 deep.
@@ -270,6 +273,23 @@ mod tests {
             let after_another = answer(&mut buffers, i);
             assert_eq!(after_another, answer(&mut ClipBuffers::default(), i), "joint {i}");
         }
+    }
+
+    /// A cone that stands on its base far from the middle of a floor.
+    #[test]
+    fn a_base_that_touches_a_wide_floor_does_not_overlap_it() {
+        let (floor, cone) = (SharedShape::cuboid(68.5, 1.0, 68.5), SharedShape::cone(2.67e-2, 4.08e-2));
+        let mut worst = 0.0_f32;
+        for k in 0..1000 {
+            let tilt = Vector::new((k as f32).sin(), 0.0, (1.7 * k as f32).cos()) * 4e-6;
+            let turn = Quat::from_scaled_axis(tilt) * Quat::from_rotation_y(0.1 * k as f32);
+            let at = Vector::new(0.38 + 0.01 * k as f32, 1.0 + 2.67e-2 - 1e-6, -2.92);
+            let pos12 = Pose::from_parts(at, turn);
+            let search = ContactQuery { prediction: 2e-3, size: 2.67e-2 };
+            let found = convex_contact((&floor, &cone), &pos12, search, &mut ClipBuffers::default());
+            worst = worst.max(-deepest(&found));
+        }
+        assert!(worst < 1e-5, "{worst} m");
     }
 
     #[test]

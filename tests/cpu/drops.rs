@@ -444,7 +444,6 @@ fn run(shape: &str, kind: &str, seed: u64) -> Outcome {
                 // As it stands, wherever it goes.
                 alone.add(body.clone().velocity(Vec3::ZERO, Vec3::ZERO));
                 let reported = Penetration::of_world(&alone, &config).max;
-                if (reported - depth).abs() / drop.thickness > 0.015 { println!("DBG {shape} {kind} {seed} step {step}: {reported} {depth} {} {:?} {:?} {:?} {:?}", drop.thickness, body.position, body.rotation, body.linear_velocity, body.angular_velocity); }
                 drop.wrong = drop.wrong.max((reported - depth).abs() / drop.thickness);
             }
         }
