@@ -38,10 +38,14 @@ pub struct Energy {
     /// Body by body.
     kept: Vec<Kept>,
     entries: Vec<Entry>,
+    /// The islands that contacts and joints make, each with its account.
     islands: Islands,
-    /// The account of the island whose root each body is.
     accounts: Vec<Account>,
-    /// The bodies of islands that made energy, each after its root.
+    /// The island of each body; [`UNTOUCHED`] of one that nothing touches.
+    numbers: Vec<u32>,
+    /// Whether the islands are those of the contacts of this step.
+    are_known: bool,
+    /// The bodies of islands that made energy, each after its island.
     members: Vec<(u32, u32)>,
     /// Whether a joint holds each body.
     jointed: Vec<bool>,
@@ -49,7 +53,19 @@ pub struct Energy {
     fresh: Vec<usize>,
 }
 
-crate::saved::cloned!(Energy { kept } scratch { entries, islands, accounts, members, jointed, fresh });
+impl Clone for Energy {
+    fn clone(&self) -> Self {
+        Self { kept: self.kept.clone(), ..Self::default() }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.kept.clone_from(&from.kept);
+        self.are_known = false;
+    }
+}
+
+/// The island of a body that no contact and no joint touches.
+const UNTOUCHED: u32 = u32::MAX;
 
 /// What a body keeps from step to step (J).
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,7 +100,6 @@ struct Entry {
     rounding: f64,
     /// The longest lever of a joint (m).
     lever: f64,
-    common: Common,
 }
 
 /// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times their ways (kg m).
@@ -127,12 +142,10 @@ impl Entry {
         self.rest += other.rest;
         self.rounding += other.rounding;
         self.lever = self.lever.max(other.lever);
-        self.common.add(&other.common);
     }
 
     /// Leaves out the motion that all have in common: nothing within changes it.
-    fn leave_out_common(&mut self) {
-        let Common { mass, momenta, force, moved } = self.common;
+    fn leave_out(&mut self, Common { mass, momenta, force, moved }: Common) {
         let [before, after] = momenta.map(|momentum| 0.5 * momentum.length_squared() / mass);
         let whole = self.before.max(f64::MIN_POSITIVE);
         (self.before, self.after) = (self.before - before, self.after - after);
@@ -148,14 +161,17 @@ impl Entry {
 #[derive(Clone, Copy, Debug, Default)]
 struct Account {
     all: Entry,
+    mass: f64,
+    /// What its bodies have in common, where nothing holds them.
+    common: Common,
     /// What the springs of its contacts gave back, and the energy of what they push out (J).
     released: f64,
     pushed: f64,
     /// Whether anything but its bodies holds it.
     is_held: bool,
-    /// Whether a contact or a joint touches it.
-    is_touched: bool,
     is_refused: bool,
+    /// What its bodies keep of what their springs hold, and for their mass (J/kg).
+    shares: [f64; 2],
 }
 
 impl Account {
@@ -167,7 +183,7 @@ impl Account {
 
     fn is_over(&self) -> bool {
         let made = self.made();
-        self.is_touched && (made > 0.0 || made.is_nan())
+        made > 0.0 || made.is_nan()
     }
 }
 
@@ -186,6 +202,7 @@ impl Saved for Energy {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        self.are_known &= !A::READS;
         let bodies = archive.count(self.kept.len())?;
         self.kept.resize(bodies, Kept::default());
         archive.runs(bodies, |i, archive| {
@@ -199,6 +216,11 @@ impl Saved for Energy {
 }
 
 impl Energy {
+    /// Takes over that contacts came or went.
+    pub fn follow_contacts(&mut self) {
+        self.are_known = false;
+    }
+
     /// Takes over bodies that came, went, or changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.kept.resize(world.bodies.len(), Kept::default());
@@ -245,18 +267,23 @@ impl Energy {
             return Taken::default();
         }
         self.join(problem);
+        self.add_up(world, problem, effort);
         let mut taken = Taken::default();
         if self.accounts.iter().any(Account::is_over) {
             self.add_released(problem, effort);
             taken = self.settle(world, problem, effort, config, dt);
         }
-        let roots = self.islands.roots();
-        for ((kept, &root), entry) in self.kept.iter_mut().zip(roots).zip(&self.entries) {
-            let Account { all, released, .. } = &self.accounts[root as usize];
-            let of_island = Kept::of(all, all.left() + released);
-            let share = |of: f64, sum: f64| if sum > 0.0 { (of / sum) as f32 } else { 0.0 };
-            kept.springs = of_island.springs * share(entry.springs, all.springs);
-            kept.reserve = of_island.reserve * share(entry.common.mass, all.common.mass);
+        let share = |of: f32, sum: f64| if sum > 0.0 { f64::from(of) / sum } else { 0.0 };
+        for account in &mut self.accounts {
+            let Account { all, mass, released, .. } = account;
+            let Kept { springs, reserve, .. } = Kept::of(all, all.left() + *released);
+            account.shares = [share(springs, all.springs), share(reserve, *mass)];
+        }
+        for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
+            let [springs, reserve] =
+                self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
+            kept.springs = (springs * self.entries[i].springs) as f32;
+            kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
         }
         taken
     }
@@ -275,35 +302,73 @@ impl Energy {
         }
     }
 
-    /// Finds the islands of bodies that contacts and joints hold together, and adds up what they have.
+    /// Finds the islands of bodies that contacts and joints hold together.
     fn join(&mut self, problem: &StepProblem) {
-        let bodies = self.entries.len();
-        self.islands.reset(bodies);
-        self.accounts.clear();
-        self.accounts.resize(bodies, Account::default());
+        let joints = problem.rows_of(&problem.joint_colors());
+        if self.are_known && joints.is_empty() {
+            return;
+        }
+        let Self { islands, accounts, numbers, entries, .. } = self;
+        islands.reset(entries.len());
+        // First whether what touches a body holds it.
+        const HELD: u32 = 0;
+        const FREE: u32 = 1;
+        numbers.clear();
+        numbers.resize(entries.len(), UNTOUCHED);
         let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
-        let joints = problem.rows_of(&problem.joint_colors()).iter().map(|&j| &problem.joints[j as usize]);
-        let pairs = contacts.chain(joints.map(ends));
-        for [a, b] in pairs.clone() {
-            if can_move(problem, a) && can_move(problem, b) {
-                self.islands.join(a, b);
-            }
-        }
-        for [a, b] in pairs {
-            for body in [a, b].into_iter().filter(|&body| can_move(problem, body)) {
-                self.accounts[self.islands.root(body) as usize].is_touched = true;
-            }
+        for [a, b] in contacts.chain(joints.iter().map(|&j| ends(&problem.joints[j as usize]))) {
             match [can_move(problem, a), can_move(problem, b)] {
-                [true, false] => self.accounts[self.islands.root(a) as usize].is_held = true,
-                [false, true] => self.accounts[self.islands.root(b) as usize].is_held = true,
-                _ => {}
+                [true, true] => {
+                    islands.join(a, b);
+                    [a, b].into_iter().for_each(|body| numbers[body as usize] = numbers[body as usize].min(FREE));
+                }
+                [true, false] => numbers[a as usize] = HELD,
+                [false, true] => numbers[b as usize] = HELD,
+                [false, false] => {}
             }
         }
-        for (&root, entry) in self.islands.roots().iter().zip(&self.entries) {
-            self.accounts[root as usize].all.add(entry);
+        accounts.clear();
+        // A root comes before the other bodies of its island.
+        for (body, &root) in islands.roots().iter().enumerate() {
+            let state = std::mem::replace(&mut numbers[body], UNTOUCHED);
+            if state == UNTOUCHED {
+                continue;
+            }
+            if root as usize == body {
+                numbers[body] = accounts.len() as u32;
+                accounts.push(Account::default());
+            } else {
+                numbers[body] = numbers[root as usize];
+            }
+            accounts[numbers[body] as usize].is_held |= state == HELD;
         }
-        let free = self.accounts.iter_mut().filter(|account| !account.is_held && account.all.common.mass > 0.0);
-        free.for_each(|account| account.all.leave_out_common());
+        self.are_known = joints.is_empty();
+    }
+
+    /// Adds up what islands have.
+    fn add_up(&mut self, world: &World, problem: &StepProblem, effort: &Effort) {
+        let Self { accounts, numbers, entries, .. } = self;
+        for account in accounts.iter_mut() {
+            *account = Account { is_held: account.is_held, ..Account::default() };
+        }
+        let members = || numbers.iter().enumerate().filter(|(_, number)| **number != UNTOUCHED);
+        for (i, &number) in members() {
+            let account = &mut accounts[number as usize];
+            account.all.add(&entries[i]);
+            account.mass += f64::from(world.bodies[i].mass.mass);
+        }
+        if accounts.iter().all(|account| account.is_held) {
+            return;
+        }
+        for (i, &number) in members() {
+            let account = &mut accounts[number as usize];
+            if !account.is_held {
+                let substep = f64::from(problem.blocks[effort.block_of(i)].substep.length);
+                account.common.add(&common(&world.bodies[i], i, problem, substep));
+            }
+        }
+        let free = accounts.iter_mut().filter(|account| !account.is_held && account.mass > 0.0);
+        free.for_each(|account| account.all.leave_out(account.common));
     }
 
     /// Adds what the springs of contacts hold now that touch bodies on joints. Joints and contacts may push against each other without an end, so
@@ -330,7 +395,7 @@ impl Energy {
     fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
         for contact in problem.swept_contacts().filter(|contact| !is_jointed(&self.jointed, contact)) {
             let body = moved_by(problem, contact);
-            let account = &mut self.accounts[self.islands.root(body as u32) as usize];
+            let account = &mut self.accounts[self.numbers[body] as usize];
             if account.all.left() < 0.0 {
                 let [before, after] =
                     springs::held_by_contact(problem, contact, &problem.blocks[effort.block_of(body)].substep);
@@ -352,9 +417,9 @@ impl Energy {
     ) -> Taken {
         let mut taken = Taken::default();
         self.members.clear();
-        let is_over = |root: u32| self.accounts[root as usize].is_over();
-        let roots = self.islands.roots().iter().copied();
-        self.members.extend((0..).zip(roots).filter(|(_, root)| is_over(*root)).map(|(body, root)| (root, body)));
+        let is_over = |island: u32| self.accounts.get(island as usize).is_some_and(Account::is_over);
+        let numbers = self.numbers.iter().copied();
+        self.members.extend(numbers.zip(0..).filter(|(island, _)| is_over(*island)));
         self.members.sort_unstable();
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let account = &mut self.accounts[members[0].0 as usize];
@@ -392,10 +457,11 @@ impl Energy {
 
     /// Lets joints and contacts of the islands whose step was not taken begin without impulses.
     fn forget_impulses(&mut self, problem: &mut StepProblem) {
-        let (islands, accounts) = (&mut self.islands, &self.accounts);
-        let mut is_refused = |[a, b]: [u32; 2], problem: &StepProblem| {
+        let (numbers, accounts) = (&self.numbers, &self.accounts);
+        let is_refused = |[a, b]: [u32; 2], problem: &StepProblem| {
             let body = if can_move(problem, a) { a } else { b };
-            can_move(problem, body) && accounts[islands.root(body) as usize].is_refused
+            let account = || accounts.get(numbers[body as usize] as usize);
+            can_move(problem, body) && account().is_some_and(|account| account.is_refused)
         };
         for i in 0..problem.joints.len() {
             let joint = problem.joints[i];
@@ -436,33 +502,50 @@ fn ends(joint: &JointRow) -> [u32; 2] {
     [joint.body_a, joint.body_b]
 }
 
-/// What a body has, with the work of gravity and forces. A velocity at the end of a step belongs to the middle of its last substep, so that a way
-/// is half a substep longer than the mean of the velocities tells.
+/// What a body has, with the work of gravity and forces.
 fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) -> Entry {
     let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
     if mass.inv_mass <= 0.0 {
         return Entry::default();
     }
     let m = f64::from(body.mass.mass);
-    let [v, w] = [row.v, row.w].map(|u| Vec3::from(u).as_dvec3());
-    let [v_0, w_0] = [body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
-    let acceleration = Vec3::from(mass.acceleration).as_dvec3();
-    let way = Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep);
-    let moved = m * way;
-    let pushed = acceleration.dot(moved);
-    let common = Common { mass: m, momenta: [m * v_0, m * v], force: m * acceleration, moved };
-    let turned = body.whole_torque().as_dvec3().dot((w + w_0) * (0.5 * dt));
-    let turn = product(turn_of(row), body.rotation);
-    let spin = product(turn, body.mass.principal_frame).as_dquat().inverse() * w;
-    let after = 0.5 * (m * v.length_squared() + (body.mass.principal_inertia.as_dvec3() * spin * spin).element_sum());
-    // A body without shapes has no size.
-    let size = Some(f64::from(body.smallest_half_extent())).filter(|size| size.is_finite()).unwrap_or(0.0);
-    let rest = ROUNDING * m * acceleration.length() * size;
+    let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
+    let acceleration = Vec3::from(mass.acceleration);
+    let pushed = m * acceleration.as_dvec3().dot(way(row, v, v_0, substep));
+    let torque = body.whole_torque();
+    let w = Vec3::from(row.w);
+    let turned = if torque == Vec3::ZERO { 0.0 } else { f64::from(torque.dot(w + body.angular_velocity)) * (0.5 * dt) };
+    let spinning = |rotation: &dyn Fn() -> Quat, w: Vec3| {
+        let inertia = body.mass.principal_inertia;
+        if inertia.x == inertia.y && inertia.y == inertia.z {
+            return 0.5 * f64::from(inertia.x) * w.as_dvec3().length_squared();
+        }
+        let spin = (product(rotation(), body.mass.principal_frame).inverse() * w).as_dvec3();
+        0.5 * (inertia.as_dvec3() * spin * spin).element_sum()
+    };
+    let before = 0.5 * m * v_0.length_squared() + spinning(&|| body.rotation, body.angular_velocity);
+    let after = 0.5 * m * v.length_squared() + spinning(&|| product(turn_of(row), body.rotation), w);
+    // The radius of gyration is a size.
+    let size = f64::from(body.mass.principal_inertia.min_element() / body.mass.mass).sqrt();
+    let rest = ROUNDING * m * f64::from(acceleration.length()) * size;
     let slack = REGAINED * after + rest;
-    let before = body.kinetic_energy();
     // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less. Energy that constraints made does not count.
     let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
-    Entry { before, after, work: pushed + turned, slack, rest, rounding, common, ..Entry::default() }
+    Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
+}
+
+/// The way of a body from and to the times of its velocities, which belong to the middle of a substep (m): it went half a substep further at the
+/// last of them, and not at the first.
+fn way(row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
+    Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep)
+}
+
+/// What a body adds to the common motion of its island.
+fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common {
+    let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
+    let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
+    let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
+    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(row, v, v_0, substep) }
 }
 
 /// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the

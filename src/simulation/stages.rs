@@ -279,7 +279,7 @@ impl Stages {
     /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
     /// or a body lies where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, by_body, .. } = self;
+        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, by_body, .. } = self;
         // Rows may change their places; a step that fails makes no new lists.
         by_body.forget();
         let times = &mut stats.times;
@@ -302,6 +302,7 @@ impl Stages {
         timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
+                energy.follow_contacts();
             }
             joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
