@@ -152,6 +152,11 @@ impl Kernel {
         }
     }
 
+    /// Whether it presses the points of a manifold as one.
+    pub fn presses_as_one(self) -> bool {
+        matches!(self, Self::SolveContacts(Rules { as_one: true, .. }) | Self::ApplyRestitution(_))
+    }
+
     /// Whether the kernel works with velocities that are changes since the step began.
     pub fn is_from_start(self) -> bool {
         match self {

@@ -108,10 +108,11 @@ impl Constraint for JointRow {
     }
 }
 
-/// Applies a kernel to a contact of a lane.
+/// Applies a kernel to a contact of a lane; `as_one` is that of [`Kernel::presses_as_one`].
 #[inline(always)]
 pub(super) fn sweep_contact<L: Lane>(
     kernel: Kernel,
+    as_one: bool,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
@@ -119,8 +120,8 @@ pub(super) fn sweep_contact<L: Lane>(
 ) {
     match kernel {
         Kernel::WarmStart(rules) => warm_start(rules, pair, contact, rows),
-        Kernel::SolveContacts(rules) => solve_contact(rules, params, pair, contact, rows),
-        Kernel::ApplyRestitution(rules) => restitute_contact(rules, params, pair, contact, rows),
+        Kernel::SolveContacts(rules) => solve_contact(Rules { as_one, ..rules }, params, pair, contact, rows),
+        Kernel::ApplyRestitution(rules) if as_one => restitute_contact(rules, params, pair, contact, rows),
         _ => unreachable!("a kernel over other rows"),
     }
 }

@@ -183,7 +183,14 @@ impl<S: Scalar> Reference<S> {
                     let own = first..first + row.point_count as usize + usize::from(rules.patch);
                     let (mut pair, rows) = (self.load_pair(row.bodies()), &mut self.rows);
                     let mut own = (&rows.points[own.clone()], &mut rows.impulses[own]);
-                    sweep_contact(pass.kernel, &params, &mut pair, &rows.contacts[i], &mut own);
+                    sweep_contact(
+                        pass.kernel,
+                        pass.kernel.presses_as_one(),
+                        &params,
+                        &mut pair,
+                        &rows.contacts[i],
+                        &mut own,
+                    );
                     self.store_pair(row.bodies(), &pair);
                 }
             }
