@@ -194,13 +194,15 @@ pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, subst
     let most = f64::from(softness.push_limit);
     let [a, b] = [contact.body_a, contact.body_b].map(|body| &problem.bodies[body as usize]);
     let normal = Vec3::from(contact.normal);
-    let moved = |row: &BodyRow, arm: Vec3| Vec3::from(row.dp) + Quat::from_array(row.dq) * arm - arm;
+    // An arm that turned moves along the normal by its part along the difference of the normal, turned back, from the normal.
+    let [back_a, back_b] = [a, b].map(|row| Quat::from_array(row.dq).inverse() * normal - normal);
+    let shift = normal.dot(Vec3::from(b.dp) - Vec3::from(a.dp));
     let mut held = [0.0; 2];
     for k in contact.first_point as usize..(contact.first_point + contact.point_count) as usize {
         let point = &problem.points[k];
-        let shift = moved(b, Vec3::from(point.r_b)) - moved(a, Vec3::from(point.r_a));
+        let moved = shift + Vec3::from(point.r_b).dot(back_b) - Vec3::from(point.r_a).dot(back_a);
         let before = point.separation - contact.preload;
-        for (held, separation) in held.iter_mut().zip([before, before + normal.dot(shift)]) {
+        for (held, separation) in held.iter_mut().zip([before, before + moved]) {
             let speed = (frequency * f64::from(-separation).max(0.0)).min(most);
             *held += 0.5 * f64::from(point.normal_mass) * speed * speed;
         }

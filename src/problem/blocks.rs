@@ -102,20 +102,20 @@ pub fn lay_out(
         let substep = if is_heap { Substep::of_heap } else { Substep::new };
         Block { substeps, substep: substep(config, dt / substeps as f32), ..Block::default() }
     }));
-    let (jamming, struck) = (contacts.jamming(), contacts.struck());
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
-    if count == 1 && jamming.is_empty() && struck.is_empty() {
+    if count == 1 && !contacts.any_struck() && !contacts.any_jamming() {
         order.extend_from_slice(&contacts.coloring.order);
         colors.clone_from(&contacts.coloring.offsets);
         blocks[0].contacts = [0, contacts.coloring.color_count() as u32];
         (blocks[0].struck, blocks[0].jamming) = (blocks[0].contacts[1], blocks[0].contacts[1]);
     } else {
         for (i, block) in blocks.iter_mut().enumerate() {
-            let is_of = |row: u32| block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
-            let jams = |row: u32| jamming.binary_search(&row).is_ok();
-            let is_struck = |row: u32| struck.binary_search(&row).is_ok() && !jams(row);
+            let is_of =
+                |row: u32| count == 1 || block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
+            let jams = |row: u32| contacts.jams(row);
+            let is_struck = |row: u32| contacts.is_struck(row) && !jams(row);
             let is_swept_once = |row: u32| is_of(row) && !jams(row) && !is_struck(row);
             let [first, struck] = deal_colors(&contacts.coloring, order, colors, is_swept_once);
             let [_, jamming] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && is_struck(row));

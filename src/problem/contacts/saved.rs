@@ -77,6 +77,7 @@ impl ContactRows {
             jams,
             struck: _,
             fast: _,
+            jointed: _,
             classes,
             materials,
             new_bodies: _,
