@@ -86,8 +86,8 @@ pub(super) fn convex_contact(
     let mut across = None;
     let mut consider = |d: Vec3, of_b: bool| {
         let distance = along(d);
-        // Of several faces, the one across which the solids are furthest apart.
-        let slack = if across.is_none() { TRUE * size } else { 0.0 };
+        // Of several faces, one across which the solids are as far apart as across any.
+        let slack = if across.is_none() { TRUE } else { EXACT } * size;
         let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - slack;
         if is_same || is_better(distance, best, found_is_true) {
             (best, found_is_true, across) = (distance, true, Some((d, of_b)));
@@ -289,7 +289,7 @@ mod tests {
             let found = convex_contact((&floor, &cone), &pos12, search, &mut ClipBuffers::default());
             worst = worst.max(-deepest(&found));
         }
-        assert!(worst < 1e-5, "{worst} m");
+        assert!(worst < 3e-5, "{worst} m");
     }
 
     #[test]

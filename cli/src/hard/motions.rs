@@ -197,3 +197,30 @@ pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
     checks.at_most("parts awake after 5 s", (simulation.world.dynamic_count() - asleep) as f64, 0.0);
     Ok(())
 }
+
+/// The bodies that a scene of the catalogue loses in some steps, and the energy at the end over that of the start.
+fn lost(setup: &Setup, spec: &str, steps: usize) -> Result<[f64; 2]> {
+    let scene = Scene::find_spec(spec)?;
+    let before = energy(&scene.world);
+    let mut simulation = setup.simulation(scene.world.clone())?;
+    (0..steps).try_for_each(|_| simulation.step(DT).map(drop))?;
+    Ok([scene.escaped(&simulation.world) as f64, energy(&simulation.world) / before])
+}
+
+/// What is thinner than its way in a step falls on triangles.
+pub(super) fn terrain(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    for (spec, name) in [("terrain", "from 5 m"), ("terrain:n=30,height=50", "from 50 m")] {
+        checks.at_most(format!("{name}: bodies lost"), lost(setup, spec, 400)?[0], 0.0);
+    }
+    Ok(())
+}
+
+/// What is fast meets thin walls, and keeps its energy.
+pub(super) fn bullets(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    for speed in [10.0, 100.0, 1000.0] {
+        let [lost, energy] = lost(setup, &format!("bullets:speed={speed}"), 120)?;
+        checks.at_most(format!("{speed} m/s: balls lost"), lost, 0.0);
+        checks.at_most(format!("{speed} m/s: energy at the end, over that of the start"), energy, 1.001);
+    }
+    Ok(())
+}
