@@ -1,5 +1,5 @@
-// apply_joint_changes: one thread applies the correction of one joint of one color to its bodies.
-// Reads joints, joint_changes, masses. Writes bodies that can move.
+// apply_joint_changes: one thread applies the corrections of one joint of one color and of its locks to its bodies.
+// Reads joints, axes, joint_changes, masses. Writes bodies that can move.
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/joint_system.rs.
 
@@ -7,6 +7,7 @@ fn apply_joint_change(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
+    apply_axis_changes(&pair, joint);
     let anchors = current_anchors(&pair, joint);
     apply_impulse(false, &pair, anchors.r_a, anchors.r_b, joint_changes[i].linear);
     store_pair(joint.body_a, joint.body_b, &pair);

@@ -1,15 +1,17 @@
-// measure_joints: one thread computes the velocity that one joint lacks.
-// Reads joints, bodies, masses. Writes joint_changes; no other thread writes the same one. Double: src/kernels/joint_system.rs.
+// measure_joints: one thread computes the velocities that one joint and its locks lack.
+// Reads joints, axes, bodies, masses. Writes joint_changes; no other thread writes the same one. Double: src/kernels/joint_system.rs.
 
 fn measure_joint(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
+    measure_axes(rules, &pair, joint);
     let anchors = current_anchors(&pair, joint);
     var wanted = relative_velocity(rules, &pair, anchors.r_a, anchors.r_b);
     if rules.biased {
         wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * pass_row.joint.bias_rate;
     }
+    wanted = of_anchors(joint, wanted);
     note_correction(rules.measured, wanted.x, 1.0);
     note_correction(rules.measured, wanted.y, 1.0);
     note_correction(rules.measured, wanted.z, 1.0);

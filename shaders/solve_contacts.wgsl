@@ -6,6 +6,7 @@
 fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
     let softness = pair_softness(pair);
     let movement = normal_movement(rules, pair, contact);
+    if rules.as_one { solve_as_one(rules, pair, contact, softness, movement); }
     for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
         var impulse = impulses[k];
         solve_normal(rules, pair, contact, points[k], softness, movement, &impulse);

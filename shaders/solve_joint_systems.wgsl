@@ -1,19 +1,112 @@
 // solve_joint_systems: one thread solves one system of joints.
-// Reads joint_systems, joint_blocks. Writes joint_nodes, joint_changes, joint_impulses; no other thread writes those of the same system.
-// Double: solve_system in src/kernels/joint_system.rs.
+// Reads joint_systems, joints. Writes joint_blocks, joint_nodes, joint_changes, joint_impulses; no other thread writes those of the same
+// system. Double: solve_system in src/kernels/joint_system.rs.
 
-fn solve_system(rules: Rules, system: u32) {
-    if is_converged(rules.measured) { return; }
+// The velocity that row i of a node lacks, less what its softness gives way by; 0 where there is no row.
+fn right_of_row(first_axis: u32, rows: u32, i: u32, softness: f32) -> f32 {
+    let axis = axis_of_row(rows, i);
+    if axis == 0u { return 0.0; }
+    let k = first_axis + axis - 1u;
+    return joint_changes[k].linear.x - joint_impulses[k].linear.x * softness;
+}
+
+// Keeps the correction of row i of a node.
+fn change_row(first_axis: u32, rows: u32, i: u32, change: f32) {
+    let axis = axis_of_row(rows, i);
+    if axis == 0u { return; }
+    let k = first_axis + axis - 1u;
+    joint_changes[k].linear.x = change;
+    joint_impulses[k].linear.x += change;
+}
+
+fn right_of_node(node: u32) -> vec3f {
+    let joint = joint_of_node(node);
+    let rows = rows_of_node(node);
+    let softness = joint_nodes[node].softness;
+    if rows == ANCHORS { return joint_changes[joint].linear - joint_impulses[joint].linear * softness; }
+    // Impulses of axes follow those of joints.
+    let first = params.joint_count + joints[joint].first_axis;
+    return vec3f(
+        right_of_row(first, rows, 0u, softness),
+        right_of_row(first, rows, 1u, softness),
+        right_of_row(first, rows, 2u, softness),
+    );
+}
+
+fn change_node(node: u32, change: vec3f) {
+    let joint = joint_of_node(node);
+    let rows = rows_of_node(node);
+    if rows == ANCHORS {
+        joint_changes[joint].linear = change;
+        joint_impulses[joint].linear += change;
+        return;
+    }
+    let first = params.joint_count + joints[joint].first_axis;
+    change_row(first, rows, 0u, change.x);
+    change_row(first, rows, 1u, change.y);
+    change_row(first, rows, 2u, change.z);
+}
+
+fn without_number(u: vec3f, i: u32) -> vec3f {
+    return vec3f(select(u.x, 0.0, i == 0u), select(u.y, 0.0, i == 1u), select(u.z, 0.0, i == 2u));
+}
+
+fn without_row(m: mat3x3f, i: u32) -> mat3x3f {
+    return mat3x3f(without_number(m[0], i), without_number(m[1], i), without_number(m[2], i));
+}
+
+fn without_column(m: mat3x3f, i: u32) -> mat3x3f {
+    let zero = vec3f(0.0);
+    return mat3x3f(select(m[0], zero, i == 0u), select(m[1], zero, i == 1u), select(m[2], zero, i == 2u));
+}
+
+// Takes row i of a node out if it is a limit that holds, and bears no impulse or would pull; whether it did.
+fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: bool, change: f32) -> bool {
+    if !is_limit_row(rows, i) || !held { return false; }
+    let before = joint_impulses[first_axis + axis_of_row(rows, i) - 1u].linear.x;
+    if before * (before + change) > 0.0 { return false; }
+    let along = joint_nodes[node].along;
+    let about_a = joint_nodes[node].about_a;
+    let about_b = joint_nodes[node].about_b;
+    let turn_a = joint_nodes[node].turn_a;
+    let turn_b = joint_nodes[node].turn_b;
+    joint_nodes[node].along = without_row(along, i);
+    joint_nodes[node].about_a = without_row(about_a, i);
+    joint_nodes[node].about_b = without_row(about_b, i);
+    joint_nodes[node].turn_a = without_column(turn_a, i);
+    joint_nodes[node].turn_b = without_column(turn_b, i);
+    return true;
+}
+
+// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
+// In a system that is new, all hold.
+fn let_go(system: u32, is_new: bool) -> bool {
+    var any = false;
+    let end = begin_of_system(system + 1u);
+    for (var node = begin_of_system(system); node < end; node++) {
+        let rows = rows_of_node(node);
+        if rows == ANCHORS { continue; }
+        let first = params.joint_count + joints[joint_of_node(node)].first_axis;
+        let held = diagonal_of(joint_blocks[first_block_of_node(node)].lower);
+        let change = joint_nodes[node].right;
+        any = let_go_of_row(node, first, rows, 0u, is_new || held.x > 0.0, change.x) || any;
+        any = let_go_of_row(node, first, rows, 1u, is_new || held.y > 0.0, change.y) || any;
+        any = let_go_of_row(node, first, rows, 2u, is_new || held.z > 0.0, change.z) || any;
+    }
+    return any;
+}
+
+// Finds the changes of the impulses of one system, the right sides of its nodes.
+fn find_changes(system: u32) {
     let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);
+    for (var node = first; node < end; node++) { joint_nodes[node].right = right_of_node(node); }
     for (var node = first; node < end; node++) {
-        let joint = joint_of_node(node);
-        joint_nodes[node].right = joint_changes[joint].linear - joint_impulses[joint].linear * joint_nodes[node].softness;
-    }
-    for (var node = first; node < end; node++) {
-        let right = joint_nodes[node].right;
+        let pivot = first_block_of_node(node);
         let end_block = end_block_of_node(node);
-        for (var at = first_block_of_node(node) + 1u; at < end_block; at++) {
+        let right = forward(joint_blocks[pivot].lower, joint_nodes[node].right);
+        joint_nodes[node].right = right;
+        for (var at = pivot + 1u; at < end_block; at++) {
             joint_nodes[node_of_block(at)].right -= block_times(joint_blocks[at].lower, right);
         }
     }
@@ -21,13 +114,28 @@ fn solve_system(rules: Rules, system: u32) {
         let node = first + left - 1u;
         let pivot = first_block_of_node(node);
         let end_block = end_block_of_node(node);
-        var change = block_times(joint_blocks[pivot].lower, joint_nodes[node].right);
+        let factors = joint_blocks[pivot].lower;
+        var change = joint_nodes[node].right * diagonal_of(factors);
         for (var at = pivot + 1u; at < end_block; at++) {
             change -= transposed_block_times(joint_blocks[at].lower, joint_nodes[node_of_block(at)].right);
         }
-        joint_nodes[node].right = change;
-        let joint = joint_of_node(node);
-        joint_changes[joint].linear = change;
-        joint_impulses[joint].linear += change;
+        joint_nodes[node].right = backward(factors, change);
     }
+}
+
+fn solve_system(rules: Rules, system: u32) {
+    if is_converged(rules.measured) { return; }
+    let first = begin_of_system(system);
+    let end = begin_of_system(system + 1u);
+    // Sweeps may have let go of limits since the system was factored.
+    for (var node = first; node < end; node++) { joint_nodes[node].right = vec3f(0.0); }
+    let is_new = 0.0 > joint_nodes[first].softness;
+    var changed = let_go(system, is_new) || is_new;
+    loop {
+        if changed { factor_blocks(system); }
+        find_changes(system);
+        changed = let_go(system, false);
+        if !changed { break; }
+    }
+    for (var node = first; node < end; node++) { change_node(node, joint_nodes[node].right); }
 }

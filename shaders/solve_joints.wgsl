@@ -7,7 +7,7 @@ fn solve_joint(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }
     let joint = joints[i];
     var pair = load_pair(joint.body_a, joint.body_b);
-    solve_axes(rules, &pair, joint);
+    solve_axes(rules, false, &pair, joint);
     let anchors = current_anchors(&pair, joint);
     let x = joint_column(&pair, anchors, vec3f(1.0, 0.0, 0.0));
     let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0));

@@ -7,8 +7,13 @@
 //!
 //! A class rises as soon as a load lasts, and falls only after a second in which half of the lower class's promise was kept: a load that is as
 //! large as before never changes a class. The power of two makes the change exact: impulses and preloads scale without rounding.
+//!
+//! Bodies that others hold inside of each other press the harder the stiffer their springs are, so that every class would ask for the next one.
+//! That force comes from no load: a contact counts at most what the bodies and drives of its island can be as a load.
 
 mod island;
+
+use glam::Vec3;
 
 use crate::config::{Method, SolverConfig, Stabilization};
 use crate::error::{Result, ensure};
@@ -16,7 +21,7 @@ use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
 use crate::saved::{Archive, Saved};
 use crate::stats::EFFORT_CLASSES;
-use crate::world::{BodyKind, World};
+use crate::world::{Body, BodyKind, World};
 use island::{HIGHEST, Island};
 
 /// A constraint, for the effort that its island takes.
@@ -28,10 +33,10 @@ pub struct Interface {
     pub b: u32,
     /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
     pub need: f32,
+    /// The force under which a contact sags as deep as promised with the substeps of the settings; of a joint the most force of its drives (N).
+    pub force: f32,
     /// Whether it is a joint, which no other takes load from.
     pub is_joint: bool,
-    /// The row of the contact or joint.
-    pub row: u32,
 }
 
 /// The class of effort of each island, and which islands are heaps.
@@ -41,8 +46,6 @@ pub struct Effort {
     classes: Vec<u8>,
     /// Steps in which the next lower class would have kept its promise, body by body.
     calm_for: Vec<u8>,
-    /// How deep contacts of its island overlapped, over the promise, when its class changed in the hope of less; 0 where it may rise. Body by body.
-    overlapped: Vec<f32>,
     /// Bodies that began on others, unbalanced by any forces, and whose islands did not come to rest since.
     restless: Vec<u32>,
     /// The need that gives them [`RESTLESS_SUBSTEPS`].
@@ -60,9 +63,11 @@ pub struct Effort {
     used: Vec<Kind>,
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
+    /// Whether classes rose since they were decided.
+    is_refined: bool,
     highest: u8,
-    /// The lowest class from which on a class has to show that it lessens overlaps.
-    judged_from: u8,
+    /// The class of [`LONG_SUBSTEPS`].
+    long_from: u8,
     /// Bodies that can be pushed, asleep or not.
     movable: u32,
     /// Bodies that are awake and can be pushed, class by class.
@@ -77,7 +82,6 @@ pub struct Effort {
 crate::saved::cloned!(Effort {
     classes,
     calm_for,
-    overlapped,
     restless,
     restless_need,
     heaps,
@@ -87,8 +91,9 @@ crate::saved::cloned!(Effort {
     heaps_in,
     used,
     any_above,
+    is_refined,
     highest,
-    judged_from,
+    long_from,
     movable,
     counts,
 } scratch { awake, islands, of_root });
@@ -102,7 +107,6 @@ impl Saved for Effort {
         let Self {
             classes,
             calm_for,
-            overlapped,
             restless,
             restless_need,
             heaps,
@@ -112,8 +116,9 @@ impl Saved for Effort {
             heaps_in,
             used,
             any_above,
+            is_refined,
             highest,
-            judged_from,
+            long_from,
             movable,
             counts,
             awake: _,
@@ -124,14 +129,12 @@ impl Saved for Effort {
         if A::READS {
             classes.resize(bodies, 0);
             calm_for.resize(bodies, 0);
-            overlapped.resize(bodies, 0.0);
             heaps.resize(bodies, false);
             heaps_before.resize(bodies, false);
         }
         archive.runs(bodies, |i, archive| {
             classes[i].walk(archive)?;
             calm_for[i].walk(archive)?;
-            overlapped[i].walk(archive)?;
             heaps[i].walk(archive)?;
             heaps_before[i].walk(archive)?;
             ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))
@@ -143,8 +146,9 @@ impl Saved for Effort {
         heaps_in.walk(archive)?;
         used.walk(archive)?;
         any_above.walk(archive)?;
+        is_refined.walk(archive)?;
         highest.walk(archive)?;
-        judged_from.walk(archive)?;
+        long_from.walk(archive)?;
         movable.walk(archive)?;
         counts.walk(archive)
     }
@@ -158,11 +162,21 @@ const HEAPS_EVERY: u32 = 8;
 /// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
 /// 0.12 of the radius thick, 4 of 15 stand with 8, 9 with 16 and 10 with 32.
 const RESTLESS_SUBSTEPS: f32 = 32.0;
-/// Fewest substeps of a class that has to show that it lessens overlaps. A contact is at rest within a step of so many: the damper of the default
-/// lets it sag over 25.
-const JUDGED_SUBSTEPS: u32 = 64;
+/// From so many substeps on a class falls after as many substeps, and not after as many steps: each step costs more.
+const LONG_SUBSTEPS: u32 = 64;
 /// What is as fast as after a fall of so long does not come to rest where it began (s).
 const FALL: f32 = 0.1;
+
+/// The most that a contact bears of the loads of its island, over their sum: what leans on others, as a wedge does, bears more than its weight.
+const LEVERAGE: f32 = 4.0;
+
+/// The load that a body can be to its contacts in a step (N): its weight, what pulls it, and what stops it within the step.
+fn load_of(body: &Body, gravity: Vec3, dt: f32) -> f32 {
+    let mass = body.mass.mass;
+    let gyration = (body.mass.principal_inertia.max_element() / mass).sqrt();
+    let speed = body.linear_velocity.length() + gyration * body.angular_velocity.length();
+    mass * (gravity.length() + speed / dt) + body.whole_force().length() + body.whole_torque().length() / gyration
+}
 
 /// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
@@ -180,9 +194,8 @@ impl Effort {
     }
 
     /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` gives the contacts and joints between bodies that are
-    /// awake, where a body counts as movable that a pass moves; `overlap` gives how deep the surfaces of the contact of a row overlap, over the
-    /// sag that the settings promise; `is_above` says whether any needs more than class 0 gives. Where no body is above class 0 and none has to
-    /// be, nothing goes over them.
+    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives. Where no body is
+    /// above class 0 and none has to be, nothing goes over them.
     pub fn follow<I: Iterator<Item = Interface> + Clone>(
         &mut self,
         world: &World,
@@ -190,10 +203,10 @@ impl Effort {
         config: &SolverConfig,
         dt: f32,
         is_above: bool,
-        (interfaces, overlap): (impl FnOnce() -> I, impl Fn(u32) -> f32),
+        interfaces: impl FnOnce() -> I,
     ) -> bool {
         self.highest = Self::highest(config);
-        self.judged_from = (JUDGED_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
+        self.long_from = (LONG_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
         self.restless_need = (RESTLESS_SUBSTEPS / config.substeps as f32).powi(2);
         self.has_heaps = config.has_heap_springs();
         if self.heaps_change {
@@ -204,7 +217,6 @@ impl Effort {
         if is_first {
             self.classes.resize(world.bodies.len(), 0);
             self.calm_for.resize(world.bodies.len(), 0);
-            self.overlapped.resize(world.bodies.len(), 0.0);
             self.heaps.resize(world.bodies.len(), false);
             self.heaps_before.resize(world.bodies.len(), false);
             self.movable = world.dynamic_count() as u32;
@@ -222,9 +234,8 @@ impl Effort {
         // No contact holds bodies of two kinds.
         let has_kinds = self.used.len() > 1;
         let is_restless = !self.restless.is_empty();
-        let is_squeezed = self.overlapped.iter().any(|&before| before > 0.0);
-        let changed = (is_first || self.any_above || is_above || is_squeezed || looks || has_kinds || is_restless)
-            && self.follow_islands(world, asleep, interfaces(), overlap, looks);
+        let changed = (is_first || self.any_above || is_above || looks || has_kinds || is_restless)
+            && self.follow_islands(world, asleep, interfaces(), dt, looks);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
             self.restless.retain(|&body| {
@@ -244,11 +255,10 @@ impl Effort {
         self.restless.retain(|&body| changed.binary_search(&(body as usize)).is_err());
         self.classes.resize(bodies, 0);
         self.calm_for.resize(bodies, 0);
-        self.overlapped.resize(bodies, 0.0);
         self.heaps.resize(bodies, false);
         self.heaps_before.resize(bodies, false);
         for &i in changed.iter().filter(|&&i| i < bodies) {
-            (self.classes[i], self.calm_for[i], self.overlapped[i]) = (0, 0, 0.0);
+            (self.classes[i], self.calm_for[i]) = (0, 0);
             (self.heaps[i], self.heaps_before[i]) = (false, false);
         }
         self.movable = world.dynamic_count() as u32;
@@ -257,6 +267,19 @@ impl Effort {
     /// Notes bodies that begin on others, unbalanced by any forces.
     pub fn note_restless(&mut self, bodies: Vec<u32>) {
         self.restless.extend(bodies);
+    }
+
+    /// Raises the class of the bodies of an island by two, so that the next step has a quarter of its substep; whether that is possible.
+    pub fn refine(&mut self, bodies: impl Iterator<Item = usize> + Clone) -> bool {
+        let class = bodies.clone().map(|i| self.class_of(i)).max().unwrap_or(0);
+        if class >= self.highest || self.classes.is_empty() {
+            return false;
+        }
+        for i in bodies {
+            (self.classes[i], self.calm_for[i]) = ((class + 2).min(self.highest), 0);
+        }
+        (self.any_above, self.is_refined) = (true, true);
+        true
     }
 
     fn any_heap(&self) -> bool {
@@ -273,10 +296,11 @@ impl Effort {
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
-            Interface { a, b, need: need as f32, is_joint: false, row: 0 }
+            // What statics finds is a load, however strong the contact is.
+            Interface { a, b, need: need as f32, force: 0.0, is_joint: false }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
-        self.follow_islands(world, &[], interfaces.iter().copied(), |_| 0.0, false);
+        self.follow_islands(world, &[], interfaces.iter().copied(), dt, false);
     }
 
     fn follow_islands(
@@ -284,7 +308,7 @@ impl Effort {
         world: &World,
         asleep: &[bool],
         interfaces: impl Iterator<Item = Interface> + Clone,
-        overlap: impl Fn(u32) -> f32,
+        dt: f32,
         looks_for_heaps: bool,
     ) -> bool {
         let bodies = world.bodies.len();
@@ -298,65 +322,57 @@ impl Effort {
         let root = |body: u32| roots[body as usize] as usize;
         self.of_root.clear();
         self.of_root.resize(bodies, Island::NONE);
-        for Interface { a, b, need, is_joint, .. } in interfaces.clone() {
-            let body = if a == IMMOVABLE { b } else { a };
-            if body != IMMOVABLE {
-                let island = &mut self.of_root[root(body)];
-                if is_joint {
-                    island.whole_need = island.whole_need.max(need);
-                    island.has_joints = true;
-                } else {
-                    island.needs.add(need);
-                    island.contacts += 1;
-                }
-            }
-        }
         self.awake.clear();
         for (i, body) in (0..).zip(&world.bodies) {
             if body.kind == BodyKind::Fixed || asleep.get(i as usize) == Some(&true) {
                 continue;
             }
-            self.awake.push((i, body.kind == BodyKind::Dynamic));
+            let is_dynamic = body.kind == BodyKind::Dynamic;
+            self.awake.push((i, is_dynamic));
             let island = &mut self.of_root[root(i)];
             let i = i as usize;
             island.bodies += 1;
             island.class = island.class.max(self.classes[i]);
             island.calm_for = island.calm_for.min(self.calm_for[i]);
-            island.overlapped = island.overlapped.max(self.overlapped[i]);
             island.is_heap |= self.heaps[i];
             island.fastest = island.fastest.max(body.linear_velocity.length());
+            if is_dynamic {
+                island.load += load_of(body, world.gravity_on(i), dt);
+            }
+        }
+        let body_of = |a: u32, b: u32| Some(if a == IMMOVABLE { b } else { a }).filter(|&body| body != IMMOVABLE);
+        for Interface { a, b, need, force, is_joint } in interfaces.clone() {
+            if let Some(body) = body_of(a, b).filter(|_| is_joint) {
+                let island = &mut self.of_root[root(body)];
+                island.load += force;
+                island.whole_need = island.whole_need.max(need);
+                island.has_joints = true;
+            }
+        }
+        for Interface { a, b, need, force, is_joint } in interfaces {
+            if let Some(body) = body_of(a, b).filter(|_| !is_joint) {
+                let island = &mut self.of_root[root(body)];
+                island.needs.add(need.min(LEVERAGE * island.load / force));
+                island.contacts += 1;
+            }
         }
         for &body in &self.restless {
             let need = &mut self.of_root[root(body)].whole_need;
             *need = need.max(self.restless_need);
         }
-        let mut any_asks = false;
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
             if looks_for_heaps {
                 island.is_heap = self.has_heaps && island.becomes_heap();
             }
-            any_asks |= island.asks_for_more(self.highest);
+            (island.class, island.calm_for) = island.next(self.highest, self.long_from);
         }
-        // Overlaps of few islands count, and each costs a look at the poses of two bodies.
-        for Interface { a, b, need, is_joint, row } in interfaces.filter(|_| any_asks) {
-            let body = if a == IMMOVABLE { b } else { a };
-            if body != IMMOVABLE && !is_joint && need > 1.0 {
-                let island = &mut self.of_root[root(body)];
-                if island.asks_for_more(self.highest) {
-                    island.overlap = island.overlap.max(overlap(row));
-                }
-            }
-        }
-        for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
-            (island.class, island.calm_for, island.overlapped) = island.next(self.highest, self.judged_from);
-        }
-        let mut changed = false;
+        let mut changed = std::mem::take(&mut self.is_refined);
         let mut kinds = [[0; 2]; EFFORT_CLASSES];
         for &(body, is_dynamic) in &self.awake {
-            let Island { class, calm_for, overlapped, is_heap, .. } = self.of_root[root(body)];
+            let Island { class, calm_for, is_heap, .. } = self.of_root[root(body)];
             let body = body as usize;
             changed |= class != self.classes[body];
-            (self.classes[body], self.calm_for[body], self.overlapped[body]) = (class, calm_for, overlapped);
+            (self.classes[body], self.calm_for[body]) = (class, calm_for);
             self.heaps[body] = is_heap;
             self.heaps_change |= is_heap != self.heaps_before[body];
             kinds[usize::from(class)][usize::from(is_heap)] += u32::from(is_dynamic);

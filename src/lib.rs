@@ -49,6 +49,7 @@ pub mod config;
 pub mod conform;
 pub mod contacts;
 mod effort;
+mod energy;
 mod error;
 mod graph;
 mod kernels;

@@ -1,6 +1,8 @@
 //! The names of kinds in files, on command lines and in messages.
 
-/// Gives a kind without fields one name a value: `ALL`, `name`, `Display`, `FromStr`.
+/// Gives a kind without fields one name a value: `ALL`, `name`, `Display`, `FromStr`. The tests of this repository use it too.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! named {
     ($kind:ident { $($value:ident = $name:literal,)+ }) => {
         impl $kind {
@@ -22,10 +24,10 @@ macro_rules! named {
         }
 
         impl std::str::FromStr for $kind {
-            type Err = $crate::error::Error;
+            type Err = $crate::Error;
 
-            fn from_str(name: &str) -> $crate::error::Result<Self> {
-                let unknown = || $crate::error::input!("{name:?} is none of {}", [$($name),+].join(", "));
+            fn from_str(name: &str) -> $crate::Result<Self> {
+                let unknown = || $crate::Error::input(format!("{name:?} is none of {}", [$($name),+].join(", ")));
                 Self::ALL.into_iter().find(|value| value.name() == name).ok_or_else(unknown)
             }
         }

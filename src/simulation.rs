@@ -218,7 +218,7 @@ impl Simulation {
         self.stages.events.inside()
     }
 
-    /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), each
+    /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), then what flew through them, each
     /// ascending by the pairs of bodies, then joints that broke, ascending. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
     /// failed. The order and the numbers are the same for any backend with the same bits.
     ///
@@ -391,7 +391,8 @@ impl Simulation {
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
         stats.kernels.extend_from_slice(self.backend.kernel_times());
-        timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
+        let taken = timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
+        (stats.energy_taken, stats.refused) = (taken.energy, taken.refused);
         self.state = next_state();
         let convergence = &self.stages.problem.convergence;
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);

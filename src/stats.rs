@@ -46,9 +46,13 @@ pub struct StepStats {
     pub joints: usize,
     /// Those of them that are solved at once and not swept.
     pub direct_joints: usize,
-    /// Largest gap at rest that sweeps would leave in a joint, as a share of its arms. Above `max_joint_gap_share` of the settings ball joints
-    /// are solved at once, or take more substeps.
+    /// Largest gap that sweeps would leave in a joint at rest, as a share of its arms. Above `max_joint_gap_share` of the settings, nets take more
+    /// substeps.
     pub swept_joint_gap: f32,
+    /// Energy that the step took from bodies because constraints had made it (J).
+    pub energy_taken: f64,
+    /// Islands whose step would have made more energy than they have: they stood still, and take shorter substeps from the next step on.
+    pub refused: usize,
     /// Sweeps that were done, where the settings have a tolerance; else 0.
     pub sweeps: u32,
     /// Sweeps that the plan held, where the settings have a tolerance; else 0.

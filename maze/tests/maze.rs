@@ -19,7 +19,7 @@ tests! {
         every_board_is_won_by_a_script_and_the_ball_rolls_without_slipping,
         a_script_that_rolls_into_a_hole_loses_and_a_script_that_ends_decides_nothing,
         lanes_play_the_same_game_to_the_last_bit,
-        the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes,
+        the_ball_rolls_over_the_seams_of_triangles_and_boxes_as_over_one_plane,
         the_board_tilts_no_further_than_its_limit_and_no_faster_than_its_rate,
         a_game_is_won_within_two_fifths_of_a_cell_of_the_goal_and_not_before,
     }
@@ -104,7 +104,7 @@ fn roll_over(floor: Body) -> (f32, f32) {
     (hop, slip)
 }
 
-fn the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_boxes() {
+fn the_ball_rolls_over_the_seams_of_triangles_and_boxes_as_over_one_plane() {
     const SIDE: f32 = 0.06;
     let corner = |k: u32| Vec3::new((k % 41) as f32 * SIDE - 20.0 * SIDE, 0.0, (k / 41) as f32 * SIDE - 20.0 * SIDE);
     let cells = (0..41 * 40).filter(|k| k % 41 < 40);
@@ -117,8 +117,9 @@ fn the_ball_rolls_over_the_seams_of_triangles_as_over_one_plane_and_not_so_over_
     let (plane_hop, plane_slip) = roll_over(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let (mesh_hop, mesh_slip) = roll_over(Body::kinematic().shape(mesh));
     let (box_hop, box_slip) = roll_over(boxes);
-    assert!(mesh_hop < plane_hop + 2e-6 && mesh_slip < plane_slip + 1e-4, "{mesh_hop} m, {mesh_slip} m/s on triangles");
-    assert!(box_hop > 1e-5 && box_slip > 1e-3, "{box_hop} m, {box_slip} m/s on boxes; {plane_slip} m/s on a plane");
+    for (hop, slip, floor) in [(mesh_hop, mesh_slip, "triangles"), (box_hop, box_slip, "boxes")] {
+        assert!(hop < plane_hop + 2e-6 && slip < plane_slip + 1e-4, "{hop} m, {slip} m/s on {floor}");
+    }
 }
 
 fn the_board_tilts_no_further_than_its_limit_and_no_faster_than_its_rate() {

@@ -75,18 +75,31 @@ fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
 // Rows that are no limits are further than this above their upper limit (m, rad).
 const LEAST_LEFT: f32 = -5e17;
 
-fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
-    let motion = axis_motion(pair, joint, axis);
-    let mass = reciprocal(axis_inverse_mass(pair, motion));
+// Whether a row is a lock: neither a limit nor a drive.
+fn is_lock(axis: Axis) -> bool { return LEAST_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
 
-    // Of two limits the nearer one acts: it pushes the body inwards.
+// Where the nearer of the two limits of an axis is.
+struct NearerLimit { is_limit: bool, is_upper: bool, gap: f32, apart: bool }
+
+fn nearer_limit(axis: Axis, motion: AxisMotion) -> NearerLimit {
     let is_limit = axis.left > LEAST_LEFT;
     let place = axis.gap + motion.moved;
     let left = axis.left - motion.moved;
     let is_upper = is_limit && place > left;
-    let sign = select(1.0, -1.0, is_upper);
     let gap = select(place, left, is_upper);
-    let apart = is_limit && gap > 0.0;
+    return NearerLimit(is_limit, is_upper, gap, is_limit && gap > 0.0);
+}
+
+// Sweeps one axis; with `but_locks` only if it is no lock.
+fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
+    let motion = axis_motion(pair, joint, axis);
+    let mass = reciprocal(axis_inverse_mass(pair, motion));
+
+    // Of two limits the nearer one acts: it pushes the body inwards.
+    let limit = nearer_limit(axis, motion);
+    let gap = limit.gap;
+    let apart = limit.apart;
+    let sign = select(1.0, -1.0, limit.is_upper);
 
     // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
     let is_drive = axis.mass_scale + axis.impulse_scale > 0.0;
@@ -106,8 +119,9 @@ fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis,
     let before = joint_impulses[k].linear.x * sign;
     let wanted = (axis_speed(rules, pair, motion) - axis.speed) * sign;
     let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
-    let least = select(-axis.max_impulse, 0.0, is_limit);
-    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    let least = select(-axis.max_impulse, 0.0, limit.is_limit);
+    var sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    if but_locks { sum = select(sum, before, is_lock(axis)); }
     let change = (sum - before) * sign;
     joint_impulses[k].linear.x = sum * sign;
     note_correction(rules.measured, change, mass);
@@ -115,9 +129,36 @@ fn solve_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis,
 }
 
 // Impulses of axes follow those of joints.
-fn solve_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {
+fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint) {
     for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
-        solve_axis(rules, pair, joint, axes[k], params.joint_count + k);
+        solve_axis(rules, but_locks, pair, joint, axes[k], params.joint_count + k);
+    }
+}
+
+// The velocity that a lock lacks, or a limit that holds as one; none of a drive.
+fn measure_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
+    let motion = axis_motion(pair, joint, axis);
+    let limit = nearer_limit(axis, motion);
+    var rate = 0.0;
+    if rules.biased { rate = pass_row.joint.bias_rate; }
+    // Up to its limit the body goes within this substep.
+    let pull = limit.gap * select(rate, pass_row.inverse_substep, limit.apart);
+    let speed = axis_speed(rules, pair, motion);
+    let wanted = select(speed + pull, speed - pull, limit.is_upper);
+    let of_lock = select(0.0, wanted, is_lock(axis));
+    note_correction(rules.measured, of_lock, 1.0);
+    joint_changes[k].linear.x = select(of_lock, wanted, limit.is_limit) * -params.relaxation;
+}
+
+fn measure_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        measure_axis(rules, pair, joint, axes[k], params.joint_count + k);
+    }
+}
+
+fn apply_axis_changes(pair: ptr<function, Pair>, joint: Joint) {
+    for (var k = joint.first_axis; k < joint.first_axis + joint.axis_count; k++) {
+        apply_axis_impulse(pair, axis_motion(pair, joint, axes[k]), joint_changes[params.joint_count + k].linear.x);
     }
 }
 

@@ -30,7 +30,8 @@ fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
     return sum + larger(correction, 0.0);
 }
 
-fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
+// The change of the normal impulse that a point asks for by itself.
+fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
@@ -40,13 +41,84 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * (*impulse).normal;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
     let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
-    let sum = clamp_normal(rules, (*impulse).normal, params.relaxation * correction);
+    return params.relaxation * correction;
+}
+
+fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
+    let correction = normal_correction(rules, pair, contact, point, softness, movement, (*impulse).normal);
+    let sum = clamp_normal(rules, (*impulse).normal, correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
     if rules.bounces { (*impulse).peak = larger((*impulse).peak, sum); }
     note_correction(rules.measured, change, point.normal_mass);
     apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
+}
+
+// The impulse that a point would have by itself, and the normal velocity that it lacks.
+struct Wanted { sum: f32, lacking: f32 }
+
+// All points of a manifold: their changes, the sums of their arms by their changes and of their arms, how many they are, and the sums of changes,
+// gains and masses.
+struct Together {
+    changes: array<f32, 4>, arms_a: vec3f, arms_b: vec3f, middle_a: vec3f, middle_b: vec3f, count: f32, all: f32, gain: f32, mass: f32
+}
+
+fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f32, wanted: Wanted) {
+    let change = wanted.sum - impulse;
+    (*together).changes[k] = change;
+    (*together).arms_a += point.r_a * change;
+    (*together).arms_b += point.r_b * change;
+    (*together).all = (*together).all + change;
+    (*together).gain = (*together).gain + change * wanted.lacking;
+    let share = select(0.0, 1.0, point.normal_mass > 0.0);
+    (*together).middle_a += point.r_a * share;
+    (*together).middle_b += point.r_b * share;
+    (*together).count = (*together).count + share;
+    (*together).mass = (*together).mass + point.normal_mass;
+}
+
+// Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of
+// what they lack: steepest descent.
+fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) {
+    let turn_a = cross3((*together).arms_a, contact.normal);
+    let turn_b = cross3((*together).arms_b, contact.normal);
+    let spin_a = spin_of(rules.isotropic, (*pair).mass_a, turn_a);
+    let spin_b = spin_of(rules.isotropic, (*pair).mass_b, turn_b);
+    let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
+    let all = (*together).all;
+    let moved = (all * all) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turned;
+    let inverse = reciprocal(larger((*together).count, 1.0));
+    let about_a = cross3((*together).middle_a * inverse, contact.normal);
+    let about_b = cross3((*together).middle_b * inverse, contact.normal);
+    let turning = dot3(about_a, spin_of(rules.isotropic, (*pair).mass_a, about_a)) + dot3(about_b, spin_of(rules.isotropic, (*pair).mass_b, about_b));
+    let alike = reciprocal((*together).mass * (((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning));
+    let best = smaller((*together).gain * reciprocal(moved), larger(alike, 1.0));
+    let share = select(0.0, best, (*together).count > 1.0 && (*together).gain > 0.0);
+    for (var k = 0u; k < contact.point_count; k++) {
+        var impulse = impulses[contact.first_point + k];
+        impulse.normal = impulse.normal + share * (*together).changes[k];
+        if rules.bounces { impulse.peak = larger(impulse.peak, impulse.normal); }
+        impulses[contact.first_point + k] = impulse;
+    }
+    let push = contact.normal * (share * all);
+    (*pair).a.v -= push * (*pair).mass_a.inv_mass;
+    (*pair).a.w -= spin_a * share;
+    (*pair).b.v += push * (*pair).mass_b.inv_mass;
+    (*pair).b.w += spin_b * share;
+}
+
+// Non-penetration of all points together, before each is solved by itself.
+fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softness: Softness, movement: NormalMovement) {
+    var together = Together();
+    for (var k = 0u; k < contact.point_count; k++) {
+        let point = points[contact.first_point + k];
+        let impulse = impulses[contact.first_point + k].normal;
+        let correction = normal_correction(rules, pair, contact, point, softness, movement, impulse);
+        let lacking = select(0.0, correction * reciprocal(point.normal_mass), point.normal_mass > 0.0);
+        add_point(&together, k, point, impulse, Wanted(clamp_normal(rules, impulse, correction), lacking));
+    }
+    press_as_one(rules, pair, contact, &together);
 }

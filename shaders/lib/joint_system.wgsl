@@ -1,7 +1,7 @@
 // All joints of a connected set of bodies, solved at once: S = L D L^T in blocks of 3 x 3. Doubles: src/kernels/joint_system.rs.
 
-// Rounding of the products that a pivot is made of changes its determinant, at a trace of 1 to 2, by 3e-7 a joint; this is 2^-17.
-const PIVOT_STIFFENING: f32 = 7.62939453125e-6;
+// The least pivot of a row, relative to the sum of those of its block in S: 2^-20.
+const LEAST_PIVOT: f32 = 9.5367431640625e-7;
 
 // Where the lists of the systems begin in their buffer, in numbers. Layout: src/backend/gpu/rows.rs.
 fn begin_of_system(system: u32) -> u32 { return joint_systems[joint_systems[0] + system]; }
@@ -9,12 +9,25 @@ fn softness_of_system(system: u32) -> f32 { return bitcast<f32>(joint_systems[jo
 fn joint_of_node(node: u32) -> u32 { return joint_systems[joint_systems[2] + 4u * node]; }
 fn first_block_of_node(node: u32) -> u32 { return joint_systems[joint_systems[2] + 4u * node + 1u]; }
 fn end_block_of_node(node: u32) -> u32 { return joint_systems[joint_systems[2] + 4u * node + 2u]; }
+fn rows_of_node(node: u32) -> u32 { return joint_systems[joint_systems[2] + 4u * node + 3u]; }
 fn node_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] + 4u * block]; }
 fn shared_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] + 4u * block + 1u]; }
 fn first_term_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] + 4u * block + 2u]; }
 fn end_term_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] + 4u * block + 3u]; }
 fn left_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term]; }
 fn right_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term + 1u]; }
+
+// The softness of a node whose system is not factored since it began.
+const NOT_FACTORED: f32 = -1.0;
+
+// The rows of a node that holds the anchors of a joint together.
+const ANCHORS: u32 = 0xffffffffu;
+
+// One more than the number of the axis that is row i of a node, among those of the joint; 0 for no row.
+fn axis_of_row(rows: u32, i: u32) -> u32 { return (rows >> (8u * i)) & 0x7fu; }
+
+// Whether row i of a node is a limit: it holds while it bears an impulse, and is not there otherwise.
+fn is_limit_row(rows: u32, i: u32) -> bool { return ((rows >> (8u * i)) & 0x80u) != 0u; }
 
 fn block_times(m: mat3x3f, u: vec3f) -> vec3f { return m[0] * u.x + m[1] * u.y + m[2] * u.z; }
 
@@ -24,16 +37,25 @@ fn block_product(left: mat3x3f, right: mat3x3f) -> mat3x3f {
     return mat3x3f(block_times(left, right[0]), block_times(left, right[1]), block_times(left, right[2]));
 }
 
-// A block less the product of one block with the transpose of another.
-fn less_product(block: mat3x3f, left: mat3x3f, right: mat3x3f) -> mat3x3f {
+// The product of one block with the transpose of another.
+fn product_with_transpose(left: mat3x3f, right: mat3x3f) -> mat3x3f {
     return mat3x3f(
-        block[0] - block_times(left, vec3f(right[0].x, right[1].x, right[2].x)),
-        block[1] - block_times(left, vec3f(right[0].y, right[1].y, right[2].y)),
-        block[2] - block_times(left, vec3f(right[0].z, right[1].z, right[2].z)),
+        block_times(left, vec3f(right[0].x, right[1].x, right[2].x)),
+        block_times(left, vec3f(right[0].y, right[1].y, right[2].y)),
+        block_times(left, vec3f(right[0].z, right[1].z, right[2].z)),
     );
 }
 
 fn block_sum(a: mat3x3f, b: mat3x3f) -> mat3x3f { return mat3x3f(a[0] + b[0], a[1] + b[1], a[2] + b[2]); }
+
+fn block_less(a: mat3x3f, b: mat3x3f) -> mat3x3f { return mat3x3f(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
+
+// The block with these rows.
+fn block_of_rows(x: vec3f, y: vec3f, z: vec3f) -> mat3x3f {
+    return mat3x3f(vec3f(x.x, y.x, z.x), vec3f(x.y, y.y, z.y), vec3f(x.z, y.z, z.z));
+}
+
+fn diagonal_of(m: mat3x3f) -> vec3f { return vec3f(m[0].x, m[1].y, m[2].z); }
 
 // A block with more on its diagonal.
 fn with_diagonal(m: mat3x3f, more: f32) -> mat3x3f {
@@ -44,42 +66,101 @@ fn with_diagonal(m: mat3x3f, more: f32) -> mat3x3f {
     );
 }
 
-// The inverse of a pivot. A pivot that rounding may have made indefinite is made stiffer by a little.
-fn inverse_pivot(pivot: mat3x3f) -> mat3x3f {
-    let c = cofactors(pivot[0], pivot[1], pivot[2], PIVOT_STIFFENING);
-    let inverse = reciprocal(c.determinant) * c.scale;
-    return mat3x3f(c.x * inverse, c.y * inverse, c.z * inverse);
+// One over a pivot of a row; zero of a row that is not there.
+fn inverse_of_row(d: f32, least: f32, own: f32) -> f32 { return select(0.0, reciprocal(larger(d, least)), own > 0.0); }
+
+// A pivot whose rows had this diagonal in S as l d l^T: below the diagonal l, on it 1/d, which is zero in a row that is not there and had a
+// zero in S.
+fn factored_pivot(pivot: mat3x3f, own: vec3f) -> mat3x3f {
+    let x = pivot[0];
+    let y = pivot[1];
+    let z = pivot[2];
+    let least = (own.x + own.y + own.z) * LEAST_PIVOT;
+    let d_x = inverse_of_row(x.x, least, own.x);
+    let l_xy = x.y * d_x;
+    let l_xz = x.z * d_x;
+    let d_y = inverse_of_row(y.y - l_xy * x.y, least, own.y);
+    let below = y.z - l_xy * x.z;
+    let l_yz = below * d_y;
+    let d_z = inverse_of_row(z.z - l_xz * x.z - l_yz * below, least, own.z);
+    return mat3x3f(vec3f(d_x, l_xy, l_xz), vec3f(0.0, d_y, l_yz), vec3f(0.0, 0.0, d_z));
 }
 
-// The turn that a unit impulse at the arm r gives a body, axis by axis: I^-1 (r x e).
-fn turn_of_impulse(m: Mass, r: vec3f) -> mat3x3f {
-    let x = m.inv_inertia_x;
-    let y = vec3f(m.inv_inertia_x.y, m.inv_inertia_yz.x, m.inv_inertia_yz.y);
-    let z = vec3f(m.inv_inertia_x.z, m.inv_inertia_yz.y, m.inv_inertia_yz.z);
-    return mat3x3f(y * r.z - z * r.y, z * r.x - x * r.z, x * r.y - y * r.x);
+// The block of L D below a factored pivot, from that of S.
+fn block_over(block: mat3x3f, pivot: mat3x3f) -> mat3x3f {
+    let y = block[1] - block[0] * pivot[0].y;
+    return mat3x3f(block[0], y, block[2] - block[0] * pivot[0].z - y * pivot[1].z);
 }
 
-// The movement of the point at the arm r of a body that unit impulses move by `inv_mass` and turn by `turn`.
-fn movement_at(inv_mass: f32, turn: mat3x3f, r: vec3f) -> mat3x3f {
-    return with_diagonal(mat3x3f(cross3(turn[0], r), cross3(turn[1], r), cross3(turn[2], r)), inv_mass);
+// l^-1 u of a factored pivot.
+fn forward(pivot: mat3x3f, u: vec3f) -> vec3f {
+    let second = u.y - pivot[0].y * u.x;
+    return vec3f(u.x, second, u.z - pivot[0].z * u.x - pivot[1].z * second);
 }
 
-fn negated(m: mat3x3f) -> mat3x3f { return mat3x3f(-m[0], -m[1], -m[2]); }
+// l^-T u of a factored pivot.
+fn backward(pivot: mat3x3f, u: vec3f) -> vec3f {
+    let second = u.y - pivot[1].z * u.z;
+    return vec3f(u.x - pivot[0].y * second - pivot[0].z * u.z, second, u.z);
+}
 
-// The block of S in the column of one joint and the row of another.
+// How one side of a row of S moves under one side of a column: along, and about.
+fn movement(shift: mat3x3f, inv_mass: f32, about: mat3x3f, turn: mat3x3f) -> mat3x3f {
+    return block_sum(block_product(about, turn), mat3x3f(shift[0] * inv_mass, shift[1] * inv_mass, shift[2] * inv_mass));
+}
+
+// Both sides of a joint, as those of `shared_sides`.
+const OWN_SIDES: u32 = 9u;
+
+// The block of S in the column of one node and the row of another, which may be the same.
 fn coupling(column: u32, row: u32, shared_sides: u32) -> mat3x3f {
+    let shift = product_with_transpose(joint_nodes[row].along, joint_nodes[column].along);
+    let mass_a = joint_nodes[column].mass_a;
+    let mass_b = joint_nodes[column].mass_b;
     var block = mat3x3f(vec3f(0.0), vec3f(0.0), vec3f(0.0));
     if (shared_sides & 1u) != 0u {
-        block = block_sum(block, movement_at(joint_nodes[column].mass_a, joint_nodes[column].turn_a, joint_nodes[row].r_a));
+        block = block_sum(block, movement(shift, mass_a, joint_nodes[row].about_a, joint_nodes[column].turn_a));
     }
     if (shared_sides & 2u) != 0u {
-        block = block_sum(block, negated(movement_at(joint_nodes[column].mass_a, joint_nodes[column].turn_a, joint_nodes[row].r_b)));
+        block = block_less(block, movement(shift, mass_a, joint_nodes[row].about_b, joint_nodes[column].turn_a));
     }
     if (shared_sides & 4u) != 0u {
-        block = block_sum(block, negated(movement_at(joint_nodes[column].mass_b, joint_nodes[column].turn_b, joint_nodes[row].r_a)));
+        block = block_less(block, movement(shift, mass_b, joint_nodes[row].about_a, joint_nodes[column].turn_b));
     }
     if (shared_sides & 8u) != 0u {
-        block = block_sum(block, movement_at(joint_nodes[column].mass_b, joint_nodes[column].turn_b, joint_nodes[row].r_b));
+        block = block_sum(block, movement(shift, mass_b, joint_nodes[row].about_b, joint_nodes[column].turn_b));
     }
     return block;
+}
+
+// Factors one system whose nodes are known.
+fn factor_blocks(system: u32) {
+    let end = begin_of_system(system + 1u);
+    for (var node = begin_of_system(system); node < end; node++) {
+        let pivot = first_block_of_node(node);
+        let end_block = end_block_of_node(node);
+        for (var at = pivot; at < end_block; at++) {
+            var block = coupling(node, node_of_block(at), select(shared_of_block(at), OWN_SIDES, at == pivot));
+            let own = diagonal_of(block);
+            if at == pivot {
+                let softness = (own.x + own.y + own.z) * softness_of_system(system);
+                joint_nodes[node].softness = softness;
+                block = with_diagonal(block, softness);
+            }
+            let end_term = end_term_of_block(at);
+            for (var term = first_term_of_block(at); term < end_term; term++) {
+                let left = joint_blocks[left_of_term(term)].lower;
+                block = block_less(block, product_with_transpose(left, joint_blocks[right_of_term(term)].upper));
+            }
+            if at == pivot {
+                joint_blocks[at].lower = factored_pivot(block, own);
+            } else {
+                let factors = joint_blocks[pivot].lower;
+                let inverse = diagonal_of(factors);
+                let upper = block_over(block, factors);
+                joint_blocks[at].lower = mat3x3f(upper[0] * inverse.x, upper[1] * inverse.y, upper[2] * inverse.z);
+                joint_blocks[at].upper = upper;
+            }
+        }
+    }
 }

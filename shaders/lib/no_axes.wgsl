@@ -1,6 +1,6 @@
 // Joints that hold their anchors together, and nothing else. Twin: lib/axes.wgsl.
 
-fn solve_axes(rules: Rules, pair: ptr<function, Pair>, joint: Joint) {}
+fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint) {}
 
 fn warm_start_axes(pair: ptr<function, Pair>, joint: Joint) {}
 

@@ -9,6 +9,8 @@ struct Rules {
     friction_first: bool,
     accumulated: bool,
     round: bool,
+    // The points of a manifold are solved together before each by itself.
+    as_one: bool,
     passes: u32,
     driven: bool,
     measured: bool,

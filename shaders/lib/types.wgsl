@@ -37,15 +37,17 @@ struct Axis {
 
 struct JointImpulse { linear: vec3f }
 
-// One joint of a system while it is factored; `right` is the right side, then the correction. Double: src/kernels/joint_system.rs.
+// Up to three rows of a joint while its system is factored; `right` is the right side, then the correction. Double:
+// src/kernels/joint_system.rs.
 struct JointNode {
-    r_a: vec3f, mass_a: f32,
-    r_b: vec3f, mass_b: f32,
+    along: mat3x3f,
+    about_a: mat3x3f, about_b: mat3x3f,
     turn_a: mat3x3f, turn_b: mat3x3f,
     right: vec3f, softness: f32,
+    mass_a: f32, mass_b: f32,
 }
 
-// A block of L, or the inverse of a pivot, and the block of L D.
+// A block of L, or the factors of a pivot, and the block of L D.
 struct JointBlock { lower: mat3x3f, upper: mat3x3f }
 
 struct Turning { inv_inertia_x: vec3f, body: u32, inv_inertia_yz: vec3f }

@@ -52,14 +52,16 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             }
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => (contacts, None),
             Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => (joints, None),
-            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => (own.direct_joints(), None),
+            Kernel::SolveAxes(_) | Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
+                (own.direct_joints(), None)
+            }
             Kernel::IntegrateVelocities { .. }
             | Kernel::BeginChanges
             | Kernel::EndChanges
             | Kernel::IntegratePositions { .. } => (bodies, None),
             Kernel::IntegrateTorques { .. } => (if problem.torques.is_empty() { 0..0 } else { bodies }, None),
             Kernel::IntegrateGyroscopic { .. } => (inertias, None),
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => (systems, None),
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => (systems, None),
             Kernel::TurnInertias => (turning, None),
             _ => (0..0, None),
         };

@@ -116,7 +116,10 @@ pub(super) struct BodyState {
     pub position: Vec3,
     /// Size of the gravity that it feels over that of its world; 0 if it cannot be pushed.
     pub gravity_scale: f32,
-    pub rest: [f32; 4],
+    /// Acceleration by gravity and by lasting forces (m/s²).
+    pub pull: Vec3,
+    /// 1 if a joint holds it, otherwise 0.
+    pub tied: f32,
 }
 
 /// The row of a [`BodyState`] that begins with rotation and center.
@@ -155,7 +158,8 @@ impl CuboidPlace {
 }
 
 impl BodyState {
-    pub fn of(body: &Body, activity: Activity) -> Self {
+    /// A body on which gravity acts so much (m/s²).
+    pub fn of(body: &Body, activity: Activity, gravity: Vec3) -> Self {
         let (position, rotation) = (body.position, body.rotation);
         let moves = body.kind != BodyKind::Fixed;
         let (v, w) = if moves { (body.linear_velocity, body.angular_velocity) } else { (Vec3::ZERO, Vec3::ZERO) };
@@ -170,7 +174,12 @@ impl BodyState {
             activity: [0.0, 1.0, 2.0][activity as usize],
             position,
             gravity_scale: if body.kind == BodyKind::Dynamic { body.gravity_scale.abs() } else { 0.0 },
-            rest: [0.0; 4],
+            pull: if body.kind == BodyKind::Dynamic && activity == Activity::Awake {
+                gravity + body.whole_force() / body.mass.mass
+            } else {
+                Vec3::ZERO
+            },
+            tied: 0.0,
         }
     }
 }
@@ -197,5 +206,7 @@ pub(super) struct Margins {
     pub recycle: f32,
     /// How far gravity moves any body of the world in one step (m); with a gravity scale of 1 at least.
     pub fall: f32,
+    /// Lengths of the step and of its longest substep (s).
     pub dt: f32,
+    pub substep: f32,
 }

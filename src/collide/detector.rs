@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::collider::Activity;
 use super::collider::{BodyState, Margins};
+use super::guard::Extent;
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::places::Places;
@@ -20,32 +21,35 @@ use crate::world::{Body, BodyKind, Groups, Joint, World};
 
 /// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
 pub struct Detector {
-    worlds: Vec<WorldContacts>,
+    pub(super) worlds: Vec<WorldContacts>,
     /// The bodies that it knows, by their indices.
-    known: Vec<KnownBody>,
-    kinds: Vec<BodyKind>,
-    groups: Vec<Groups>,
-    moving: Vec<BodyState>,
+    pub(super) known: Vec<KnownBody>,
+    pub(super) kinds: Vec<BodyKind>,
+    pub(super) groups: Vec<Groups>,
+    /// The bodies as the last detection found them.
+    pub(super) moving: Vec<BodyState>,
+    /// Their sizes; none if they have to be found anew.
+    pub(super) extents: Vec<Extent>,
     /// Where the last step left each body. What has to stay the same for a body to sleep is kept by `sleep`, which stands
     /// above the detector.
     left: Vec<Left>,
     /// How far gravity moves a body in one step, in each world (m).
     falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
-    jointed: HashSet<(u32, u32)>,
+    pub(super) jointed: HashSet<(u32, u32)>,
     /// What sensors overlapped when that was last asked.
     overlaps: Vec<Overlap>,
 }
 
-crate::saved::cloned!(Detector { worlds, known, kinds, groups, left, jointed } scratch { moving, falls, overlaps });
+crate::saved::cloned!(Detector { worlds, known, kinds, groups, extents, left, jointed } scratch { moving, falls, overlaps });
 
 /// A body as the detector knows it.
 #[derive(Clone, Copy, Default)]
-struct KnownBody {
+pub(super) struct KnownBody {
     generation: u32,
-    world: u32,
+    pub(super) world: u32,
     /// Its colliders, among those of its world.
-    colliders: ColliderRange,
+    pub(super) colliders: ColliderRange,
 }
 
 crate::saved::fields!(KnownBody { generation, world, colliders });
@@ -63,6 +67,7 @@ impl Detector {
     pub(crate) fn walk<A: Archive>(&mut self, world: &World, base: [f32; 2], archive: &mut A) -> Result<()> {
         let bodies = archive.count(self.known.len())?;
         if A::READS {
+            self.extents.clear();
             self.known.resize(bodies, KnownBody::default());
             self.kinds.resize(bodies, BodyKind::Fixed);
             self.groups.resize(bodies, Groups::ALL);
@@ -140,6 +145,7 @@ impl Detector {
             kinds: Vec::new(),
             groups: Vec::new(),
             moving: Vec::new(),
+            extents: Vec::new(),
             left: Vec::new(),
             falls: Vec::new(),
             jointed: jointed(world),
@@ -171,6 +177,7 @@ impl Detector {
 
     /// Takes over the bodies that [`Self::changed_bodies`] found. The contacts of such a body end.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        self.extents.clear();
         let count = world.bodies.len().max(self.known.len());
         self.known.resize(count, KnownBody::default());
         self.kinds.resize(count, BodyKind::Fixed);
@@ -278,8 +285,11 @@ impl Detector {
     /// the step; without `activity` all take part.
     pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
-        let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i));
+        let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
+        for (a, b) in world.joints.iter().map(Joint::indices) {
+            [Some(a), b].into_iter().flatten().for_each(|body| self.moving[body].tied = 1.0);
+        }
         self.falls.clear();
         self.falls.resize(self.worlds.len(), 1.0);
         for (state, &part) in self.moving.iter().zip(world.bodies.worlds()) {
@@ -287,8 +297,13 @@ impl Detector {
             *largest = largest.max(state.gravity_scale);
         }
         (0..).zip(&mut self.falls).for_each(|(part, fall)| *fall *= world.gravity_of(part).length() * dt * dt);
-        let margins =
-            |fall: f32| Margins { speculative: config.speculative_margin, recycle: config.recycle_distance, fall, dt };
+        let margins = |fall: f32| Margins {
+            speculative: config.speculative_margin,
+            recycle: config.recycle_distance,
+            fall,
+            dt,
+            substep: dt / config.substeps as f32,
+        };
         let input = |fall: f32| DetectionInput {
             margins: margins(fall),
             kinds: &self.kinds,

@@ -13,6 +13,7 @@ use parry3d::query::details::{NormalConstraints, contact_support_map_support_map
 use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
+use super::cone::FacetCone;
 use super::solid::{
     ClipBuffers, ContactQuery, DEEP, EXACT, Magnified, PUSH, ParryManifold, Patch, Solid, add_above, ask, clip,
     clip_to, magnification,
@@ -59,6 +60,7 @@ pub(super) fn composite_contacts(
             }
         } else {
             let cone = cone();
+            let cone = cone.as_ref().map(FacetCone::new);
             let cone = cone.as_ref().map(|cone| cone as &dyn NormalConstraints);
             ask((triangle, shape), pos12, cone, search, &mut found);
         }
@@ -172,7 +174,7 @@ pub(super) fn triangle_contact(
         return None;
     }
     let mut normal = direction;
-    if cone.is_some_and(|cone| !cone.project_local_normal_mut(&mut normal)) {
+    if cone.is_some_and(|cone| !FacetCone::new(&cone).project_local_normal_mut(&mut normal)) {
         return None;
     }
     if normal != face {

@@ -1,8 +1,9 @@
 //! A contact manifold that lives on from step to step: at most four points, chosen and matched deterministically.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 use crate::error::{Result, input};
+use crate::math::{self, NormalMovement};
 use crate::saved::{Archive, Saved};
 
 /// Most points that a manifold keeps.
@@ -105,6 +106,28 @@ impl Manifold {
     /// Whether it has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.count == 0
+    }
+
+    /// How the points move along the normal where the center of b goes on by `drift` as seen from that of a, and each body turns.
+    pub(super) fn movement(&self, drift: Vec3, turns: [Quat; 2]) -> impl Fn(&ManifoldPoint) -> f32 + use<> {
+        let vector = |v: Vec3| math::Vec3::<f32>::load(v.to_array());
+        let [turn_a, turn_b] = turns.map(|turn| math::Quat::load(turn.to_array()));
+        let normal = vector(self.normal);
+        let movement = NormalMovement::new(normal, vector(drift), turn_a, turn_b);
+        let movement = movement.round(normal, self.radius_a, self.radius_b);
+        move |point| movement.between(vector(point.r_a), vector(point.r_b))
+    }
+
+    /// Brings separations from where the surfaces meet to where the bodies begin: until they meet, the bodies move by `drift` and `turns`.
+    pub(super) fn carry_back(&mut self, drift: Vec3, turns: [Quat; 2]) {
+        let movement = self.movement(drift, turns);
+        self.points[..self.count as usize].iter_mut().for_each(|point| point.separation -= movement(point));
+    }
+
+    /// Brings the points at least so far apart.
+    pub(super) fn give_way(&mut self, least: [f32; MAX_POINTS]) {
+        let points = self.points[..self.count as usize].iter_mut().zip(least);
+        points.for_each(|(point, least)| point.separation = point.separation.max(least));
     }
 
     /// Takes over the slot of the same contact one step earlier: points match by feature and, where that fails (two aligned boxes

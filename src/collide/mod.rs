@@ -5,23 +5,29 @@
 //! number of threads. Each of several worlds beside each other has its own tree and pairs, so that the pairs of a world do not depend on
 //! the other worlds.
 
+mod ascent;
 mod collider;
+mod cone;
 mod cuboids;
 mod detector;
 #[cfg(test)]
 mod distances;
 mod facet;
+mod flush;
+mod guard;
 mod lane_pose;
 mod manifold;
 mod narrow;
 mod pair;
 mod pairs;
+mod path;
 mod places;
 mod query;
 mod report;
 mod reuse;
 mod sensors;
 mod solid;
+mod sweep;
 mod teleport;
 #[cfg(test)]
 mod testing;

@@ -6,8 +6,11 @@ use std::sync::Mutex;
 
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::flush::Neighbors;
+use super::manifold::Manifold;
 use super::pair::{Pair, PairScratch, Side, Update};
 use super::pairs::{NEVER, PairChunk, Placed};
+use super::path::Going;
 use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
 use crate::lanes::{InstructionSet, WIDTH, Wide};
 use crate::panics::blaming;
@@ -18,6 +21,7 @@ pub(super) struct Narrow<'a> {
     pub cuboids: &'a [CuboidPlace],
     pub moving: &'a [BodyState],
     pub margins: Margins,
+    pub neighbors: Neighbors<'a>,
 }
 
 /// A pair that is not as it was.
@@ -41,6 +45,8 @@ struct Scratch {
     events: Vec<Event>,
     cuboid_pairs: Vec<CuboidPair>,
     cuboids: CuboidScratch,
+    /// The events whose contacts are held against the ways of their bodies, with the manifolds that the pairs had of those that go far.
+    going: Vec<(u32, Going, Vec<Manifold>)>,
 }
 
 /// A pair that the test found not to stay as it is.
@@ -59,13 +65,14 @@ impl Narrow<'_> {
 
     fn update_with(&self, chunk: PairChunk, scratch: &mut Scratch) -> Vec<Updated> {
         let PairChunk { first, pairs, tracks } = chunk;
-        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids } = scratch;
+        let Scratch { pair: pair_scratch, tests, events, cuboid_pairs, cuboids, going } = scratch;
         let set = InstructionSet::default();
         tests.clear();
         let test = ReuseTest { tracks, moving: self.moving, margins: self.margins, results: Mutex::new(tests) };
         set.run(&test, 0..tracks.len().div_ceil(WIDTH));
         events.clear();
         cuboid_pairs.clear();
+        going.clear();
         for (group, tested) in tests.iter().enumerate() {
             if tested.verdict == Wide([REUSED; WIDTH]) && tested.changes == Wide::default() {
                 continue;
@@ -87,6 +94,10 @@ impl Narrow<'_> {
                     let prediction = tested.prediction.0[lane];
                     track.then = bodies.map(Placed::of);
                     track.predicted = prediction;
+                    if let Some(goes) = self.going(track) {
+                        let before = if goes.is_far() { pair.manifolds.clone() } else { Vec::new() };
+                        going.push((events.len() as u32, goes, before));
+                    }
                     let places = [pair.collider_a, pair.collider_b];
                     if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
                         let number = events.len() as u32;
@@ -94,7 +105,9 @@ impl Narrow<'_> {
                         update = None;
                     } else {
                         let bodies = [pair.body_a, pair.body_b];
-                        update = Some(blaming(bodies, || pair.compute(self.sides(pair), prediction, pair_scratch)));
+                        update = Some(blaming(bodies, || {
+                            pair.compute(self.sides(pair), prediction, Some(&self.neighbors), pair_scratch)
+                        }));
                     }
                 }
                 events.push(Event { place: place as u32, changes, update });
@@ -104,8 +117,18 @@ impl Narrow<'_> {
             let event = &mut events[number as usize];
             let pair = &mut pairs[event.place as usize];
             let prediction = tracks[event.place as usize].predicted;
-            event.update = Some(pair.take_over(self.sides(pair), prediction, write, pair_scratch));
+            event.update =
+                Some(pair.take_over(self.sides(pair), prediction, write, Some(&self.neighbors), pair_scratch));
         });
+        for (number, goes, before) in going.drain(..) {
+            let event = &mut events[number as usize];
+            let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
+            let update = event.update.unwrap_or_else(|| pair.part());
+            let bodies = [pair.body_a, pair.body_b];
+            let scratch = (&mut *pair_scratch, &mut *cuboids);
+            let far = blaming(bodies, || self.follow_ways(pair, track, (goes, before), scratch));
+            event.update = Some(far.unwrap_or(update));
+        }
         let finish = |event: &Event| {
             let (pair, track) = (&mut pairs[event.place as usize], &mut tracks[event.place as usize]);
             let update = event.update.unwrap_or_else(|| pair.part());

@@ -7,6 +7,7 @@ use parry3d::shape::TypedShape;
 
 use super::collider::{BodyState, ColliderInfo};
 use super::facet::composite_contacts;
+use super::flush::{FlushScratch, Neighbors};
 use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
@@ -30,9 +31,21 @@ pub struct Pair {
     pub size: f32,
     /// Whether a body of it is awake, so that its manifolds are swept.
     pub takes_part: bool,
+    /// Whether what lies flush with one of the colliders changed its manifold.
+    pub(super) is_mended: bool,
 }
 
-crate::saved::cloned!(Pair { body_a, body_b, manifolds, colliders, collider_a, collider_b, size, takes_part });
+crate::saved::cloned!(Pair {
+    body_a,
+    body_b,
+    manifolds,
+    colliders,
+    collider_a,
+    collider_b,
+    size,
+    takes_part,
+    is_mended
+});
 
 /// A collider, and where its body is.
 pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);
@@ -43,6 +56,7 @@ pub(super) struct PairScratch {
     buffers: ClipBuffers,
     one: ParryManifold,
     many: Vec<ParryManifold>,
+    flush: FlushScratch,
     renewal: Renewal,
 }
 
@@ -74,6 +88,7 @@ impl Pair {
             colliders: [a.index, b.index],
             size: a.size.min(b.size),
             takes_part: true,
+            is_mended: false,
         }
     }
 
@@ -120,13 +135,21 @@ impl Pair {
     }
 
     /// Asks parry for the manifolds.
-    pub(super) fn compute(&mut self, sides: [Side; 2], prediction: f32, scratch: &mut PairScratch) -> Update {
+    pub(super) fn compute(
+        &mut self,
+        sides: [Side; 2],
+        prediction: f32,
+        neighbors: Option<&Neighbors>,
+        scratch: &mut PairScratch,
+    ) -> Update {
         let [(ca, _), (cb, _)] = sides;
+        let colliders = [self.collider_a, self.collider_b];
         let search = ContactQuery { prediction, size: self.size };
         let [pose_a, pose_b] = sides.map(pose);
         let pos12 = seen_from(pose_a, pose_b);
-        let PairScratch { buffers, one, many, renewal } = scratch;
+        let PairScratch { buffers, one, many, flush, renewal } = scratch;
         many.clear();
+        self.is_mended = false;
         let found: &[ParryManifold] = if ca.is_composite() {
             composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, buffers, many);
             many
@@ -136,6 +159,7 @@ impl Pair {
             many
         } else {
             *one = convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers);
+            self.is_mended = neighbors.is_some_and(|all| all.mend(colliders, sides, search, one, buffers, flush));
             std::slice::from_ref(one)
         };
         self.renew(found, sides, prediction, renewal)
@@ -147,10 +171,14 @@ impl Pair {
         sides: [Side; 2],
         prediction: f32,
         write: &dyn Fn(&mut ParryManifold),
-        PairScratch { one, renewal, .. }: &mut PairScratch,
+        neighbors: Option<&Neighbors>,
+        PairScratch { one, buffers, flush, renewal, .. }: &mut PairScratch,
     ) -> Update {
         empty(one);
         write(one);
+        let search = ContactQuery { prediction, size: self.size };
+        let colliders = [self.collider_a, self.collider_b];
+        self.is_mended = neighbors.is_some_and(|all| all.mend(colliders, sides, search, one, buffers, flush));
         self.renew(std::slice::from_ref(one), sides, prediction, renewal)
     }
 
@@ -200,7 +228,7 @@ impl Pair {
 }
 
 /// Where a collider is.
-fn pose((c, body): Side) -> Pose {
+pub(super) fn pose((c, body): Side) -> Pose {
     placed(Pose::from_parts(body.position, body.rotation), c.local)
 }
 

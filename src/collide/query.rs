@@ -2,13 +2,19 @@
 
 use glam::Vec3;
 use parry3d::math::Pose;
-use parry3d::shape::SharedShape;
+use parry3d::query::TrackedContact;
+use parry3d::shape::{PackedFeatureId, SharedShape};
 
+use super::ascent::ascend;
 use super::facet::half_space_contact;
-use super::solid::{ClipBuffers, ContactQuery, DEEP, PUSH, ParryManifold, Solid, add_above, ask, clip_to};
+use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, PUSH, ParryManifold, Solid, add_above, ask, clip_to};
 
 /// How far a distance may be from that along its normal, relative to the thinner shape's smallest half extent.
-const TRUE: f32 = 0.01;
+pub(super) const TRUE: f32 = 0.01;
+/// The same where a rim touches.
+const RIM: f32 = 0.004;
+/// How far apart solids with a rim are pushed, relative to the thinner shape's smallest half extent.
+const APART: f32 = 0.1;
 /// Cosine of the angle up to which two directions are the same, short of 1: 0.6 degrees.
 const SAME: f32 = 5e-5;
 
@@ -37,10 +43,11 @@ pub(super) fn convex_contact(
     }
     ask((&**a, &**b), pos12, None, search, &mut found);
     let (Some(map_a), Some(map_b)) = (a.as_support_map(), b.as_support_map()) else { return found };
-    let along = |d: Vec3| {
+    let gap = |d: Vec3| {
         let own = pos12.rotation.inverse() * -d;
-        d.dot(*pos12 * map_b.local_support_point(own) - map_a.local_support_point(d))
+        *pos12 * map_b.local_support_point(own) - map_a.local_support_point(d)
     };
+    let along = |d: Vec3| d.dot(gap(d));
     let is_true = |found: &ParryManifold, distance: f32| {
         if found.points.is_empty() { distance > prediction } else { (deepest(found) - distance).abs() < TRUE * size }
     };
@@ -55,16 +62,20 @@ pub(super) fn convex_contact(
     // Where the points are wrong, others along as good a direction are better.
     let is_better =
         |distance: f32, best: f32, is_true: bool| distance > best + if is_true { PUSH } else { -TRUE } * size;
-    let is_deep = !found_is_true || best < -DEEP * size;
-    let middles = *pos12 * b.compute_local_aabb().center() - a.compute_local_aabb().center();
-    if let Some(away) = middles.try_normalize().filter(|_| is_deep) {
-        let push = PUSH * size;
+    let ask_apart = |away: Vec3, push: f32| {
         let mut apart = *pos12;
         apart.translation += away * push;
         let mut again = ParryManifold::new();
         ask((&**a, &**b), &apart, None, ContactQuery { prediction: prediction + push, size }, &mut again);
-        let (distance, pushed) = (along(again.local_n1), push * again.local_n1.dot(away));
+        let pushed = push * again.local_n1.dot(away);
         again.points.iter_mut().for_each(|p| p.dist -= pushed);
+        again
+    };
+    let is_deep = !found_is_true || best < -DEEP * size;
+    let middles = *pos12 * b.compute_local_aabb().center() - a.compute_local_aabb().center();
+    if let Some(away) = middles.try_normalize().filter(|_| is_deep) {
+        let again = ask_apart(away, PUSH * size);
+        let distance = along(again.local_n1);
         if is_better(distance, best, found_is_true) && is_true(&again, distance) {
             (found, best, found_is_true) = (again, distance, true);
         }
@@ -75,22 +86,62 @@ pub(super) fn convex_contact(
     let mut across = None;
     let mut consider = |d: Vec3, of_b: bool| {
         let distance = along(d);
-        let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - TRUE * size;
+        // Of several faces, one across which the solids are as far apart as across any.
+        let slack = if across.is_none() { TRUE } else { EXACT } * size;
+        let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - slack;
         if is_same || is_better(distance, best, found_is_true) {
             (best, found_is_true, across) = (distance, true, Some((d, of_b)));
         }
     };
     solid_a.each_normal(|normal| consider(normal, false));
     solid_b.each_normal(|normal| consider(-normal, true));
-    match across {
-        Some((d, false)) => found = face_contact(&solid_a, &solid_b, d, search, buffers),
-        Some((d, true)) => {
-            found = face_contact(&solid_b, &solid_a, -d, search, buffers);
-            flip(&mut found);
+    if let Some((d, of_b)) = across {
+        let face = if of_b {
+            let mut face = face_contact(&solid_b, &solid_a, -d, search, buffers);
+            flip(&mut face);
+            face
+        } else {
+            face_contact(&solid_a, &solid_b, d, search, buffers)
+        };
+        let is_same = d.dot(found.local_n1) > 1.0 - SAME && is_true(&found, along(found.local_n1));
+        if !face.points.is_empty() {
+            found = face;
+        } else if !is_same {
+            found = point_contact([&solid_a, &solid_b], d, best, &found, TRUE * size);
+            found.points.retain(|point| point.dist <= prediction);
         }
-        None => {}
+    }
+    if !rims {
+        return found;
+    }
+    // parry's search stops short on rims.
+    let (distance, d) = ascend(found.local_n1.normalize_or(Vec3::Y), EXACT * size, gap);
+    let is_as_far = |found: &ParryManifold| (deepest(found) - distance).abs() < RIM * size;
+    if distance > prediction {
+        found.points.clear();
+    } else if !is_as_far(&found) {
+        // Far enough apart, the search is exact.
+        let apart = ask_apart(d, APART * size - distance.min(0.0));
+        let is_true = is_as_far(&apart);
+        found = if is_true { apart } else { point_contact([&solid_a, &solid_b], d, distance, &apart, RIM * size) };
     }
     found
+}
+
+/// The contact of two solids at one point, with their distance along the unit normal `d`: the nearest point of `found`, if it has any. The frame
+/// of the first is that of both.
+fn point_contact([a, b]: [&Solid; 2], d: Vec3, distance: f32, found: &ParryManifold, exact: f32) -> ParryManifold {
+    let nearest = found.points.iter().min_by(|p, q| p.dist.total_cmp(&q.dist)).map(|point| point.local_p1);
+    let top = a.furthest(d) + d * a.radius;
+    let below = |at: Vec3| at + d * d.dot(top - at);
+    let on_b = below(b.furthest(-d));
+    let on_a = nearest.map_or(if a.is_near(on_b, exact) { on_b } else { top }, below);
+    let on_b = b.pose.inverse_transform_point(on_a + d * distance);
+    let unknown = PackedFeatureId::UNKNOWN;
+    let mut contact = ParryManifold::new();
+    (contact.local_n1, contact.local_n2) = (d, b.pose.rotation.inverse() * -d);
+    contact.points.push(TrackedContact::new(on_a, on_b, unknown, unknown, distance));
+    contact
 }
 
 /// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
@@ -101,7 +152,7 @@ pub(super) fn empty(manifold: &mut ParryManifold) {
     *manifold = ParryManifold { points, ..ParryManifold::new() };
 }
 
-/// The contact of `other` across the face of `solid` with the unit normal `face`.
+/// The contact of `other` across the face of `solid` with the unit normal `face`; without points if the other lies beside it.
 fn face_contact(
     solid: &Solid,
     other: &Solid,
@@ -116,9 +167,6 @@ fn face_contact(
     other.corners(-face, corners);
     add_above(polygon, corners, patch, face);
     let origin = solid.furthest(face);
-    if polygon.iter().all(|corner| face.dot(corner.0 - origin) - other.radius > search.prediction) {
-        polygon.push((other.furthest(-face), 0));
-    }
     let mut found = ParryManifold::new();
     found.local_n1 = solid.pose.rotation.inverse() * face;
     found.local_n2 = other.pose.rotation.inverse() * -face;
@@ -126,6 +174,34 @@ fn face_contact(
     found.points.extend(contacts.filter(|contact| contact.dist <= search.prediction));
     found.points.iter_mut().for_each(|point| point.local_p1 = solid.pose.inverse_transform_point(point.local_p1));
     found
+}
+
+/// The contact of `other` with `solid`, whose frame is that of both, along the unit normal `normal`. Where the normal is not that of a
+/// face, the solid has a corner or an edge there.
+pub(super) fn flush_contact(
+    solid: &Solid,
+    other: &Solid,
+    (normal, is_face): (Vec3, bool),
+    search: ContactQuery,
+    ClipBuffers { polygon, patch, unclipped, corners }: &mut ClipBuffers,
+    found: &mut ParryManifold,
+) {
+    // A little wider, so that what lies just between two shapes lies on one of them.
+    let exact = EXACT * search.size;
+    other.feature(-normal, polygon);
+    if is_face {
+        solid.feature(normal, patch);
+        let middle = patch.iter().map(|corner| corner.0).sum::<Vec3>() / patch.len() as f32;
+        patch.iter_mut().for_each(|corner| corner.0 += 1.5 * exact * (corner.0 - middle).normalize_or_zero());
+        clip_to(polygon, unclipped, patch, normal);
+        other.corners(-normal, corners);
+        add_above(polygon, corners, patch, normal);
+    }
+    found.local_n1 = normal;
+    found.local_n2 = other.pose.rotation.inverse() * -normal;
+    let at = solid.furthest(normal);
+    let contacts = other.contacts(polygon, [normal, normal, at]).filter(|contact| contact.dist <= search.prediction);
+    found.points.extend(contacts.filter(|contact| is_face || solid.is_near(contact.local_p1, exact)));
 }
 
 /// Exchanges the two shapes.
@@ -146,6 +222,7 @@ fn deepest(manifold: &ParryManifold) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Quat;
     use parry3d::math::Vector;
 
     /// A wedge of a ring between two angles, inner radius 0.9 and outer 1, 0.5 deep.
@@ -196,6 +273,23 @@ mod tests {
             let after_another = answer(&mut buffers, i);
             assert_eq!(after_another, answer(&mut ClipBuffers::default(), i), "joint {i}");
         }
+    }
+
+    /// A cone that stands on its base far from the middle of a floor.
+    #[test]
+    fn a_base_that_touches_a_wide_floor_does_not_overlap_it() {
+        let (floor, cone) = (SharedShape::cuboid(68.5, 1.0, 68.5), SharedShape::cone(2.67e-2, 4.08e-2));
+        let mut worst = 0.0_f32;
+        for k in 0..1000 {
+            let tilt = Vector::new((k as f32).sin(), 0.0, (1.7 * k as f32).cos()) * 4e-6;
+            let turn = Quat::from_scaled_axis(tilt) * Quat::from_rotation_y(0.1 * k as f32);
+            let at = Vector::new(0.38 + 0.01 * k as f32, 1.0 + 2.67e-2 - 1e-6, -2.92);
+            let pos12 = Pose::from_parts(at, turn);
+            let search = ContactQuery { prediction: 2e-3, size: 2.67e-2 };
+            let found = convex_contact((&floor, &cone), &pos12, search, &mut ClipBuffers::default());
+            worst = worst.max(-deepest(&found));
+        }
+        assert!(worst < 3e-5, "{worst} m");
     }
 
     #[test]

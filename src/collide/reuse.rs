@@ -152,7 +152,8 @@ mod tests {
                 activity,
                 position: at,
                 gravity_scale: 1.0,
-                rest: [0.0; 4],
+                pull: glam::Vec3::ZERO,
+                tied: 0.0,
             }
         }
 
@@ -198,7 +199,7 @@ mod tests {
     #[test]
     fn sixteen_pairs_are_tested_as_one_is() {
         let mut random = Random(1);
-        let margins = Margins { speculative: 0.02, recycle: 0.02, fall: 0.003, dt: 1.0 / 60.0 };
+        let margins = Margins { speculative: 0.02, recycle: 0.02, fall: 0.003, dt: 1.0 / 60.0, substep: 1.0 / 480.0 };
         let moving: Vec<BodyState> = (0..300).map(|_| random.body()).collect();
         let track = |place: u32| {
             let mut body = |_| (149.5 * (random.next() + 1.0)) as u32;

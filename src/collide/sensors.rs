@@ -29,7 +29,7 @@ impl Visitors<'_> {
     }
 
     /// Whether a sensor sees the collider of another body: one of the two moves or is moved, and the groups of the bodies meet.
-    fn may_meet(&self, sensor: &ColliderInfo, other: &ColliderInfo) -> bool {
+    pub(super) fn may_meet(&self, sensor: &ColliderInfo, other: &ColliderInfo) -> bool {
         if other.is_gone() || other.sensor || other.body == sensor.body {
             return false;
         }

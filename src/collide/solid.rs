@@ -163,9 +163,20 @@ impl<'a> Solid<'a> {
         Some(Self { shape, map, radius, pose })
     }
 
+    /// The same, with a ball as a point that is rounded off.
+    pub fn or_point(shape: &'a dyn Shape, pose: Pose) -> Option<Self> {
+        let (map, radius) = features(shape, true)?;
+        Some(Self { shape, map, radius, pose })
+    }
+
     /// The point of the solid that lies furthest in the direction `d`.
     pub fn furthest(&self, d: Vec3) -> Vec3 {
         self.pose * self.map.local_support_point(self.pose.rotation.inverse() * d)
+    }
+
+    /// Whether a point is in the solid, or no further from it than `distance`.
+    pub fn is_near(&self, point: Vec3, distance: f32) -> bool {
+        self.shape.distance_to_point(&self.pose, point, true) <= distance
     }
 
     /// Writes the face or edge of the solid that lies best across `d` at its furthest corner in that direction.

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::collider::Activity;
 use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins, is_in_range};
+use super::flush::Neighbors;
 use super::manifold::NO_SLOT;
 use super::narrow::{Narrow, Updated};
 use super::pairs::Pairs;
@@ -334,14 +335,15 @@ impl WorldContacts {
     }
 
     fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
-        let narrow =
-            Narrow { colliders: &self.colliders, cuboids: &self.cuboids, moving: input.moving, margins: input.margins };
-        let updates: Vec<Updated> = self.pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
-        let mut stats = DetectStats { pairs: self.pairs.len(), ..DetectStats::default() };
+        let Self { colliders, cuboids, tree, planes, pairs, changed, .. } = self;
+        let neighbors = Neighbors { colliders, tree, planes, input };
+        let narrow = Narrow { colliders, cuboids, moving: input.moving, margins: input.margins, neighbors };
+        let updates: Vec<Updated> = pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
+        let mut stats = DetectStats { pairs: pairs.len(), ..DetectStats::default() };
         for Updated { pair, computed, reshaped } in updates {
             stats.computed += usize::from(computed);
             stats.reshaped |= reshaped;
-            self.changed.push(PairChange { pair, computed });
+            changed.push(PairChange { pair, computed });
         }
         stats
     }

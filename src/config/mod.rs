@@ -89,13 +89,12 @@ pub struct SolverConfig {
     pub friction_at: FrictionAt,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
-    /// Largest gap of a joint at rest, relative to its arms. Sets of joints that sweeps would leave further apart are solved at once, or
-    /// take more substeps where that is cheaper (nets).
+    /// Largest gap of a joint, relative to its arms. Nets that sweeps would leave further apart take more substeps, and so do joints whose arms turn
+    /// fast.
     pub max_joint_gap_share: f32,
-    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where sweeps would leave a gap of more
-    /// than `max_joint_gap_share` at rest: where a joint bears many times the mass of its bodies. A set in which
-    /// one joint is no ball joint is swept. Measured with 8 substeps, a chain of 100 links with 1000 times the mass of a link at its end: gap
-    /// 0.22 of a link with sweeps, 6e-5 at once, in twice the time.
+    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where that costs time in proportion to their number, as
+    /// in chains, trees and single loops. It sweeps nets. Motors and springs are swept all the same. Measured with 8 substeps, a chain of 100 links
+    /// with 1000 times the mass of a link at its end: gap 0.22 of a link with sweeps, 6e-5 at once.
     pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,
@@ -109,6 +108,7 @@ pub struct SolverConfig {
     pub gyroscopic: bool,
     /// How far apart surfaces are when a contact is already made, relative to the smallest half extent of the thinner
     /// shape. The distance that the bodies approach in one step is added, up to twice that half extent; before a half-space, all of it.
+    /// Bodies that approach further, or pass beside each other, have the contact of the place where their ways meet, and none where the ways do not.
     pub speculative_margin: f32,
     /// A manifold is reused while its bodies moved relative to each other by less than this, relative to the smallest
     /// half extent of the thinner shape; 0 computes every manifold anew.

@@ -159,12 +159,12 @@ named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", })
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum JointSolver {
-    /// At once where sweeps would leave gaps and factors stay sparse, else by sweeps.
+    /// At once where factors stay sparse, else by sweeps.
     #[default]
     Auto,
     /// One after another, as contacts.
     Sweeps,
-    /// All joints of a connected set of bodies at once, whatever that costs.
+    /// All joints of a connected set of bodies at once, whatever that costs; motors and springs by sweeps.
     Direct,
 }
 

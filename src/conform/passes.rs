@@ -21,6 +21,8 @@ pub fn every_rules() -> Vec<Rules> {
                 friction_first: has(2),
                 accumulated: has(3),
                 round: has(4),
+                // Meets each of the others on both sides.
+                as_one: has(0) ^ has(1) ^ has(4),
                 measured: has(5),
                 driven: has(6),
                 passes: 1 + u8::from(has(6)),
@@ -75,7 +77,7 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::WarmStartJoints { axes: false },
         Kernel::WarmStartJoints { axes: true },
         Kernel::TurnInertias,
-        Kernel::FactorJoints,
+        Kernel::BeginSystems,
     ];
     for (first, measured) in [(true, true), (true, false), (false, true), (false, false)] {
         all.push(Kernel::Extrapolate { first, measured });
@@ -84,9 +86,11 @@ pub fn every_kernel() -> Vec<Kernel> {
         all.push(Kernel::WarmStart(rules.of_warm_start()));
         all.push(Kernel::SolveJoints(rules.of_joints()));
         all.push(Kernel::SolveJoints(Rules { axes: true, ..rules.of_joints() }));
-        all.push(Kernel::MeasureJoints(rules.of_joints()));
-        all.push(Kernel::SolveJointSystems(rules.of_joints()));
-        all.push(Kernel::ApplyJointChanges(rules.of_joints()));
+        let with_axes = Rules { axes: true, ..rules.of_joints() };
+        all.push(Kernel::SolveAxes(with_axes));
+        all.push(Kernel::MeasureJoints(with_axes));
+        all.push(Kernel::SolveJointSystems(with_axes));
+        all.push(Kernel::ApplyJointChanges(with_axes));
         all.push(Kernel::SolveContacts(rules));
         let Rules { patch, from_start, isotropic, .. } = rules;
         all.push(Kernel::ApplyRestitution(Rules { patch, from_start, isotropic, ..Rules::default() }));
@@ -111,8 +115,10 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
         Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SumJointImpulses { .. } => joints,
-        Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => problem.blocks[0].direct_joints(),
-        Kernel::FactorJoints | Kernel::SolveJointSystems(_) => systems,
+        Kernel::SolveAxes(_) | Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
+            problem.blocks[0].direct_joints()
+        }
+        Kernel::BeginSystems | Kernel::SolveJointSystems(_) => systems,
         Kernel::TurnInertias => turning,
         Kernel::ClearImpulses
         | Kernel::SumImpulses { .. }
@@ -177,7 +183,7 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         let [begin, end] = changes.map(|passes| if rules.from_start { passes } else { Vec::new() });
         return vec![[begin, sweep, end].concat()];
     }
-    if matches!(kernel, Kernel::TurnInertias | Kernel::FactorJoints) {
+    if matches!(kernel, Kernel::TurnInertias | Kernel::BeginSystems) {
         return vec![system_sweep(Rules::default(), problem)];
     }
     // A warm start applies the impulses since it last ran.
@@ -198,9 +204,10 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
 
 /// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
-    let (turn, factor) = (Kernel::TurnInertias, Kernel::FactorJoints);
+    let (turn, factor) = (Kernel::TurnInertias, Kernel::BeginSystems);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
     let first = [move_bodies, turn, factor].into_iter().flat_map(|kernel| in_one_pass(kernel, problem));
+    let rules = Rules { axes: true, ..rules };
     let measured = in_one_pass(Kernel::MeasureJoints(rules), problem);
     let solved = in_one_pass(Kernel::SolveJointSystems(rules), problem);
     let sweep = [measured, solved, color_by_color(Kernel::ApplyJointChanges(rules), problem)].concat();

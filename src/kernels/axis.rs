@@ -6,6 +6,7 @@ use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
 
 /// How bodies move along an axis: double of the WGSL struct `AxisMotion`.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct AxisMotion<L> {
     /// Along which the bodies shift; zero for an axis to turn about.
     pub along: Vec3<L>,
@@ -92,7 +93,7 @@ fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L)
 
 /// The speed that a unit impulse along the axis gives.
 #[inline(always)]
-fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
+pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
     let turn_a = dot3(motion.about_a, pair.mass_a.inv_inertia.times(motion.about_a));
     let turn_b = dot3(motion.about_b, pair.mass_b.inv_inertia.times(motion.about_b));
     dot3(motion.along, motion.along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b)
@@ -108,10 +109,41 @@ pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axi
 /// Rows that are no limits are further than this above their upper limit (m, rad): half of `NO_LIMIT`.
 const LEAST_LEFT: f64 = -5e17;
 
-/// Sweeps one axis. Kernel `solve_joints`.
+/// Whether a row is a lock: neither a limit nor a drive.
+#[inline(always)]
+pub fn is_lock<L: Lane>(axis: &Axis<L>) -> L::Mask {
+    let of_drive = axis.mass_scale + axis.impulse_scale;
+    L::and(L::constant(LEAST_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
+}
+
+/// Where the nearer of the two limits of an axis is.
+#[derive(Clone, Copy)]
+pub(super) struct NearerLimit<L: Lane> {
+    /// Whether the row is a limit, and whether the upper one is nearer.
+    pub is_limit: L::Mask,
+    pub is_upper: L::Mask,
+    /// The way that is left to it; below zero beyond it. Of a lock, its place.
+    pub gap: L,
+    /// Whether the limit is not reached.
+    pub apart: L::Mask,
+}
+
+impl<L: Lane> NearerLimit<L> {
+    #[inline(always)]
+    pub fn of(axis: &Axis<L>, motion: &AxisMotion<L>) -> Self {
+        let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
+        let (place, left) = (axis.gap + motion.moved, axis.left - motion.moved);
+        let is_upper = L::and(is_limit, place.gt(left));
+        let gap = L::select(place, left, is_upper);
+        Self { is_limit, is_upper, gap, apart: L::and(is_limit, gap.gt(L::constant(0.0))) }
+    }
+}
+
+/// Sweeps one axis; with `but_locks` only if it is no lock. Kernels `solve_joints` and `solve_axes`.
 #[inline(always)]
 pub fn solve_axis<L: Lane>(
     rules: Rules,
+    but_locks: bool,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     joint: &Joint<L>,
@@ -123,13 +155,8 @@ pub fn solve_axis<L: Lane>(
     let mass = reciprocal(axis_inverse_mass(pair, &motion));
 
     // Of two limits the nearer one acts: it pushes the body inwards.
-    let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
-    let place = axis.gap + motion.moved;
-    let left = axis.left - motion.moved;
-    let is_upper = L::and(is_limit, place.gt(left));
+    let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
     let sign = L::select(one, L::constant(-1.0), is_upper);
-    let gap = L::select(place, left, is_upper);
-    let apart = L::and(is_limit, gap.gt(zero));
 
     // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
     let is_drive = (axis.mass_scale + axis.impulse_scale).gt(zero);
@@ -152,7 +179,10 @@ pub fn solve_axis<L: Lane>(
     let wanted = (axis_speed(rules, pair, &motion) - axis.speed) * sign;
     let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
     let least = L::select(-axis.max_impulse, zero, is_limit);
-    let sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    let mut sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
+    if but_locks {
+        sum = L::select(sum, before, is_lock(axis));
+    }
     let change = (sum - before) * sign;
     *impulse = sum * sign;
     note_correction(rules, params, pair, change, mass);

@@ -8,8 +8,9 @@ use super::Rules;
 use super::friction::{solve_friction, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
+use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
-use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, smaller};
+use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, reciprocal, smaller};
 
 /// The points of a manifold and their impulses, wherever they stand.
 pub trait PointRows<L> {
@@ -87,21 +88,21 @@ struct Common<L> {
     movement: NormalMovement<L>,
 }
 
-/// Non-penetration at one point.
+/// The change of the normal impulse that a point asks for by itself.
 ///
 /// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other: a separation of 1e-11 m
 /// that rounding puts on the other side changes a sweep by what the spring is soft. That is why plain WGSL agrees with
 /// the reference to 1e-6 m/s in the middle of a step and to a few hundredths in the worst one.
 #[inline(always)]
-fn solve_normal<L: Lane>(
+fn normal_correction<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     Common { softness, movement }: &Common<L>,
-    pair: &mut Pair<L>,
+    pair: &Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
-    impulse: &mut Impulse<L>,
-) {
+    impulse: L,
+) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
@@ -112,10 +113,25 @@ fn solve_normal<L: Lane>(
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
     let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
-    let sum = clamp_normal(rules, impulse.normal, params.relaxation * correction);
+    params.relaxation * correction
+}
+
+/// Non-penetration at one point.
+#[inline(always)]
+fn solve_normal<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    common: &Common<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    point: &Point<L>,
+    impulse: &mut Impulse<L>,
+) {
+    let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
+    let sum = clamp_normal(rules, impulse.normal, correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
     if rules.bounces {
@@ -123,6 +139,91 @@ fn solve_normal<L: Lane>(
     }
     note_correction(rules, params, pair, change, point.normal_mass);
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
+}
+
+/// Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of what
+/// they lack: steepest descent. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. What points
+/// change in common is one impulse at their middle, and no point takes more than its share because it comes first. A point may pull after that,
+/// until it is solved.
+#[inline(always)]
+fn press_as_one<L: Lane>(
+    rules: Rules,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    rows: &mut impl PointRows<L>,
+    wanted: impl Fn(&Pair<L>, &Point<L>, &Impulse<L>) -> (L, L),
+) {
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let mut changes = [zero; MAX_POINTS];
+    let (mut arms_a, mut arms_b) = (Vec3::default(), Vec3::default());
+    let (mut count, mut all, mut gain, mut mass) = (zero, zero, zero, zero);
+    let (mut middle_a, mut middle_b) = (Vec3::default(), Vec3::default());
+    for k in 0..rules.contact_points(rows.count()) {
+        let point = rows.point(k);
+        let impulse = rows.impulse(k);
+        let (sum, lacking) = wanted(pair, &point, &impulse);
+        let change = sum - impulse.normal;
+        changes[k] = change;
+        arms_a += point.r_a * change;
+        arms_b += point.r_b * change;
+        all = all + change;
+        gain = gain + change * lacking;
+        let share = L::select(zero, one, point.normal_mass.gt(zero));
+        middle_a += point.r_a * share;
+        middle_b += point.r_b * share;
+        count = count + share;
+        mass = mass + point.normal_mass;
+    }
+    let (turn_a, turn_b) = (cross3(arms_a, contact.normal), cross3(arms_b, contact.normal));
+    let (spin_a, spin_b) =
+        (spin_of(rules, pair.mass_a.inv_inertia, turn_a), spin_of(rules, pair.mass_b.inv_inertia, turn_b));
+    let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
+    let moved = (all * all) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turned;
+    // The share of points that lack the same is the most: what differs from point to point is left to the sweep.
+    let inverse = reciprocal(larger(count, one));
+    let (about_a, about_b) = (cross3(middle_a * inverse, contact.normal), cross3(middle_b * inverse, contact.normal));
+    let turning = dot3(about_a, spin_of(rules, pair.mass_a.inv_inertia, about_a))
+        + dot3(about_b, spin_of(rules, pair.mass_b.inv_inertia, about_b));
+    let alike = reciprocal(mass * ((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning));
+    let best = smaller(gain * reciprocal(moved), larger(alike, one));
+    let share = L::select(zero, best, L::and(count.gt(one), gain.gt(zero)));
+    for k in 0..rules.contact_points(rows.count()) {
+        let impulse = rows.impulse(k);
+        let sum = impulse.normal + share * changes[k];
+        rows.set_normal(k, sum);
+        if rules.bounces {
+            rows.set_peak(k, larger(impulse.peak, sum));
+        }
+    }
+    let push = contact.normal * (share * all);
+    pair.a.v -= push * pair.mass_a.inv_mass;
+    pair.a.w -= spin_a * share;
+    pair.b.v += push * pair.mass_b.inv_mass;
+    pair.b.w += spin_b * share;
+}
+
+/// What a point lacks to change its impulse by `correction` without a bound; nothing where it has no mass.
+#[inline(always)]
+fn lacking<L: Lane>(point: &Point<L>, correction: L) -> L {
+    let zero = L::constant(0.0);
+    L::select(zero, correction * reciprocal(point.normal_mass), point.normal_mass.gt(zero))
+}
+
+/// Non-penetration of all points together, before each is solved by itself: where each is solved, none of them would change. Swept one after
+/// another only, the points of a flat blow turn the body, because the first one takes more than its share.
+#[inline(always)]
+fn solve_as_one<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    common: &Common<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    rows: &mut impl PointRows<L>,
+) {
+    press_as_one(rules, pair, contact, rows, |pair, point, impulse| {
+        let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
+        (clamp_normal(rules, impulse.normal, correction), lacking(point, correction))
+    });
 }
 
 /// Forgets the impulse of one point. Kernel `clear_impulses`.
@@ -182,6 +283,9 @@ pub fn solve_contact<L: Lane>(
         if has_friction && rules.friction_first {
             sweep_friction(rules, params, pair, contact, rows);
         }
+        if rules.as_one {
+            solve_as_one(rules, params, &common, pair, contact, rows);
+        }
         for k in 0..rules.contact_points(rows.count()) {
             let mut impulse = rows.impulse(k);
             solve_normal(rules, params, &common, pair, contact, &rows.point(k), &mut impulse);
@@ -226,7 +330,7 @@ fn sweep_friction<L: Lane>(
     }
 }
 
-/// Makes the points bounce that were hit fast enough. Kernel `apply_restitution`.
+/// Makes the points bounce that were hit fast enough: together, then each. Kernel `apply_restitution`.
 #[inline(always)]
 pub fn restitute_contact<L: Lane>(
     rules: Rules,
@@ -236,13 +340,17 @@ pub fn restitute_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let zero = L::constant(0.0);
+    let bounce = |pair: &Pair<L>, point: &Point<L>, impulse: &Impulse<L>| {
+        let hit = (-params.restitution_threshold).gt(point.approach_velocity);
+        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
+        let lacking = -(vn + contact.restitution * point.approach_velocity);
+        let sum = larger(impulse.normal + point.normal_mass * lacking, zero);
+        (L::select(impulse.normal, sum, L::and(hit, impulse.peak.gt(zero))), lacking)
+    };
+    press_as_one(rules, pair, contact, rows, bounce);
     for k in 0..rules.contact_points(rows.count()) {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
-        let hit = (-params.restitution_threshold).gt(point.approach_velocity);
-        let bounces = L::and(hit, impulse.peak.gt(zero));
-        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
-        let correction = -(point.normal_mass * (vn + contact.restitution * point.approach_velocity));
-        let sum = L::select(impulse.normal, larger(impulse.normal + correction, zero), bounces);
+        let (sum, _) = bounce(pair, &point, &impulse);
         let change = sum - impulse.normal;
         rows.set_normal(k, sum);
         rows.set_peak(k, larger(impulse.peak, sum));

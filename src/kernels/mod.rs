@@ -14,7 +14,7 @@ pub mod joint_system;
 mod kernel_rows;
 pub mod momentum;
 pub mod pair;
-mod rows;
+pub(crate) mod rows;
 
 pub use kernel_rows::KernelRows;
 pub use rows::{
@@ -39,6 +39,8 @@ pub struct Rules {
     pub accumulated: bool,
     /// Whether any surface is round.
     pub round: bool,
+    /// Whether the points of a manifold are solved together before each by itself.
+    pub as_one: bool,
     /// How often a manifold is swept before the next one, 1 or more.
     pub passes: u8,
     /// Whether surfaces slip by themselves, as a belt does: friction at points is then against `slip_1` and `slip_2`, a
@@ -66,6 +68,7 @@ impl Default for Rules {
             friction_first: false,
             accumulated: true,
             round: false,
+            as_one: false,
             driven: false,
             passes: 1,
             measured: false,

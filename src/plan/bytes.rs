@@ -65,10 +65,12 @@ impl Pass {
             Kernel::UpdateMomentum => {
                 problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * size_of::<StepLength<f32>>()
             }
-            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => rows.len() * (pair + JOINT + IMPULSE),
-            Kernel::WarmStartJoints { .. } => rows.len() * (pair + JOINT + IMPULSE) + axes(rows) * (AXIS + IMPULSE),
+            Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) | Kernel::WarmStartJoints { .. } => {
+                rows.len() * (pair + JOINT + IMPULSE) + axes(rows) * (AXIS + IMPULSE)
+            }
+            Kernel::SolveAxes(_) => rows.len() * (pair + JOINT) + axes(rows) * (AXIS + 2 * IMPULSE),
             Kernel::SolveJoints(_) => rows.len() * (pair + JOINT + 2 * IMPULSE) + axes(rows) * (AXIS + 2 * IMPULSE),
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => self.bytes_of_systems(problem),
             Kernel::ClearImpulses | Kernel::SumImpulses { .. } => {
                 let patches = if problem.has_patches() { rows.len() } else { 0 };
                 let each = if self.kernel == (Kernel::SumImpulses { first: false }) { 3 } else { 2 };

@@ -44,8 +44,8 @@ pub enum Kernel {
     },
     /// Inertia of bodies that turned; over `turning`.
     TurnInertias,
-    /// Factors the joints that are solved at once; over systems.
-    FactorJoints,
+    /// Joints that are solved at once begin where their bodies are; over systems.
+    BeginSystems,
     /// Impulses that the joints carry; over joint colors.
     WarmStartJoints {
         /// Whether joints have axes.
@@ -71,6 +71,8 @@ pub enum Kernel {
     UpdateMomentum,
     /// One sweep of the joints; over joint colors.
     SolveJoints(Rules),
+    /// One sweep of the limits and drives of joints that are solved at once; over their colors.
+    SolveAxes(Rules),
     /// The velocities that joints lack which are solved at once; over their colors, in any order.
     MeasureJoints(Rules),
     /// Solves joints at once; over systems.
@@ -101,7 +103,7 @@ impl Kernel {
             Self::SumImpulses { .. } => "sum_impulses",
             Self::SumJointImpulses { .. } => "sum_joint_impulses",
             Self::TurnInertias => "turn_inertias",
-            Self::FactorJoints => "factor_joints",
+            Self::BeginSystems => "begin_systems",
             Self::WarmStartJoints { .. } => "warm_start_joints",
             Self::WarmStart(_) => "warm_start",
             Self::BeginSweep { .. } => "begin_sweep",
@@ -109,6 +111,7 @@ impl Kernel {
             Self::MeasureStep => "measure_step",
             Self::UpdateMomentum => "update_momentum",
             Self::SolveJoints(_) => "solve_joints",
+            Self::SolveAxes(_) => "solve_axes",
             Self::MeasureJoints(_) => "measure_joints",
             Self::SolveJointSystems(_) => "solve_joint_systems",
             Self::ApplyJointChanges(_) => "apply_joint_changes",
@@ -129,7 +132,7 @@ impl Kernel {
                 | Self::IntegrateGyroscopic { .. }
                 | Self::IntegratePositions { .. }
                 | Self::TurnInertias
-                | Self::FactorJoints
+                | Self::BeginSystems
                 | Self::SolveJointSystems(_)
         )
     }
@@ -139,6 +142,7 @@ impl Kernel {
         match self {
             Self::WarmStart(rules)
             | Self::SolveJoints(rules)
+            | Self::SolveAxes(rules)
             | Self::MeasureJoints(rules)
             | Self::SolveJointSystems(rules)
             | Self::ApplyJointChanges(rules)
@@ -146,6 +150,11 @@ impl Kernel {
             | Self::ApplyRestitution(rules) => Some(rules),
             _ => None,
         }
+    }
+
+    /// Whether it presses the points of a manifold as one.
+    pub fn presses_as_one(self) -> bool {
+        matches!(self, Self::SolveContacts(Rules { as_one: true, .. }) | Self::ApplyRestitution(_))
     }
 
     /// Whether the kernel works with velocities that are changes since the step began.
@@ -163,7 +172,11 @@ impl Kernel {
     pub fn reads_start(self) -> bool {
         let measures = matches!(
             self,
-            Self::SolveJoints(_) | Self::MeasureJoints(_) | Self::SolveContacts(_) | Self::ApplyRestitution(_)
+            Self::SolveJoints(_)
+                | Self::SolveAxes(_)
+                | Self::MeasureJoints(_)
+                | Self::SolveContacts(_)
+                | Self::ApplyRestitution(_)
         );
         measures && self.is_from_start()
     }
@@ -189,6 +202,7 @@ impl Kernel {
         match self {
             Self::Extrapolate { measured, .. } => measured,
             Self::SolveJoints(rules)
+            | Self::SolveAxes(rules)
             | Self::MeasureJoints(rules)
             | Self::SolveJointSystems(rules)
             | Self::ApplyJointChanges(rules)
@@ -221,6 +235,7 @@ impl fmt::Display for Kernel {
                 (r.friction_first, "first"),
                 (!r.accumulated, "clamped per correction"),
                 (r.round, "round"),
+                (r.as_one, "as one"),
                 (r.driven, "driven"),
                 (r.passes > 1, "repeated"),
                 (r.measured, "measured"),

@@ -38,7 +38,11 @@ struct Sweeps<'a> {
     /// Joints that are solved at once: the color of their systems, and the groups of their colors.
     systems: &'a [Range<u32>],
     direct: &'a [Range<u32>],
+    /// Those groups, if any joint has a limit or a drive.
+    swept_axes: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
+    /// Contacts whose points are struck together.
+    struck: &'a [Range<u32>],
     /// Contacts whose friction jams.
     jamming: &'a [Range<u32>],
 }
@@ -79,11 +83,12 @@ pub(crate) struct PlanKey {
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
-    /// Whether joints have axes.
+    /// Whether joints have axes, and whether any is a limit or a drive.
     axes: bool,
+    swept_axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes });
+crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes, swept_axes });
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -94,6 +99,7 @@ impl PlanKey {
             && self.totals != problem.totals.is_empty()
             && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
+            && self.swept_axes == has_swept_axes(problem)
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
@@ -108,8 +114,14 @@ impl PlanKey {
             isotropic,
             has_torques: !problem.torques.is_empty(),
             axes: !problem.axes.is_empty(),
+            swept_axes: has_swept_axes(problem),
         }
     }
+}
+
+/// Whether any axis is a limit or a drive.
+fn has_swept_axes(problem: &StepProblem) -> bool {
+    problem.axes.iter().any(|axis| !axis.is_lock())
 }
 
 /// Whether the bodies of each block have equal moments of inertia.
@@ -137,6 +149,7 @@ impl StepPlan {
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.rules.clamping == Clamping::Accumulated,
             round: contacts.round,
+            as_one: false,
             driven: false,
             passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
@@ -178,12 +191,13 @@ impl StepPlan {
         let groups = |colors: &Range<u32>| color_groups(&problem.colors, colors.clone(), config.fuse_colors_below);
         let (contacts, joints, direct) =
             (groups(&contact_colors), groups(&own.swept_joints()), groups(&own.direct_joints()));
-        let [swept_once, jamming] = own.contacts_by_jamming().map(|colors| groups(&colors));
+        let [swept_once, struck, jamming] = own.contacts_by_kind().map(|colors| groups(&colors));
         // A color without rows needs no pass.
         let kept = |color: &'_ Range<u32>| !problem.rows_of(color).is_empty();
         let [bodies, inertias, systems, turning] =
             [bodies, inertias, systems, turning].map(|color| Some(color).filter(kept));
         let [bodies, inertias, systems, turning] = [&bodies, &inertias, &systems, &turning].map(Option::as_slice);
+        let has_swept_axes = has_swept_axes(problem);
         // Momentum begins with the third sweep.
         let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
         let sweeps = |count: u32| Sweeps {
@@ -194,7 +208,9 @@ impl StepPlan {
             joints: &joints,
             systems,
             direct: &direct,
+            swept_axes: if has_swept_axes { &direct } else { &[] },
             contacts: &swept_once,
+            struck: &struck,
             jamming: &jamming,
         };
         // Friction needs some sweep to happen in.
@@ -204,7 +220,7 @@ impl StepPlan {
         // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
         // velocities that they gave. The arms of joints turn.
         let carried = shared.accumulated && joint_colors.is_empty() && !from_start;
-        self.over_colors(Kernel::FactorJoints, block, systems);
+        self.over_colors(Kernel::BeginSystems, block, systems);
         for substep in 0..substeps {
             let warm_start = carried && substep > 0;
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
@@ -213,7 +229,7 @@ impl StepPlan {
             }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
-            self.over_colors(Kernel::WarmStartJoints { axes: false }, block, &direct);
+            self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &direct);
             if warm_start {
                 // Done already.
             } else if shared.accumulated {
@@ -224,7 +240,7 @@ impl StepPlan {
             self.sweeps(sweeps(config.iterations), biased);
             self.over_colors(Kernel::IntegratePositions { from_start }, block, bodies);
             self.over_colors(Kernel::TurnInertias, block, turning);
-            self.over_colors(Kernel::FactorJoints, block, systems);
+            self.over_colors(Kernel::BeginSystems, block, systems);
             self.sweeps(sweeps(config.relax), shared);
             if substep + 1 < substeps {
                 self.sum_impulses(problem, block, substep);
@@ -267,7 +283,9 @@ impl StepPlan {
             joints: &joints,
             systems: &[],
             direct: &[],
+            swept_axes: &[],
             contacts: &contacts,
+            struck: &[],
             jamming: &[],
         };
         plan.sweeps(sweeps, rules);
@@ -295,8 +313,10 @@ impl StepPlan {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
             if let [first, ..] = sweeps.direct {
-                let rules = Rules { axes: false, ..rules.of_joints() };
+                let rules = Rules { axes: true, ..rules.of_joints() };
                 let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
+                // Locks have the last word.
+                self.over_colors(Kernel::SolveAxes(rules), block, sweeps.swept_axes);
                 self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
                 self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
@@ -304,6 +324,7 @@ impl StepPlan {
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
+            self.over_colors(Kernel::SolveContacts(Rules { as_one: true, ..rules }), block, sweeps.struck);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {

@@ -12,9 +12,10 @@
 
 use std::f32::consts::{PI, TAU};
 
+use super::NodeRow;
 use super::rows::{AxisRow, NO_LIMIT};
 use super::softness::softness;
-use crate::world::{Axis, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear};
+use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
 
 /// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
 /// some otherwise.
@@ -32,6 +33,60 @@ pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
     let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
     let bounds = axes_of(joint).filter(|(_, axis)| axis.bounds != Bounds::Free);
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
+}
+
+/// How many rows of a joint are of drives; they stand before the others.
+pub fn drive_count(joint: &Joint) -> usize {
+    kinds(joint).filter(|(_, is_drive)| *is_drive).count()
+}
+
+/// The most force of the drives of a joint as it stands (N): that of a motor, and what the deflection of a spring gives. What turns pushes at the
+/// smallest half extent of body a.
+pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
+    if axes_of(joint).all(|(_, axis)| axis.drive == Drive::None) {
+        return 0.0;
+    }
+    let (a, b) = joint.indices();
+    let dynamic = [Some(a), b].into_iter().flatten().map(|body| &world.bodies[body]);
+    let (mass, inertia) = dynamic
+        .filter(|body| body.kind == BodyKind::Dynamic)
+        .map(|body| &body.mass)
+        .fold((f32::INFINITY, f32::INFINITY), |(mass, inertia), of| {
+            (of.mass.min(mass), of.principal_inertia.max_element().min(inertia))
+        });
+    let position = world.joint_motion(joint).position;
+    let load = |(i, axis): (usize, &Axis)| {
+        let is_angle = i >= 3;
+        let load = match axis.drive {
+            Drive::None => 0.0,
+            Drive::Motor { max_load, .. } => max_load,
+            Drive::Spring { target, frequency, max_load, .. } => {
+                let stiffness = if is_angle { inertia } else { mass } * (TAU * frequency).powi(2);
+                max_load.min(stiffness * (position[i] - target).abs())
+            }
+        };
+        if is_angle { load / world.bodies[a].smallest_half_extent() } else { load }
+    };
+    axes_of(joint).map(load).sum()
+}
+
+/// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks and limits to turn about, which
+/// give a lever its stiffness, before those to shift along. A point that is locked by equal limits and driven is swept.
+pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
+    let is_limit = |axis: &Axis| match axis.bounds {
+        Bounds::Locked => Some(false),
+        Bounds::Between { min, max } if min < max => Some(true),
+        Bounds::Between { .. } => Some(false).filter(|_| axis.drive == Drive::None),
+        Bounds::Free => None,
+    };
+    let bounds = |are_angles: bool| {
+        let rows = (0..).zip(kinds(joint)).filter(move |(_, (i, is_drive))| !is_drive && (*i >= 3) == are_angles);
+        let axis = |i: usize| axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        let own: Vec<(u32, bool)> = rows.filter_map(|(row, (i, _))| Some((row, is_limit(axis(i))?))).collect();
+        NodeRow::rows_of(&own)
+    };
+    let shifts = if joint.holds_anchors() { NodeRow::ANCHORS } else { bounds(false) };
+    [bounds(true), shifts].into_iter().filter(|rows| *rows > 0)
 }
 
 /// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.

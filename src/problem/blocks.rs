@@ -13,7 +13,7 @@ use crate::effort::Effort;
 use crate::graph::Coloring;
 use crate::world::{BodyKind, World};
 
-/// Islands that take substeps of one length, by their colors, 100 B. No constraint holds bodies of two blocks that can move.
+/// Islands that take substeps of one length, by their colors, 104 B. No constraint holds bodies of two blocks that can move.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Block {
@@ -23,6 +23,8 @@ pub struct Block {
     pub substep: Substep,
     /// First color of the contacts, and one past the last.
     pub contacts: [u32; 2],
+    /// The first of those colors whose contacts are struck, and whose points are solved together.
+    pub struck: u32,
     /// The first of those colors whose contacts jam, and are swept several times each.
     pub jamming: u32,
     /// First color of the joints, and one past the last.
@@ -49,10 +51,10 @@ impl Block {
         [c..c_end, j..j_end, bodies, inertias, systems, turning]
     }
 
-    /// Colors of the contacts that do not jam, and of those that do.
-    pub fn contacts_by_jamming(&self) -> [Range<u32>; 2] {
+    /// Colors of the contacts that are swept once, of those that are struck, and of those that jam.
+    pub fn contacts_by_kind(&self) -> [Range<u32>; 3] {
         let [first, end] = self.contacts;
-        [first..self.jamming, self.jamming..end]
+        [first..self.struck, self.struck..self.jamming, self.jamming..end]
     }
 
     /// Colors of the joints that are swept.
@@ -100,22 +102,25 @@ pub fn lay_out(
         let substep = if is_heap { Substep::of_heap } else { Substep::new };
         Block { substeps, substep: substep(config, dt / substeps as f32), ..Block::default() }
     }));
-    let jamming = contacts.jamming();
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
-    if count == 1 && jamming.is_empty() {
+    if count == 1 && !contacts.any_struck() && !contacts.any_jamming() {
         order.extend_from_slice(&contacts.coloring.order);
         colors.clone_from(&contacts.coloring.offsets);
         blocks[0].contacts = [0, contacts.coloring.color_count() as u32];
-        blocks[0].jamming = blocks[0].contacts[1];
+        (blocks[0].struck, blocks[0].jamming) = (blocks[0].contacts[1], blocks[0].contacts[1]);
     } else {
         for (i, block) in blocks.iter_mut().enumerate() {
-            let is_of = |row: u32| block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
-            let jams = |row: u32| jamming.binary_search(&row).is_ok();
-            let [first, jamming] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && !jams(row));
+            let is_of =
+                |row: u32| count == 1 || block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
+            let jams = |row: u32| contacts.jams(row);
+            let is_struck = |row: u32| contacts.is_struck(row) && !jams(row);
+            let is_swept_once = |row: u32| is_of(row) && !jams(row) && !is_struck(row);
+            let [first, struck] = deal_colors(&contacts.coloring, order, colors, is_swept_once);
+            let [_, jamming] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && is_struck(row));
             let [_, end] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && jams(row));
-            (block.contacts, block.jamming) = ([first, end], jamming);
+            (block.contacts, block.struck, block.jamming) = ([first, end], struck, jamming);
         }
     }
     // The bodies of a joint that can move are of one island, and those of a system.

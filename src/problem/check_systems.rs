@@ -1,12 +1,12 @@
 //! Whether systems of joints keep what backends rely on.
 
 use super::check::refuse;
-use super::{JointSystems, StepProblem};
+use super::{JointRow, JointSystems, NodeRow, StepProblem};
 use crate::error::Result;
 
 impl StepProblem {
-    /// The joints of the direct colors of a block are those of its systems, each once; the blocks and products of a node are those of its system,
-    /// and products come before the block that they are subtracted from.
+    /// The anchors, locks and limits of the joints of the direct colors of a block are the rows of its systems, each once; the blocks and products of a
+    /// node are those of its system, and products come before the block that they are subtracted from.
     pub(super) fn check_systems(&self) -> Result<()> {
         let JointSystems { begins, softness, nodes, blocks, terms } = &self.systems;
         let ends = begins.first().zip(begins.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
@@ -48,15 +48,16 @@ impl StepProblem {
             }
         }
         for (i, block) in self.blocks.iter().enumerate() {
-            let mut direct = self.rows_of(&block.direct_joints()).to_vec();
+            let direct = self.rows_of(&block.direct_joints());
             let [_, _, _, _, own, _] = block.colors();
             let nodes_of = |&system: &u32| &nodes[self.systems.nodes_of(system as usize)];
-            let mut solved: Vec<u32> = self.rows_of(&own).iter().flat_map(nodes_of).map(|node| node.joint).collect();
-            direct.sort_unstable();
+            let mut wanted: Vec<_> = direct.iter().flat_map(|&joint| self.rows_to_solve(joint)).collect();
+            let mut solved: Vec<_> = self.rows_of(&own).iter().flat_map(nodes_of).flat_map(rows_of_node).collect();
+            wanted.sort_unstable();
             solved.sort_unstable();
-            if solved != direct {
+            if solved != wanted {
                 return refuse(format_args!(
-                    "blocks[{i}]: the joints of its systems are not those of its direct colors"
+                    "blocks[{i}]: the rows of its systems are not the anchors, locks and limits of its direct colors"
                 ));
             }
         }
@@ -70,4 +71,26 @@ impl StepProblem {
         }
         Ok(())
     }
+
+    /// The rows of a joint that systems solve: its anchors, as none, and its locks and limits by their numbers, with whether each is a limit.
+    fn rows_to_solve(&self, joint: u32) -> impl Iterator<Item = Solved> {
+        let JointRow { first_axis, axis_count, is_loose, .. } = self.joints[joint as usize];
+        let axes = &self.axes[first_axis as usize..(first_axis + axis_count) as usize];
+        let bounds = axes.iter().enumerate().filter(|(_, axis)| axis.is_lock() || axis.is_limit());
+        let bounds = bounds.map(|(k, axis)| Some((k, axis.is_limit())));
+        Some(None).filter(|_| is_loose == 0.0).into_iter().chain(bounds).map(move |row| (joint, row))
+    }
+}
+
+/// A row of a joint that systems solve.
+type Solved = (u32, Option<(usize, bool)>);
+
+/// The rows of a node, likewise.
+fn rows_of_node(node: &NodeRow) -> impl Iterator<Item = Solved> + use<> {
+    let node = *node;
+    let anchors = Some(None).filter(|_| node.is_of_anchors());
+    anchors
+        .into_iter()
+        .chain(node.axes().map(move |(i, k)| Some((k, node.is_limit(i)))))
+        .map(move |row| (node.joint, row))
 }

@@ -11,7 +11,7 @@ use super::carry::{Carry, NO_POINT, Preload, Written};
 use super::effective::LEAST_JAMMING;
 use super::points_a_slot;
 use super::prepare::{ComputedRow, PoseRow};
-use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
+use super::rows::{BodyRow, ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slot, Slots, Write};
 use super::write::{SlotRows, Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS, Manifold};
@@ -19,7 +19,7 @@ use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
-use crate::world::{Body, World};
+use crate::world::{Body, BodyKind, Joint, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
 #[derive(Debug, Default)]
@@ -36,6 +36,11 @@ pub struct ContactRows {
     poses: Vec<PoseRow>,
     /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
     jams: Vec<bool>,
+    /// Whether the points of each slot's contact are struck together in this step; empty if none are.
+    struck: Vec<bool>,
+    /// Whether each body may be faster anywhere than half of the threshold of restitution, and whether a joint holds it.
+    fast: Vec<bool>,
+    jointed: Vec<bool>,
     /// The classes of bodies that the rows were written for.
     classes: Vec<u8>,
     /// What all materials have in common; none where one may have changed.
@@ -58,7 +63,7 @@ crate::saved::cloned!(ContactRows {
     materials,
     sums,
     carry,
-} scratch { graph, poses, new_bodies });
+} scratch { graph, poses, struck, fast, jointed, new_bodies });
 
 /// What the materials of a world have in common.
 #[derive(Clone, Copy, Debug)]
@@ -204,11 +209,21 @@ impl ContactRows {
         &'a self,
         world: &'a World,
         detector: &'a Detector,
+        config: &'a SolverConfig,
+        dt: f32,
     ) -> impl Iterator<Item = Interface> + Clone + 'a {
+        let substep = Substep::new(config, dt / config.substeps as f32);
+        let inverse_mass = |body: u32| (body != IMMOVABLE).then(|| world.bodies[body as usize].mass.mass.recip());
+        let force = move |slot: &Slot, a: Option<f32>, b: Option<f32>| {
+            let springs = if a.is_some() && b.is_some() { substep.movable } else { substep.fixed };
+            let sag = substep.length * springs.compliance() * (a.unwrap_or(0.0) + b.unwrap_or(0.0));
+            config.promised_sag(slot.size) / sag
+        };
         let any_driven = world.bodies.iter().any(Body::is_driven);
-        let all = (0..).zip(self.slots.all.iter().zip(&self.slots.edges)).filter(|(_, (slot, _))| slot.takes_part);
-        all.map(move |(row, (slot, edge))| {
+        let all = self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
+        all.map(move |(slot, edge)| {
             let (mut a, mut b) = (edge.a, edge.b);
+            let force = force(slot, inverse_mass(a), inverse_mass(b));
             if any_driven && (a == IMMOVABLE || b == IMMOVABLE) {
                 let pair = detector.pair(slot.world, slot.pair);
                 for (end, body) in [(&mut a, pair.body_a), (&mut b, pair.body_b)] {
@@ -217,25 +232,78 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need, is_joint: false, row }
+            Interface { a, b, need: slot.need, force, is_joint: false }
         })
     }
 
-    /// How deep the surfaces of a contact overlap where its bodies are now, over the sag that the settings promise. A look at the rows would not
-    /// do: a device may have them.
-    pub fn overlap(&self, row: u32, world: &World, detector: &Detector, config: &SolverConfig) -> f32 {
-        let slot = &self.slots.all[row as usize];
-        let pair = detector.pair(slot.world, slot.pair);
-        let overlaps = pair.overlaps(&pair.manifolds[slot.manifold as usize], world).map(|(overlap, _)| overlap);
-        overlaps.fold(0.0, f32::max) / config.promised_sag(slot.size)
+    /// Whether any contact that takes part jams.
+    pub fn any_jamming(&self) -> bool {
+        self.may_jam() && self.slots.taking_part().any(|row| self.jams[row as usize])
     }
 
-    /// The contacts that take part and jam, ascending.
-    pub fn jamming(&self) -> Vec<u32> {
-        if self.materials.is_none_or(|materials| !materials.may_jam) {
-            return Vec::new();
+    /// Whether the contact in a row jams.
+    pub fn jams(&self, row: u32) -> bool {
+        self.may_jam() && self.jams[row as usize]
+    }
+
+    fn may_jam(&self) -> bool {
+        self.materials.is_some_and(|materials| materials.may_jam)
+    }
+
+    /// Whether the points of any contact are struck together.
+    pub fn any_struck(&self) -> bool {
+        !self.struck.is_empty()
+    }
+
+    /// Whether the points of the contact in a row are struck together.
+    pub fn is_struck(&self, row: u32) -> bool {
+        self.any_struck() && self.struck[row as usize]
+    }
+
+    /// Notes the contacts of several points whose surfaces meet, in their mean, at more than the threshold of restitution. A joint hands a blow
+    /// on, so that the masses of two bodies do not tell what they give; these contacts are swept as others.
+    fn note_struck(&mut self, world: &World, threshold: f32, problem: &StepProblem) {
+        let Self { slots, struck, fast, jointed, .. } = self;
+        let is_fast = |(row, body): (&BodyRow, &Body)| {
+            let [v, w] = [row.v, row.w].map(Vec3::from);
+            // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
+            let reach = || 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
+            let is_above = |half_square: f32| 8.0 * half_square > threshold * threshold;
+            is_above(v.length_squared())
+                || w != Vec3::ZERO && is_above(v.length_squared() + reach() * w.length_squared())
+                || body.kind == BodyKind::Kinematic && body.is_driven()
+        };
+        struck.clear();
+        fast.clear();
+        fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
+        if !fast.contains(&true) {
+            return;
         }
-        self.slots.taking_part().filter(|&row| self.jams[row as usize]).collect()
+        jointed.clear();
+        jointed.resize(fast.len(), false);
+        for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
+            [Some(a), b].into_iter().flatten().for_each(|body| jointed[body] = true);
+        }
+        let is_struck = |(slot, contact): (&Slot, &ContactRow)| {
+            let bodies = [contact.body_a as usize, contact.body_b as usize];
+            let is_free = || bodies.iter().all(|&body| !jointed[body]);
+            if !slot.takes_part || contact.point_count < 2 || !bodies.iter().any(|&body| fast[body]) || !is_free() {
+                return false;
+            }
+            let first = contact.first_point as usize;
+            let points = &problem.points[first..first + contact.point_count as usize];
+            let arms = points.iter().fold([Vec3::ZERO; 2], |[a, b], p| [a + Vec3::from(p.r_a), b + Vec3::from(p.r_b)]);
+            let count = points.len() as f32;
+            let [a, b] = [0, 1].map(|side| {
+                let BodyRow { v, w, .. } = problem.bodies[bodies[side]];
+                count * Vec3::from(v) + Vec3::from(w).cross(arms[side])
+            });
+            (b - a).dot(contact.normal.into()) < -threshold * count
+        };
+        struck.extend(slots.all.iter().zip(&problem.contacts).map(is_struck));
+        if !struck.contains(&true) {
+            struck.clear();
+        }
     }
 
     /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
@@ -321,6 +389,7 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
+        self.note_struck(world, config.restitution_threshold, problem);
     }
 
     /// Makes room for the rows of all slots. Where friction acts at other places than before, it begins without impulses.

@@ -1,11 +1,13 @@
-//! The mass that each joint of a connected set of bodies holds up: the rule that chooses which joints are solved at once.
+//! What each joint of a connected set of bodies holds up.
 
 use std::collections::BTreeMap;
 
-/// The mass that each joint bears (kg). Every body passes its own mass, and what hangs on it, to the joints that lead to bodies which
-/// are nearer to a support, in equal parts. `sides` are the bodies of each joint that can move; a joint with one side is a support. Where
-/// there is none, the heaviest body takes its place.
-pub fn borne_masses(sides: &[[Option<u32>; 2]], mass: impl Fn(u32) -> f32) -> Vec<f32> {
+use glam::Vec4;
+
+/// What each joint bears: mass times its place (kg m), and mass (kg). Every body passes its own, and what hangs on it, to the joints that lead
+/// to bodies which are nearer to a support, in equal parts. `sides` are the bodies of each joint that can move; a joint with one side is a
+/// support. Where there is none, the heaviest body takes its place.
+pub fn borne(sides: &[[Option<u32>; 2]], own: impl Fn(u32) -> Vec4) -> Vec<Vec4> {
     let mut of_body: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (joint, own) in sides.iter().enumerate() {
         own.iter().flatten().for_each(|&body| of_body.entry(body).or_default().push(joint));
@@ -14,7 +16,7 @@ pub fn borne_masses(sides: &[[Option<u32>; 2]], mass: impl Fn(u32) -> f32) -> Ve
     let mut layer: Vec<u32> =
         of_body.iter().filter(|(_, own)| own.iter().any(|&j| is_support(j))).map(|(&body, _)| body).collect();
     if layer.is_empty() {
-        layer.extend(of_body.keys().copied().max_by(|&a, &b| mass(a).total_cmp(&mass(b))));
+        layer.extend(of_body.keys().copied().max_by(|&a, &b| own(a).w.total_cmp(&own(b).w)));
     }
     let mut distances: BTreeMap<u32, u32> = layer.iter().map(|&body| (body, 1)).collect();
     let mut order = Vec::new();
@@ -31,8 +33,8 @@ pub fn borne_masses(sides: &[[Option<u32>; 2]], mass: impl Fn(u32) -> f32) -> Ve
             }
         }
     }
-    let mut borne = vec![0.0; sides.len()];
-    let mut load: BTreeMap<u32, f32> = of_body.keys().map(|&body| (body, mass(body))).collect();
+    let mut borne = vec![Vec4::ZERO; sides.len()];
+    let mut load: BTreeMap<u32, Vec4> = of_body.keys().map(|&body| (body, own(body))).collect();
     for body in order.into_iter().rev() {
         let distance = distances[&body];
         let above = |&joint: &usize| {
@@ -58,15 +60,17 @@ mod tests {
     fn a_joint_bears_what_hangs_on_it_and_a_loop_shares() {
         let tie = |a, b| [Some(a), Some(b)];
         let hung = |a| [Some(a), None];
-        let mass = |body: u32| [1.0, 2.0, 4.0, 8.0][body as usize];
-        assert_eq!(borne_masses(&[hung(0), tie(0, 1), tie(1, 2)], mass), [7.0, 6.0, 4.0]);
-        assert_eq!(borne_masses(&[tie(2, 1), hung(2), tie(0, 1)], mass), [3.0, 7.0, 1.0]);
+        let own = |body: u32| Vec4::new(1.0, 0.0, 0.0, 1.0) * [1.0, 2.0, 4.0, 8.0][body as usize];
+        let borne_masses = |sides: &[[Option<u32>; 2]]| -> Vec<f32> {
+            let all = borne(sides, own);
+            assert!(all.iter().all(|load| load.x == load.w));
+            all.iter().map(|load| load.w).collect()
+        };
+        assert_eq!(borne_masses(&[hung(0), tie(0, 1), tie(1, 2)]), [7.0, 6.0, 4.0]);
+        assert_eq!(borne_masses(&[tie(2, 1), hung(2), tie(0, 1)]), [3.0, 7.0, 1.0]);
         // A square hung at one corner: the far corner hangs on both others.
-        assert_eq!(
-            borne_masses(&[hung(0), tie(0, 1), tie(0, 2), tie(1, 3), tie(2, 3)], mass),
-            [15.0, 6.0, 8.0, 4.0, 4.0]
-        );
+        assert_eq!(borne_masses(&[hung(0), tie(0, 1), tie(0, 2), tie(1, 3), tie(2, 3)]), [15.0, 6.0, 8.0, 4.0, 4.0]);
         // Without a support the heaviest holds the others.
-        assert_eq!(borne_masses(&[tie(0, 1), tie(1, 3)], mass), [1.0, 3.0]);
+        assert_eq!(borne_masses(&[tie(0, 1), tie(1, 3)]), [1.0, 3.0]);
     }
 }

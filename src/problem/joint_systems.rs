@@ -12,7 +12,7 @@ pub struct JointSystems {
     pub begins: Vec<u32>,
     /// Softness of the joints of each system, relative to the trace of their own blocks.
     pub softness: Vec<f32>,
-    /// The joints of each system, in the order of their elimination.
+    /// The rows of each system, up to three of a joint in a node, in the order of their elimination.
     pub nodes: Vec<NodeRow>,
     /// The blocks of L, column by column: first the pivot, then those below it.
     pub blocks: Vec<BlockRow>,
@@ -22,7 +22,7 @@ pub struct JointSystems {
 
 crate::saved::state!(JointSystems { begins, softness, nodes, blocks, terms });
 
-/// One joint of a system and its column of L, 16 B.
+/// Up to three rows of a joint and their column of L, 16 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct NodeRow {
@@ -32,11 +32,51 @@ pub struct NodeRow {
     pub first_block: u32,
     /// One past the last block of its column.
     pub end_block: u32,
-    #[doc(hidden)]
-    pub pad: u32,
+    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint, with [`NodeRow::LIMIT`]; 0 for
+    /// no row.
+    pub rows: u32,
 }
 
-crate::saved::fields!(NodeRow { joint, first_block, end_block, pad });
+crate::saved::fields!(NodeRow { joint, first_block, end_block, rows });
+
+/// A number of the impulses of joints and axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImpulseNumber {
+    /// The row of `joint_impulses`.
+    pub row: usize,
+    /// Its component, 0 to 2.
+    pub component: usize,
+}
+
+impl NodeRow {
+    /// The rows of a node that holds the anchors together.
+    pub const ANCHORS: u32 = u32::MAX;
+
+    /// The bit of a row that is a limit: it holds while it bears an impulse, and is not there otherwise.
+    const LIMIT: u32 = 0x80;
+
+    /// The rows of a node of up to three axes, each with whether it is a limit.
+    pub fn rows_of(axes: &[(u32, bool)]) -> u32 {
+        let row = |&(axis, is_limit): &(u32, bool)| axis + 1 + if is_limit { Self::LIMIT } else { 0 };
+        axes.iter().zip(0..3).map(|(axis, i)| row(axis) << (8 * i)).sum()
+    }
+
+    /// Whether row i is a limit.
+    pub fn is_limit(&self, i: usize) -> bool {
+        !self.is_of_anchors() && self.rows >> (8 * i) & Self::LIMIT != 0
+    }
+
+    /// Whether its rows are those of the anchors.
+    pub fn is_of_anchors(&self) -> bool {
+        self.rows == Self::ANCHORS
+    }
+
+    /// Its rows that are axes, each with the number of the axis among those of the joint.
+    pub fn axes(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let rows = if self.is_of_anchors() { 0 } else { self.rows };
+        (0..3).filter_map(move |i| Some((i, (rows >> (8 * i) & (Self::LIMIT - 1)).checked_sub(1)? as usize)))
+    }
+}
 
 /// One block of L, 16 B.
 #[repr(C)]
@@ -85,15 +125,18 @@ impl JointSystems {
         *self = Self::default();
     }
 
-    /// Adds the system of some joints, if its factors have at most `most_terms` products. `sides` are the bodies of a joint that can
-    /// move.
-    pub fn add(&mut self, joints: &[u32], sides: impl Fn(u32) -> [Option<u32>; 2], most_terms: usize) -> bool {
-        let Some(columns) = eliminated(joints, &sides, most_terms) else { return false };
+    /// Adds the system of some nodes, each the rows of a joint ([`NodeRow::rows`]), if its factors have at most `most_terms` products. `sides`
+    /// are the bodies of a joint that can move. Nodes of a joint stand beside each other. False without any.
+    pub fn add(&mut self, nodes: &[(u32, u32)], sides: impl Fn(u32) -> [Option<u32>; 2], most_terms: usize) -> bool {
+        let sides = |node: u32| sides(nodes[node as usize].0);
+        let Some(columns) = eliminated(nodes.len(), &sides, most_terms).filter(|columns| !columns.is_empty()) else {
+            return false;
+        };
         if self.begins.is_empty() {
             self.begins.push(0);
         }
         let base = self.nodes.len() as u32;
-        let mut place = vec![0; joints.len()];
+        let mut place = vec![0; nodes.len()];
         columns.iter().zip(base..).for_each(|((local, _), at)| place[*local as usize] = at);
         // The blocks, column by column, rows ascending.
         for (local, below) in &columns {
@@ -103,7 +146,7 @@ impl JointSystems {
             let mut rows: Vec<BlockRow> = below
                 .iter()
                 .map(|&row| {
-                    let shared = shared_sides(sides(joints[*local as usize]), sides(joints[row as usize]));
+                    let shared = shared_sides(sides(*local), sides(row));
                     BlockRow { node: place[row as usize], shared, ..BlockRow::default() }
                 })
                 .collect();
@@ -111,10 +154,17 @@ impl JointSystems {
             self.blocks.push(own);
             self.blocks.append(&mut rows);
             let end_block = self.blocks.len() as u32;
-            self.nodes.push(NodeRow { joint: joints[*local as usize], first_block, end_block, pad: 0 });
+            let (joint, rows) = nodes[*local as usize];
+            self.nodes.push(NodeRow { joint, first_block, end_block, rows });
         }
         self.begins.push(self.nodes.len() as u32);
-        self.softness.push(if has_loops(joints, &sides) { LOOP_SOFTNESS } else { 0.0 });
+        let firsts: Vec<_> = (0..nodes.len()).filter(|&i| i == 0 || nodes[i - 1].0 != nodes[i].0).collect();
+        let joints: Vec<_> = firsts.into_iter().map(|node| sides(node as u32)).collect();
+        self.softness.push(match nodes.iter().all(|node| node.1 == NodeRow::ANCHORS) {
+            _ if has_loops(&joints) => LOOP_SOFTNESS,
+            true => 0.0,
+            false => AXIS_SOFTNESS,
+        });
         self.add_terms(base as usize);
         true
     }
@@ -147,14 +197,18 @@ impl JointSystems {
 /// then, and no impulse follows from it. 2^-14 / 3 gives way by 0.04 mm at 1/480 s where 300 times the mass of a ball hangs on it.
 const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
 
-/// Whether more joints than needed hold the bodies together.
-fn has_loops(joints: &[u32], sides: &impl Fn(u32) -> [Option<u32>; 2]) -> bool {
-    let mut bodies: Vec<u32> = joints.iter().flat_map(|&joint| sides(joint)).flatten().collect();
+/// Softness of joints in trees with locks to turn about. Single precision loses the turn of a long lever of links in that of one link: its
+/// pivot is the difference of numbers 1e7 times as large. This is 2^-19 / 3, above what rounding leaves.
+const AXIS_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
+
+/// Whether more joints than needed hold the bodies together, given the bodies of each that can move.
+fn has_loops(joints: &[[Option<u32>; 2]]) -> bool {
+    let mut bodies: Vec<u32> = joints.iter().flatten().flatten().copied().collect();
     bodies.sort_unstable();
     bodies.dedup();
     // One joint of a tree may hold it to the world.
     joints.len() > bodies.len()
-        || joints.iter().filter(|&&joint| sides(joint).iter().flatten().count() == 2).count() >= bodies.len()
+        || joints.iter().filter(|sides| sides.iter().flatten().count() == 2).count() >= bodies.len()
 }
 
 /// The bits of `BlockRow::shared`.
@@ -170,21 +224,21 @@ fn shared_sides(column: [Option<u32>; 2], row: [Option<u32>; 2]) -> u32 {
     bits
 }
 
-/// Joints in the order of their elimination, each with those that come after it and that its column of L has blocks for. None if there
-/// are more than `most_terms` products.
+/// Nodes in the order of their elimination, each with those that come after it and that its column of L has blocks for. None if there
+/// are more than `most_terms` products. `sides` are the bodies of a node that can move.
 ///
-/// The joint with the fewest neighbors comes next, and of several the one that has waited longest: the ends of a chain in turn, so that
+/// The node with the fewest neighbors comes next, and of several the one that has waited longest: the ends of a chain in turn, so that
 /// a processor works on two recurrences side by side.
 fn eliminated(
-    joints: &[u32],
+    count: usize,
     sides: &impl Fn(u32) -> [Option<u32>; 2],
     most_terms: usize,
 ) -> Option<Vec<(u32, Vec<u32>)>> {
     let mut of_body: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();
-    for (local, &joint) in joints.iter().enumerate() {
-        sides(joint).into_iter().flatten().for_each(|body| of_body.entry(body).or_default().push(local as u32));
+    for node in 0..count as u32 {
+        sides(node).into_iter().flatten().for_each(|body| of_body.entry(body).or_default().push(node));
     }
-    let mut neighbors = vec![BTreeSet::new(); joints.len()];
+    let mut neighbors = vec![BTreeSet::new(); count];
     let mut terms = 0;
     for own in of_body.values() {
         terms += own.len() * own.len() / 2;
@@ -195,12 +249,12 @@ fn eliminated(
             neighbors[a as usize].extend(own.iter().copied().filter(|&b| b != a));
         }
     }
-    let mut waiting = vec![VecDeque::new(); joints.len()];
-    (0..joints.len()).for_each(|i| waiting[neighbors[i].len()].push_back(i as u32));
-    let mut is_done = vec![false; joints.len()];
-    let mut columns = Vec::with_capacity(joints.len());
+    let mut waiting = vec![VecDeque::new(); count];
+    (0..count).for_each(|i| waiting[neighbors[i].len()].push_back(i as u32));
+    let mut is_done = vec![false; count];
+    let mut columns = Vec::with_capacity(count);
     let (mut terms, mut least) = (0, 0);
-    while columns.len() < joints.len() {
+    while columns.len() < count {
         let Some(next) = waiting[least].pop_front() else {
             least += 1;
             continue;

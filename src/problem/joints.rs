@@ -1,12 +1,11 @@
 //! The rows of joints: one for each joint of the world, in its order, and those of their axes. An impulse stays in its row.
 
 use std::collections::{BTreeMap, HashMap};
-use std::f32::consts::TAU;
 
 use glam::Vec3;
 
 use super::axes;
-use super::joint_loads::borne_masses;
+use super::joint_sets::gap_of_sweeps;
 use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
@@ -14,7 +13,7 @@ use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{Effort, Interface};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{BodyKind, Bounds, Joint, JointHandle, Linear, World};
+use crate::world::{BodyKind, Joint, JointHandle, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Debug, Default)]
@@ -38,6 +37,8 @@ pub struct JointRows {
     swept_gap: f32,
     /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
     needs: Vec<f32>,
+    /// What turns opens joints by, over the promised gap: this times ω² (s²).
+    gap_of_turns: f32,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
     lent: Vec<LentInertia>,
 }
@@ -54,11 +55,11 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     needs,
-} scratch { graph, lent });
+} scratch { graph, gap_of_turns, lent });
 
-/// Most products of blocks a joint. A chain has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
+/// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
-const MOST_TERMS_A_JOINT: usize = 24;
+const MOST_TERMS_A_NODE: usize = 24;
 
 /// The gap of a net that swings over its gap at rest, as substeps for it are chosen. A net of 16 x 16 balls under 300 times opens 6 times as
 /// far as at rest with 8 substeps, and 20 times with 128.
@@ -108,8 +109,10 @@ impl JointRows {
         self.chosen_for = None;
     }
 
-    /// Chooses the joints that are solved at once, unless they are chosen. `substep` is the length of a substep (s).
+    /// Chooses the joints that are solved at once, unless they are chosen: one that is swept pulls its gap shut softly, and would gain energy if it
+    /// were solved at once from a later step on. `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
+        self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
@@ -138,23 +141,29 @@ impl JointRows {
                 members.entry(islands.root(body)).or_default().push(joint as u32);
             }
         }
-        for joints in members.values() {
-            let gap = self.gap_of_sweeps(joints, world, config, substep);
+        for joints in members.into_values() {
+            let gap = gap_of_sweeps(&joints, world, config, substep, |joint| self.sides(joint));
             self.swept_gap = self.swept_gap.max(gap);
-            let most_terms = match config.joint_solver {
-                JointSolver::Auto if gap <= config.max_joint_gap_share => continue,
-                JointSolver::Auto => MOST_TERMS_A_JOINT * joints.len(),
-                _ => usize::MAX,
-            };
-            let system = problem.systems.len() as u32;
-            // Axes are swept, and the anchors of their joints with them.
-            let are_balls = joints.iter().all(|&joint| self.joints[joint as usize].is_ball());
-            if are_balls && problem.systems.add(joints, |joint| self.sides(joint), most_terms) {
-                joints.iter().for_each(|&joint| self.systems[joint as usize] = system);
-            } else {
-                let need = SWING * gap / config.max_joint_gap_share;
-                joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
-            }
+            self.decide(&joints, gap, config, problem);
+        }
+    }
+
+    /// Solves the anchors and locks of some joints at once, which sweeps would leave open by `gap`, where that costs little enough; else they
+    /// need more substeps.
+    fn decide(&mut self, joints: &[u32], gap: f32, config: &SolverConfig, problem: &mut StepProblem) {
+        let of_joint = |&joint: &u32| axes::nodes(&self.joints[joint as usize]).map(move |rows| (joint, rows));
+        let nodes: Vec<_> = joints.iter().flat_map(of_joint).collect();
+        let most_terms = match config.joint_solver {
+            JointSolver::Auto => MOST_TERMS_A_NODE * nodes.len(),
+            _ => usize::MAX,
+        };
+        let system = problem.systems.len() as u32;
+        if problem.systems.add(&nodes, |joint| self.sides(joint), most_terms) {
+            nodes.iter().for_each(|(joint, _)| self.systems[*joint as usize] = system);
+        } else {
+            let share = gap / config.max_joint_gap_share;
+            let need = if share > 1.0 { SWING * share } else { 0.0 };
+            joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
         }
     }
 
@@ -162,33 +171,6 @@ impl JointRows {
     fn sides(&self, joint: u32) -> [Option<u32>; 2] {
         let Edge { a, b, .. } = self.edges[joint as usize];
         [a, b].map(|body| Some(body).filter(|&body| body != IMMOVABLE))
-    }
-
-    /// The largest gap at rest that sweeps leave in some joints, as a share of their arms: F/(m w²), the load F that a joint bears, the mass
-    /// m of its bodies, the frequency w of its spring.
-    fn gap_of_sweeps(&self, joints: &[u32], world: &World, config: &SolverConfig, substep: f32) -> f32 {
-        let sides: Vec<_> = joints.iter().map(|&joint| self.sides(joint)).collect();
-        let mass = |body: u32| world.bodies[body as usize].mass.mass;
-        let weight = |body: u32| mass(body) * world.bodies[body as usize].gravity_scale.abs();
-        let omega = TAU * config.joint_frequency / substep;
-        let bears = |joint: &Joint| match &joint.linear {
-            Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
-            Linear::Distance(distance) => distance.bounds != Bounds::Free,
-        };
-        let gap = |(&joint, borne): (&u32, f32)| {
-            if !bears(&self.joints[joint as usize]) {
-                return 0.0;
-            }
-            let (body_a, body_b) = self.joints[joint as usize].indices();
-            let [anchor_a, anchor_b] = world.anchors(&self.joints[joint as usize]);
-            let arm = |body: usize, anchor: Vec3| anchor.distance(world.bodies[body].center_of_mass());
-            let arms = arm(body_a, anchor_a) + body_b.map_or(0.0, |body| arm(body, anchor_b));
-            let softness: f32 = self.sides(joint).into_iter().flatten().map(|body| mass(body).recip()).sum();
-            let gravity = world.gravity_of(world.bodies.worlds()[body_a] as usize).length();
-            borne * gravity * softness / (omega * omega * arms)
-        };
-        // A joint without arms has no length to be held against.
-        joints.iter().zip(borne_masses(&sides, weight)).map(gap).filter(|gap| gap.is_finite()).fold(0.0, f32::max)
     }
 
     /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.
@@ -249,8 +231,25 @@ impl JointRows {
     }
 
     /// Whether any joint needs more than class 0 gives.
-    pub fn are_above(&self) -> bool {
-        self.needs.iter().any(|&need| need > 1.0)
+    pub fn are_above(&self, world: &World) -> bool {
+        (0..self.joints.len()).any(|joint| self.need(world, joint) > 1.0)
+    }
+
+    /// The gap that a joint would have in class 0, over the promised one: that at rest, or that of its turning arms. Arms turn, and centers of mass go
+    /// straight: in a substep h that opens a joint that is solved at once by (h ω)²/2 of an arm.
+    fn need(&self, world: &World, joint: usize) -> f32 {
+        let Joint { body_a, anchor_a, body_b, anchor_b, .. } = self.joints[joint];
+        let (mut arms, mut opened) = (0.0, 0.0);
+        for (body, anchor) in [(Some(body_a), anchor_a), (body_b, anchor_b)] {
+            if let Some(body) = body.and_then(|body| world.body(body)) {
+                let arm = anchor.distance(body.mass.center);
+                (arms, opened) = (arms + arm, opened + arm * body.angular_velocity.length_squared());
+            }
+        }
+        // Springs of swept joints would change their stiffness as bodies turn.
+        let is_direct = self.systems.get(joint).is_some_and(|&system| system != SWEPT);
+        let of_turns = if is_direct && arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 };
+        self.needs.get(joint).copied().unwrap_or(0.0).max(of_turns)
     }
 
     /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
@@ -262,9 +261,10 @@ impl JointRows {
             _ => IMMOVABLE,
         };
         awake.map(move |(i, joint)| {
+            let force = axes::driving_force(joint, world);
             let (a, b) = joint.indices();
-            let need = self.needs.get(i).copied().unwrap_or(0.0);
-            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, is_joint: true, row: i as u32 }
+            let need = self.need(world, i);
+            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, is_joint: true }
         })
     }
 
@@ -332,7 +332,12 @@ impl JointRows {
             }
         }));
         problem.params.axis_count = problem.axes.len() as u32;
-        if world.joints.iter().any(Joint::can_break) {
+        let is_driven = |b: usize| world.bodies[b].kind != BodyKind::Dynamic && world.bodies[b].is_driven();
+        let is_measured = |joint: &Joint| {
+            let (a, b) = joint.indices();
+            joint.can_break() || joint.is_driven() || is_driven(a) || b.is_some_and(is_driven)
+        };
+        if world.joints.iter().any(is_measured) {
             // A joint that takes no part bears nothing that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }

@@ -34,9 +34,9 @@ pub(super) fn lend_inertia(
     problem: &mut StepProblem,
 ) {
     for (i, h) in joints {
-        let (row, impulse) = (&problem.joints[i], problem.joint_impulses[i].linear);
+        let (row, impulse) = (&problem.joints[i], problem.joint_impulse(&problem.joint_impulses, i));
         for (body, arm, sign) in [(row.body_a, row.r_a, -1.0), (row.body_b, row.r_b, 1.0)] {
-            lent.push((body, lent_inertia(Vec3::from_array(arm), Vec3::from_array(impulse) * sign, h)));
+            lent.push((body, lent_inertia(Vec3::from_array(arm), impulse * sign, h)));
         }
     }
     lent.sort_by_key(|(body, _)| *body);

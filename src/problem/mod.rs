@@ -10,6 +10,7 @@ mod check_systems;
 mod contacts;
 pub mod effective;
 mod joint_loads;
+mod joint_sets;
 mod joint_systems;
 mod joints;
 mod lent_inertia;
@@ -23,10 +24,12 @@ mod touching;
 mod write;
 
 pub use arithmetic::{Mass, Sym3};
+pub(crate) use axes::drive_count;
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
-pub use joint_systems::{BlockRow, JointSystems, NodeRow};
+pub(crate) use effective::InverseMass;
+pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
@@ -228,6 +231,7 @@ impl StepProblem {
             substeps: 1,
             substep,
             contacts,
+            struck: contact_colors,
             jamming: contact_colors,
             joints,
             direct,
@@ -256,6 +260,18 @@ impl StepProblem {
         let rows = self.axes[own.clone()].iter().zip(&impulses[own]);
         let wanted = rows.filter(|(axis, _)| (axis.is_linear > 0.0) == is_linear);
         wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()
+    }
+
+    /// Where the three rows of a node have their impulses; none of a row that is not there.
+    pub(crate) fn numbers_of(&self, node: &NodeRow) -> [Option<ImpulseNumber>; 3] {
+        let joint = node.joint as usize;
+        if node.is_of_anchors() {
+            return [0, 1, 2].map(|component| Some(ImpulseNumber { row: joint, component }));
+        }
+        let first = self.joints.len() + self.joints[joint].first_axis as usize;
+        let mut numbers = [None; 3];
+        node.axes().for_each(|(i, k)| numbers[i] = Some(ImpulseNumber { row: first + k, component: 0 }));
+        numbers
     }
 
     /// Number of impulses, those of patches, joints and their axes included.

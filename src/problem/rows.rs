@@ -265,6 +265,18 @@ pub struct AxisRow {
     pub length: f32,
 }
 
+impl AxisRow {
+    /// Whether it is a limit: of two bounds that differ.
+    pub(crate) fn is_limit(&self) -> bool {
+        self.left > 0.5 * NO_LIMIT
+    }
+
+    /// Whether the row is a lock: neither a limit nor a drive.
+    pub fn is_lock(&self) -> bool {
+        self.left < 0.5 * NO_LIMIT && self.mass_scale + self.impulse_scale < 0.5
+    }
+}
+
 /// The impulse of one joint on its body b, accumulated, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -124,6 +124,15 @@ pub enum Event {
         /// The other collider.
         visitor: ColliderOf,
     },
+    /// A collider flew through a sensor: they overlapped neither when the step began nor at its end.
+    Passed {
+        /// The sensor.
+        sensor: ColliderOf,
+        /// The other collider.
+        visitor: ColliderOf,
+        /// When the collider met the sensor, from the begin of the step on (s).
+        time: f32,
+    },
     /// A joint bore more than its [`break_force`](crate::Joint::break_force), and is gone from the world.
     Broke {
         /// The joint. The handle is stale.
@@ -288,6 +297,13 @@ impl Events {
         self.inside.follow(overlaps, |[sensor, visitor], is_new| {
             all.push(if is_new { Event::Entered { sensor, visitor } } else { Event::Left { sensor, visitor } });
         });
+    }
+
+    /// Notes the sensors and the colliders that met them on their ways through a step, ascending, with the times; after those that overlap.
+    pub fn note_passed(&mut self, passed: impl Iterator<Item = (Touch, f32)>) {
+        let is_inside = |pair: &Touch| self.inside.now.binary_search(pair).is_ok();
+        let flew = passed.filter(|(pair, _)| !is_inside(pair));
+        self.all.extend(flew.map(|([sensor, visitor], time)| Event::Passed { sensor, visitor, time }));
     }
 
     /// The sensors, each with the colliders that overlap it, ascending.

@@ -35,7 +35,7 @@ crate::saved::cloned!(Snapshot { world, config, stages });
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
 /// The version of the bytes that follow them. It grows with every change of what is saved.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Bytes before the content: the magic, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 

@@ -7,6 +7,7 @@ use super::events::{ColliderOf, Event, Events, Hit, Met};
 use crate::collide::{DetectStats, Detector};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
+use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
@@ -14,13 +15,14 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{Body, MassProperties, Material, World};
+use crate::world::{Body, BodyKind, MassProperties, Material, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
     pub effort: Effort,
+    energy: Energy,
     /// The result of the detection of this step.
     found: DetectStats,
     key: Key,
@@ -46,6 +48,7 @@ crate::saved::cloned!(Stages {
     detector,
     sleep,
     effort,
+    energy,
     found,
     key,
     contacts,
@@ -120,6 +123,7 @@ impl Stages {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
             effort: Effort::default(),
+            energy: Energy::default(),
             found: DetectStats::default(),
             key: Key { config: config.clone(), surfaces, scale: None },
             contacts: ContactRows::default(),
@@ -143,6 +147,7 @@ impl Stages {
             detector,
             sleep,
             effort,
+            energy,
             found: _,
             key,
             contacts,
@@ -167,6 +172,7 @@ impl Stages {
         detector.walk(world, [key.config.speculative_margin, world.gravity.length() * step * step], archive)?;
         sleep.walk(world, detector.kinds(), archive)?;
         effort.walk(archive)?;
+        energy.walk(archive)?;
         problem.walk(archive)?;
         contacts.walk(world, detector, (&key.config, key.scale.as_ref(), &key.surfaces), effort, problem, archive)?;
         joints.walk(archive)?;
@@ -231,8 +237,10 @@ impl Stages {
         if changes.joints {
             for joint in self.joints.follow(world, &mut self.problem) {
                 let (a, b) = joint.indices();
-                self.sleep.disturb(a);
-                b.into_iter().for_each(|b| self.sleep.disturb(b));
+                for body in [Some(a), b].into_iter().flatten() {
+                    self.sleep.disturb(body);
+                    self.energy.follow_joints_of(body);
+                }
             }
             self.detector.follow_joints(world);
         }
@@ -252,6 +260,7 @@ impl Stages {
         self.sleep.follow_bodies(world, changed);
         self.detector.follow_bodies(world, changed);
         self.effort.follow_bodies(world, changed);
+        self.energy.follow_bodies(world, changed);
         self.contacts.follow_bodies(world, changed);
         self.key.surfaces.resize(world.bodies.len(), (MassProperties::IMMOVABLE, Material::default()));
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
@@ -270,7 +279,7 @@ impl Stages {
     /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
     /// or a body lies where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, contacts, joints, problem, found, by_body, .. } = self;
+        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, by_body, .. } = self;
         // Rows may change their places; a step that fails makes no new lists.
         by_body.forget();
         let times = &mut stats.times;
@@ -293,6 +302,7 @@ impl Stages {
         timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
+                energy.follow_contacts();
             }
             joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
@@ -302,11 +312,10 @@ impl Stages {
             }
             let has_new_bodies = contacts.note_new_bodies(world);
             let asleep = sleep.asleep();
-            let of_contacts = || contacts.interfaces(world, detector);
+            let of_contacts = || contacts.interfaces(world, detector, config, dt);
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
-            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
-            let overlap = |row: u32| contacts.overlap(row, world, detector, config);
-            effort.follow(world, asleep, config, dt, is_above, (interfaces, overlap)) || has_new_bodies
+            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above(world);
+            effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         })
     }
 
@@ -316,7 +325,9 @@ impl Stages {
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
-            contacts.sums = events.listen.sums();
+            // The work of a body that moves by itself follows from the impulses of the whole step.
+            let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();
+            contacts.sums = events.listen.sums() || world.bodies.iter().any(drives);
             contacts.write(world, detector, config, effort, dt, problem);
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
@@ -387,18 +398,26 @@ impl Stages {
         }
     }
 
-    /// Brings poses and velocities to the world.
-    pub fn store(&mut self, world: &mut World, dt: f32) {
+    /// Brings poses and velocities to the world, without the energy that constraints made.
+    pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world, dt);
+        let Self { energy, effort, key, problem, .. } = self;
+        let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
+        let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
+        // Where joints stand is where they were within the step: what their springs held at its end is not there.
+        self.energy.follow_bodies(world, &stopped);
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
         if self.detector.has_sensors() || !self.events.inside().is_empty() {
             let overlaps = self.detector.sense(world, self.sleep.activity());
             self.events.note_overlaps(overlaps.iter().map(|pair| pair.map(|side| collider_of(world, side))));
+            let passed = self.detector.passed(world, dt, self.sleep.activity(), &far);
+            self.events.note_passed(passed.into_iter().map(|(pair, t)| (pair.map(|side| collider_of(world, side)), t)));
         }
         self.break_joints(world, dt);
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);
+        taken
     }
 }
 

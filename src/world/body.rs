@@ -174,6 +174,8 @@ pub struct Body {
     pub material: Material,
     /// Which bodies it meets.
     pub groups: Groups,
+    /// Whether it is a bullet: see [`Body::swept`](Body::swept()).
+    pub swept: bool,
     /// Shapes on the body; several make a compound. The mass does not follow a change of them: call [`Self::update_mass`].
     pub colliders: Vec<Collider>,
     weight: Weight,
@@ -195,6 +197,7 @@ crate::saved::cloned!(Body {
     mass,
     material,
     groups,
+    swept,
     colliders,
     weight,
     applied_force,
@@ -265,6 +268,7 @@ impl Body {
             mass,
             material,
             groups,
+            swept,
             colliders,
             weight,
             applied_force,
@@ -279,6 +283,7 @@ impl Body {
         mass.walk(archive)?;
         material.walk(archive)?;
         groups.walk(archive)?;
+        swept.walk(archive)?;
         colliders.walk(archive)?;
         weight.walk(archive)
     }
@@ -298,6 +303,7 @@ impl Body {
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
             groups: Groups::ALL,
+            swept: false,
             colliders: Vec::new(),
             weight: Weight::Density(1000.0),
             applied_force: Vec3::ZERO,
@@ -341,7 +347,8 @@ impl Body {
     }
 
     /// Adds a sensor at the body's origin: a shape without mass that bodies pass through, and that tells which colliders overlap it
-    /// ([`Event::Entered`](crate::Event::Entered), [`Event::Left`](crate::Event::Left)).
+    /// ([`Event::Entered`](crate::Event::Entered), [`Event::Left`](crate::Event::Left)) and what flew through it within a step
+    /// ([`Event::Passed`](crate::Event::Passed)).
     ///
     /// A sensor sees colliders of other bodies which the [`groups`](Body::groups) of its body meet, but no sensors. One of the two bodies has
     /// to be dynamic or kinematic: a fixed sensor does not see the ground, and one on a body that moves does. Bodies that a joint keeps from
@@ -453,6 +460,21 @@ impl Body {
         self
     }
 
+    /// Marks a bullet. Without the mark, nothing passes through fixed geometry, and contacts between bodies that move act along the ways that both would
+    /// take through the step if nothing touched them. Where one is thrown onto another way within the step, by a bounce or a push, the two may pass
+    /// through each other. A body with the mark is held where the way that it took passes through what moves.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape};
+    ///
+    /// let bullet = Body::dynamic().shape(Shape::ball(0.004)).swept();
+    /// assert!(bullet.swept && !Body::dynamic().swept);
+    /// ```
+    pub fn swept(mut self) -> Self {
+        self.swept = true;
+        self
+    }
+
     /// Name for people.
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
@@ -518,13 +540,14 @@ impl Body {
             mass,
             material,
             groups,
+            swept,
             colliders: _,
             weight,
             applied_force: _,
             applied_torque: _,
         } = self;
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
-            && (material, groups, weight) == (&other.material, &other.groups, &other.weight)
+            && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
             && self.has_same_colliders(other)
     }
 

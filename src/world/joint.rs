@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 
 use super::bodies::BodyHandle;
-use super::joint_axis::{Axis, Bounds};
+use super::joint_axis::{Axis, Bounds, Drive};
 use crate::error::Result;
 use crate::math::rotation;
 use crate::saved::{Archive, Saved};
@@ -12,7 +12,7 @@ use crate::saved::{Archive, Saved};
 ///
 /// A joint is a ball joint at first, and a method makes another kind of it: [`hinge`](Self::hinge), [`slider`](Self::slider),
 /// [`fixed`](Self::fixed), [`rope`](Self::rope), [`rod`](Self::rod), [`elastic`](Self::elastic) or [`generic`](Self::generic). Limits, motors and
-/// springs then belong to the axes.
+/// springs then belong to the axes, and may be given before the kind. A second kind replaces the first with all that belongs to its axes.
 ///
 /// Positions and speeds of a joint are those of body a in the frame of body b: a motor with a positive speed moves a forward along the axis.
 /// With the bodies swapped, limits and targets change their signs. The axes of a joint turn with body b.
@@ -188,13 +188,27 @@ impl Joint {
 
     /// Guides the distance of the anchors, and no angle.
     pub fn at_distance(self, distance: Axis) -> Self {
-        Self { linear: Linear::Distance(distance), angular: [Axis::FREE; 3], ..self }
+        self.of_kind(Linear::Distance(distance), [Axis::FREE; 3])
     }
 
     /// Any axes: three to shift along, three to turn about. With all six of them free the joint holds nothing, and only keeps its two bodies
     /// from colliding.
     pub fn generic(self, linear: [Axis; 3], angular: [Axis; 3]) -> Self {
-        Self { linear: Linear::Axes(linear), angular, ..self }
+        self.of_kind(Linear::Axes(linear), angular)
+    }
+
+    /// Makes another kind of it. What the ball joint was given before goes on to the first axis, so that calls may come in any order.
+    fn of_kind(self, linear: Linear, angular: [Axis; 3]) -> Self {
+        let [given, rest @ ..] = self.angular;
+        let is_ball = self.holds_anchors() && rest == [Axis::FREE; 2];
+        let mut joint = Self { linear, angular, ..self };
+        if is_ball && matches!(given.bounds, Bounds::Between { .. }) {
+            joint.on_first(|axis| Axis { bounds: given.bounds, ..axis });
+        }
+        if is_ball && given.drive != Drive::None {
+            joint.on_first(|axis| Axis { drive: given.drive, ..axis });
+        }
+        joint
     }
 
     /// Sets the direction of the first axis, the same in the frames of both bodies. [`World::check`](crate::World::check) refuses a direction
@@ -289,6 +303,11 @@ impl Joint {
     pub fn breaking_at(mut self, force: f32) -> Self {
         self.break_force = force;
         self
+    }
+
+    /// Whether a motor or a spring drives one of its axes.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.linear_axes().iter().chain(&self.angular).any(|axis| axis.drive != Drive::None)
     }
 
     /// Whether there is a force that breaks the joint.

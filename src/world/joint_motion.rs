@@ -37,6 +37,9 @@ pub struct JointMotion {
     anchor_gap: f32,
 }
 
+/// The least of angle cot(angle): near pi the direction of the turn is lost.
+const MOST_TURNED: f32 = -30.0;
+
 /// Distances below this have no direction (m).
 pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
 
@@ -81,6 +84,18 @@ impl World {
         let both = 1.0 + axes_b[0].dot(first_a);
         if both > 1e-3 {
             direction[3] = (axes_b[0] + first_a) / both;
+        }
+        // The other two are those of the vector of a turn by `angle` about n across e_b: a spin w changes it by w.n along n, and by
+        // angle (w.t cot(angle) + w.e_b) along t = e_b x n.
+        let turn = axes_b[1] * position[4] + axes_b[2] * position[5];
+        let angle = turn.length();
+        if angle > 1e-3 {
+            let n = turn / angle;
+            let t = axes_b[0].cross(n);
+            let across = t * (angle / libm::tanf(angle)).max(MOST_TURNED) + axes_b[0] * angle;
+            for direction in &mut direction[4..] {
+                *direction = n * n.dot(*direction) + across * t.dot(*direction);
+            }
         }
         let velocity = a.linear_velocity + a.angular_velocity.cross(anchor_a - a.center_of_mass())
             - b.map_or(Vec3::ZERO, |b| b.linear_velocity + b.angular_velocity.cross(anchor_a - b.center_of_mass()));
@@ -189,6 +204,28 @@ mod tests {
         for (twist, swing) in [(0.4, Vec3::new(0.0, 0.3, -0.2)), (-3.0, Vec3::ZERO), (2.0, Vec3::new(0.0, -1.0, 0.5))] {
             let found = angles(Quat::from_scaled_axis(swing) * Quat::from_rotation_x(twist));
             assert!(Vec3::from(found).distance(Vec3::new(twist, swing.y, swing.z)) < 1e-5, "{found:?}");
+        }
+    }
+
+    /// Twice a small turn apart, angles differ by as much as their speeds say.
+    #[test]
+    fn speeds_are_the_changes_of_angles_at_any_angle() {
+        let mut world = World::new();
+        let body = world.add(crate::Body::dynamic().shape(crate::Shape::ball(0.5)));
+        let joint = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::FREE; 3], [Axis::LOCKED; 3]);
+        for swing in [Vec3::ZERO, Vec3::new(0.0, 0.4, -0.3), Vec3::new(0.0, -1.2, 0.8), Vec3::new(0.0, 0.7, 2.4)] {
+            let rotation = Quat::from_scaled_axis(swing) * Quat::from_rotation_x(0.6);
+            for spin in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let mut at = |turn: f32| {
+                    let a = &mut world.bodies[body];
+                    (a.rotation, a.angular_velocity) = (Quat::from_scaled_axis(spin * turn) * rotation, spin);
+                    let motion = world.joint_motion(&joint);
+                    (Vec3::from_slice(&motion.position[3..]), Vec3::from_slice(&motion.speed[3..]))
+                };
+                let ((before, _), (_, speed), (after, _)) = (at(-1e-2), at(0.0), at(1e-2));
+                let change = (after - before) / 2e-2;
+                assert!(change.distance(speed) < 2e-3 * (1.0 + speed.length()), "{swing} {spin}: {speed}, {change}");
+            }
         }
     }
 }

@@ -108,7 +108,7 @@ fn inertias_of_another_block(problem: &mut StepProblem) {
 
 #[test]
 fn what_is_not_there_is_refused_by_row_and_field() {
-    let (problem, plan) = step(&[]);
+    let (problem, plan) = step(&["joint_solver=sweeps"]);
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
@@ -199,7 +199,7 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     assert!(problem.systems.terms.len() > 1 && problem.turning.len() > 1);
     type Break = fn(&mut StepProblem);
-    let cases: [(&str, Break); 19] = [
+    let cases: [(&str, Break); 21] = [
         ("systems: 1 with 0 softnesses", |p| p.systems.softness.clear()),
         ("systems: ", |p| p.systems.begins[1] -= 1),
         ("systems: ", |p| p.systems.begins[0] = 1),
@@ -211,8 +211,10 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
         ("systems.blocks[", |p| p.systems.blocks[1].end_term = u32::MAX),
         ("systems.blocks[", |p| p.systems.terms[0] = [u32::MAX, 0]),
         ("systems.blocks[", |p| p.systems.terms[0] = [0, u32::MAX]),
-        ("blocks[0]: the joints of its systems", |p| p.systems.nodes[0].joint = p.systems.nodes[1].joint),
-        ("blocks[0]: the joints of its systems", |p| p.blocks[0].direct = p.blocks[0].joints[1]),
+        ("blocks[0]: the rows of its systems", |p| p.systems.nodes[0].joint = p.systems.nodes[1].joint),
+        ("blocks[0]: the rows of its systems", |p| p.blocks[0].direct = p.blocks[0].joints[1]),
+        ("blocks[0]: the rows of its systems", |p| p.systems.nodes[0].rows = 1),
+        ("blocks[0]: the rows of its systems", |p| p.joints[0].is_loose = 1.0),
         ("blocks[0]: colors", |p| p.blocks[0].direct = p.blocks[0].joints[1] + 1),
         ("order: system 999999, but there are", |p| put(p, 4, 0, 999_999)),
         ("order: turning 0 occurs twice", |p| put(p, 5, 1, 0)),
@@ -232,7 +234,7 @@ fn systems_of_joints_that_are_not_there_are_refused_by_row_and_field() {
         assert!(known && !line.contains('\n'), "{start}: {line}");
     }
     // A pass over systems goes over their color and no other.
-    for wanted in [Kernel::FactorJoints, Kernel::TurnInertias] {
+    for wanted in [Kernel::BeginSystems, Kernel::TurnInertias] {
         let at = plan.passes.iter().position(|pass| pass.kernel == wanted).expect("a pass");
         let mut passes = plan.passes.clone();
         passes[at].colors = 0..1;
@@ -255,7 +257,7 @@ fn a_joint_color_with_a_body_twice_is_refused() {
 
 #[test]
 fn passes_over_colors_that_are_not_there_are_refused() {
-    let (problem, plan) = step(&[]);
+    let (problem, plan) = step(&["joint_solver=sweeps"]);
     let of = |wanted: fn(Kernel) -> bool| plan.passes.iter().position(|p| wanted(p.kernel)).expect("a pass");
     let contacts = of(|k| matches!(k, Kernel::SolveContacts(_)));
     let joints = of(|k| matches!(k, Kernel::SolveJoints(_)));

@@ -13,18 +13,16 @@ mod common {
     pub use drystone::stages::conform::{passes as kernels, random};
 }
 
-/// Random worlds, and the laws that they are held against.
 #[cfg(feature = "serde")]
-#[path = "../laws"]
+#[path = "../laws/mod.rs"]
 #[allow(dead_code)]
-mod laws {
-    mod draw;
-    mod measures;
-    mod own;
-    mod properties;
-    mod run;
-    mod shrink;
-}
+mod laws;
+#[cfg(feature = "serde")]
+#[path = "../laws/own.rs"]
+mod laws_own;
+#[cfg(feature = "serde")]
+#[path = "../laws/properties.rs"]
+mod laws_properties;
 
 mod allocations;
 mod changes;
@@ -35,14 +33,18 @@ mod contacts;
 mod derivation;
 mod determinism;
 mod drops;
+mod edges;
 mod effort;
+mod energy;
 mod forged;
 mod graph;
+mod impacts;
 mod inertia;
 #[cfg(feature = "serde")]
 mod lanes;
 mod newton;
 mod oracle;
+mod passes;
 mod plan;
 #[cfg(feature = "gpu")]
 mod queries;

@@ -192,8 +192,8 @@ solve_contacts(disc friction, isotropic) over colors 0
     let expected = expected
         .replace("solve_joints(biased) over colors 1\n", &at_once("biased"))
         .replace("solve_joints() over colors 1\n", &at_once(""))
-        .replace("integrate_positions\n", "integrate_positions\nturn_inertias\nfactor_joints\n");
-    assert_eq!(solved_by(JointSolver::Direct), format!("factor_joints\n{expected}"));
+        .replace("integrate_positions\n", "integrate_positions\nturn_inertias\nbegin_systems\n");
+    assert_eq!(solved_by(JointSolver::Direct), format!("begin_systems\n{expected}"));
 }
 
 /// The first sweep of the contacts that is not biased, as the plan prints it.

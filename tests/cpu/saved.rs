@@ -285,7 +285,7 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     let mut other = bytes.clone();
     other[8] += 1;
     let line = refusal(&other);
-    assert!(line.contains("version 4") && line.contains("reads 3"), "{line}");
+    assert!(line.contains("version 5") && line.contains("reads 4"), "{line}");
     assert!(refusal(b"a file of another program").contains("these bytes are none"));
 }
 

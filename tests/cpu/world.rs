@@ -155,6 +155,35 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     }
 }
 
+/// A call that gives a joint something, by its name.
+type Given = (&'static str, fn(Joint) -> Joint);
+
+#[test]
+fn limits_motors_and_springs_may_be_given_before_the_kind_of_a_joint() {
+    let kinds: [Given; 7] = [
+        ("hinge", |joint| joint.hinge(Vec3::Y)),
+        ("slider", |joint| joint.slider(Vec3::Y)),
+        ("fixed", Joint::fixed),
+        ("rope", |joint| joint.rope(2.0)),
+        ("rod", |joint| joint.rod(2.0)),
+        ("elastic", |joint| joint.elastic(2.0, 1.0, 0.5)),
+        ("generic", |joint| joint.generic([Axis::LOCKED, Axis::FREE, Axis::FREE], [Axis::LOCKED; 3])),
+    ];
+    let given: [Given; 4] = [
+        ("limits", |joint| joint.limited(0.1, 1.5)),
+        ("a motor", |joint| joint.motor(0.3, 20.0)),
+        ("a spring", |joint| joint.spring(0.5, 2.0, 0.7)),
+        ("limits and a motor", |joint| joint.limited(0.1, 1.5).motor(0.3, 20.0)),
+    ];
+    let joint = Joint::to_world(0, Vec3::X, Vec3::Y);
+    for (kind, of_kind) in kinds {
+        for (what, give) in given {
+            assert_eq!(of_kind(give(joint)), give(of_kind(joint)), "{what} before {kind}");
+        }
+        assert_eq!(of_kind(joint.hinge(Vec3::X).motor(0.3, 20.0)).linear, of_kind(joint).linear, "a second kind");
+    }
+}
+
 /// A joint by the index or the handle of a removed body ties nothing else.
 #[test]
 fn a_joint_to_a_body_that_is_gone_is_refused_and_does_not_tie_a_stranger() {

@@ -11,7 +11,7 @@ const LIBRARY: &[&[&str]] = &[
     &["effort", "queries", "load", "scenes"],
     &["problem", "contacts"],
     &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
-    &["backend", "solver"],
+    &["backend", "energy", "solver"],
     &["simulation"],
     &["compare", "recording"],
     &["conform"],

@@ -47,6 +47,7 @@ const MEASURED: Rules = Rules {
     friction_first: false,
     accumulated: true,
     round: true,
+    as_one: true,
     driven: false,
     passes: 1,
     measured: true,
@@ -76,10 +77,10 @@ fn problems(seed: u64) -> [StepProblem; 2] {
 /// Any three rules of a kernel, and the values that they have there.
 fn triples(kernel: Kernel) -> HashSet<[(usize, u8); 3]> {
     let Some(rules) = kernel.rules() else { return HashSet::new() };
-    let Rules { biased, friction, patch, friction_first, accumulated, round, driven, .. } = rules;
+    let Rules { biased, friction, patch, friction_first, accumulated, round, as_one, driven, .. } = rules;
     let Rules { passes, measured, from_start, isotropic, bounces, axes, .. } = rules;
     let values = [
-        [biased, patch, friction_first, accumulated, round, driven].map(u8::from).to_vec(),
+        [biased, patch, friction_first, accumulated, round, as_one, driven].map(u8::from).to_vec(),
         [measured, from_start, isotropic, bounces, axes].map(u8::from).to_vec(),
         vec![friction as u8, passes],
     ];

@@ -4,15 +4,10 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-/// Random worlds, and the laws that they are held against.
 #[cfg(feature = "serde")]
-#[path = "../laws"]
+#[path = "../laws/mod.rs"]
 #[allow(dead_code)]
-mod laws {
-    pub mod draw;
-    mod measures;
-    pub mod run;
-}
+mod laws;
 
 mod breaking;
 mod closed_forms;

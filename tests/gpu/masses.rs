@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::common::Open;
+use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
 use drystone::{Backend, Body, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
@@ -82,7 +83,7 @@ fn a_light_ball_hangs_on_a_heavy_one(open: Open) {
         world.join(Joint::to_world(upper, 0.5 * Vec3::Y, 5.0 * k as f32 * Vec3::X));
         world.join(Joint::new(upper, -0.5 * Vec3::Y, lower, 0.5 * Vec3::Y));
     }
-    let config = SolverConfig::default();
+    let config = SolverConfig::default().with(|c| c.joint_solver = JointSolver::Sweeps);
     let substep = 1.0 / 60.0 / f64::from(config.substeps as f32);
     let mut simulation = simulate(world, config, open);
     for _ in 0..600 {

@@ -6,73 +6,61 @@ use std::str::FromStr;
 
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::random::SplitMix64;
-use drystone::{Axis, Body, BodyKind, Groups, Joint, Linear, Scene, Shape, World};
+use drystone::{Axis, Body, BodyKind, Error, Groups, Joint, Linear, Scene, Shape, World, named};
 
-/// The words of an enum: its values in order, their names, and the way back from a name.
-macro_rules! words {
-    ($(#[$doc:meta])* $Name:ident { $($(#[$of:meta])* $Value:ident = $word:literal,)* }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum $Name { $($(#[$of])* $Value,)* }
-
-        impl $Name {
-            pub const ALL: &[Self] = &[$(Self::$Value,)*];
-        }
-
-        impl fmt::Display for $Name {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.pad(match self { $(Self::$Value => $word,)* })
-            }
-        }
-
-        impl FromStr for $Name {
-            type Err = String;
-
-            fn from_str(word: &str) -> Result<Self, String> {
-                match word {
-                    $($word => Ok(Self::$Value),)*
-                    _ => Err(format!("{word}: none of {}", [$($word,)*].join(", "))),
-                }
-            }
-        }
-    };
+/// The things that the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Nothing.
+    Plain,
+    /// Motors on most axes that are not locked; a third of them at speed 0.
+    Motors,
+    /// Springs on most axes that are not locked; half of them without damper.
+    Springs,
+    /// A kinematic body that shifts or turns.
+    Kinematic,
+    /// Masses of 1 g to 1 t.
+    Ratios,
+    /// Anchors up to 100 sizes of the second body beside it.
+    Levers,
 }
 
-words!(
-    /// The things that the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
-    Family {
-        /// Nothing.
-        Plain = "plain",
-        /// Motors on most axes that are not locked; a third of them at speed 0.
-        Motors = "motors",
-        /// Springs on most axes that are not locked; half of them without damper.
-        Springs = "springs",
-        /// A kinematic body that shifts or turns.
-        Kinematic = "kinematic",
-        /// Masses of 1 g to 1 t.
-        Ratios = "ratios",
-        /// Anchors up to 100 sizes of the second body beside it.
-        Levers = "levers",
-    }
-);
+named!(Family {
+    Plain = "plain",
+    Motors = "motors",
+    Springs = "springs",
+    Kinematic = "kinematic",
+    Ratios = "ratios",
+    Levers = "levers",
+});
 
-words!(
-    /// The joints of a world.
-    Kind {
-        /// Bodies without joints.
-        None = "none",
-        Ball = "ball",
-        Hinge = "hinge",
-        Slider = "slider",
-        Fixed = "fixed",
-        /// Axes free, limited or locked.
-        Generic = "generic",
-        /// Ropes, rods, springs.
-        Distance = "distance",
-        /// Any of them, for each joint anew.
-        All = "all",
-    }
-);
+/// The joints of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Bodies without joints.
+    None,
+    Ball,
+    Hinge,
+    Slider,
+    Fixed,
+    /// Axes free, limited or locked.
+    Generic,
+    /// Ropes, rods, springs.
+    Distance,
+    /// Any of them, for each joint anew.
+    All,
+}
+
+named!(Kind {
+    None = "none",
+    Ball = "ball",
+    Hinge = "hinge",
+    Slider = "slider",
+    Fixed = "fixed",
+    Generic = "generic",
+    Distance = "distance",
+    All = "all",
+});
 
 /// A world: what it is drawn from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +92,8 @@ impl FromStr for Drawn {
             _ => return Err(form()),
         };
         let seed = seed.parse().map_err(|_| form())?;
-        Ok(Self { family: family.parse()?, kind: kind.parse()?, collides, seed })
+        let line = |error: Error| error.to_string();
+        Ok(Self { family: family.parse().map_err(line)?, kind: kind.parse().map_err(line)?, collides, seed })
     }
 }
 

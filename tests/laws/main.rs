@@ -16,19 +16,17 @@ use std::time::Instant;
 
 use drystone::preset::Preset;
 use drystone::scenes::SceneFile;
-use drystone::{Cpu, Scene, SolverConfig};
+use drystone::{Cpu, Error, Scene, SolverConfig};
 
-mod draw;
-mod measures;
-mod run;
+#[path = "mod.rs"]
+mod laws;
 #[path = "../common/settings.rs"]
 mod settings;
-mod shrink;
 mod table;
 
-use draw::{Drawn, Family, Kind};
-use run::{Case, Verdict};
-use shrink::{Cause, shrunk};
+use laws::draw::{Drawn, Family, Kind};
+use laws::run::{self, Case, Verdict};
+use laws::shrink::{Cause, shrunk};
 
 /// What the command line asks for.
 struct Options {
@@ -51,8 +49,9 @@ struct Options {
     trace: bool,
 }
 
-fn words<T: std::str::FromStr<Err = String> + Copy>(text: &str, all: &[T]) -> Result<Vec<T>, String> {
-    if text == "each" { Ok(all.to_vec()) } else { text.split(',').map(str::parse).collect() }
+fn words<T: std::str::FromStr<Err = Error> + Copy>(text: &str, all: &[T]) -> Result<Vec<T>, String> {
+    let parsed = |word: &str| word.parse().map_err(|error: Error| error.to_string());
+    if text == "each" { Ok(all.to_vec()) } else { text.split(',').map(parsed).collect() }
 }
 
 fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
@@ -87,8 +86,8 @@ impl Options {
             }
             let value = arguments.next().ok_or_else(|| format!("{name}: has no value"))?;
             match name.as_str() {
-                "--family" => options.families = words(&value, Family::ALL)?,
-                "--kind" => options.kinds = words(&value, Kind::ALL)?,
+                "--family" => options.families = words(&value, &Family::ALL)?,
+                "--kind" => options.kinds = words(&value, &Kind::ALL)?,
                 "--collides" => {
                     options.collides = match value.as_str() {
                         "0" => vec![false],
@@ -218,9 +217,9 @@ fn answer(options: &Options) -> Result<(), String> {
             write(&case.scene, path)?;
         }
         let verdict = run::run_on(&case, Box::new(Cpu::new()), options.trace);
-        for (step, [motion, weight, springs, work]) in verdict.trace.iter().enumerate() {
+        for (step, [motion, weight, springs, work, taken, refused]) in verdict.trace.iter().enumerate() {
             println!(
-                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e}",
+                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e} taken {taken:.3e} refused {refused}",
                 motion + weight + springs - work
             );
         }

@@ -11,8 +11,8 @@ use drystone::scenes::SceneFile;
 use drystone::{Backend, Cpu, Reference, SolverConfig};
 use rayon::prelude::*;
 
-use super::draw::{Drawn, Family, Kind};
-use super::run::{Case, Verdict, run_on};
+use crate::laws::draw::{Drawn, Family, Kind};
+use crate::laws::run::{Case, Verdict, run_on};
 
 /// Worlds of each group.
 const WORLDS: u64 = 12;
@@ -60,7 +60,7 @@ impl Group {
         all
     }
 
-    /// Refuses any of the worlds that breaks one of some laws: finite, energy, gap, momentum, spin.
+    /// Refuses any of the worlds that breaks one of some laws: finite, energy, lasting, gap, momentum, spin.
     #[track_caller]
     fn keeps(&self, laws: &[&str]) {
         let cases = self.cases();
@@ -110,10 +110,15 @@ fn joints_without_contacts_keep_the_momentum() {
     Group { rate: 30, ..group() }.keeps(&["momentum"]);
 }
 
+#[test]
+fn no_world_that_nothing_drives_ends_above_its_start() {
+    Group::new(&[Family::Plain], EVERY).keeps(&["finite", "lasting"]);
+}
+
 /// The reference and the lanes have the same bits, and so the same verdict.
 #[test]
 fn a_verdict_does_not_depend_on_lanes() {
-    let group = Group::new(Family::ALL, EVERY);
+    let group = Group::new(&Family::ALL, EVERY);
     for (drawn, case) in group.cases().into_iter().step_by(7) {
         let case = Case { seconds: 0.5, ..case };
         let [lanes, one] =
@@ -137,26 +142,26 @@ macro_rules! broken {
 
 broken! {
     energy_of_contacts: "1 of 48 worlds gain energy", Group::new(&[Family::Plain, Family::Ratios], &[Kind::None]), ["energy"];
-    energy_of_ball_joints: "16 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Ball]), ["finite", "energy"];
-    energy_of_hinges: "19 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Hinge]), ["finite", "energy"];
-    energy_of_sliders: "20 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Slider]), ["finite", "energy"];
-    energy_of_fixed_joints: "19 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Fixed]), ["finite", "energy"];
-    energy_of_generic_joints: "22 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Generic]), ["finite", "energy"];
+    energy_of_ball_joints: "14 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Ball]), ["finite", "energy"];
+    energy_of_hinges: "17 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Hinge]), ["finite", "energy"];
+    energy_of_sliders: "18 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Slider]), ["finite", "energy"];
+    energy_of_fixed_joints: "8 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Fixed]), ["finite", "energy"];
+    energy_of_generic_joints: "20 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Generic]), ["finite", "energy"];
     energy_of_distances: "14 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::Distance]), ["finite", "energy"];
-    energy_of_any_joints: "14 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::All]), ["finite", "energy"];
-    energy_of_motors: "85 of 168 worlds gain energy", Group::new(&[Family::Motors], JOINTED), ["finite", "energy"];
-    energy_of_springs: "137 of 168 worlds gain energy", Group::new(&[Family::Springs], JOINTED), ["finite", "energy"];
-    energy_with_kinematic_bodies: "135 of 192 worlds gain energy", Group::new(&[Family::Kinematic], EVERY), ["finite", "energy"];
-    energy_of_light_and_heavy_bodies: "125 of 168 worlds gain energy", Group::new(&[Family::Ratios], JOINTED), ["finite", "energy"];
-    energy_on_long_levers: "146 of 168 worlds gain energy", Group::new(&[Family::Levers], JOINTED), ["finite", "energy"];
-    energy_with_fast: "138 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Fast), ["finite", "energy"];
-    energy_with_accurate: "120 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Accurate), ["finite", "energy"];
-    energy_at_30_steps: "128 of 192 worlds gain energy", Group { rate: 30, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
-    energy_at_240_steps: "126 of 192 worlds gain energy", Group { rate: 240, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
-    gaps: "135 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Plain], JOINTED), ["gap"];
-    gaps_of_light_and_heavy_bodies: "139 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Ratios], JOINTED), ["gap"];
-    gaps_on_long_levers: "149 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Levers], JOINTED), ["gap"];
+    energy_of_any_joints: "15 of 24 worlds gain energy", Group::new(&[Family::Plain], &[Kind::All]), ["finite", "energy"];
+    energy_of_motors: "62 of 168 worlds gain energy", Group::new(&[Family::Motors], JOINTED), ["finite", "energy"];
+    energy_of_springs: "122 of 168 worlds gain energy", Group::new(&[Family::Springs], JOINTED), ["finite", "energy"];
+    energy_with_kinematic_bodies: "121 of 192 worlds gain energy", Group::new(&[Family::Kinematic], EVERY), ["finite", "energy"];
+    energy_of_light_and_heavy_bodies: "106 of 168 worlds gain energy", Group::new(&[Family::Ratios], JOINTED), ["finite", "energy"];
+    energy_on_long_levers: "109 of 168 worlds gain energy", Group::new(&[Family::Levers], JOINTED), ["finite", "energy"];
+    energy_with_fast: "111 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Fast), ["finite", "energy"];
+    energy_with_accurate: "106 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Accurate), ["finite", "energy"];
+    energy_at_30_steps: "103 of 192 worlds gain energy", Group { rate: 30, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
+    energy_at_240_steps: "119 of 192 worlds gain energy", Group { rate: 240, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
+    gaps: "122 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Plain], JOINTED), ["gap"];
+    gaps_of_light_and_heavy_bodies: "128 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Ratios], JOINTED), ["gap"];
+    gaps_on_long_levers: "118 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Levers], JOINTED), ["gap"];
     angular_momentum_of_contacts: "5 of 24 worlds change their angular momentum", Group::new(&[Family::Plain], &[Kind::None]), ["spin"];
-    angular_momentum: "311 of 1008 worlds change their angular momentum", Group::new(Family::ALL, JOINTED), ["spin"];
-    momentum: "1 of 1152 worlds change their momentum", Group::new(Family::ALL, EVERY), ["momentum"];
+    angular_momentum: "269 of 1008 worlds change their angular momentum", Group::new(&Family::ALL, JOINTED), ["spin"];
+    momentum: "1 of 1152 worlds change their momentum", Group::new(&Family::ALL, EVERY), ["momentum"];
 }

@@ -1,7 +1,7 @@
 //! What many runs came to: a table with a row for each family and kind, and a file with a line for each world.
 
-use super::draw::Drawn;
-use super::run::{MOST_DRIFT, MOST_GAP, Verdict};
+use crate::laws::draw::Drawn;
+use crate::laws::run::{MOST_DRIFT, MOST_GAP, Verdict};
 
 /// A world, its run, and the time that it took (s).
 pub type Row = (Drawn, (Verdict, f64));

@@ -407,7 +407,7 @@ fn the_schema_describes_every_key() {
     assert_eq!(
         keys(body),
         "angular_velocity density force friction gravity_scale groups kind leaves linear_velocity mass mass_properties name \
-         position restitution rotation shapes torque"
+         position restitution rotation shapes swept torque"
     );
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");

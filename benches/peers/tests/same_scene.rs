@@ -292,12 +292,15 @@ fn more_iterations_than_physx_takes_are_refused() {
 }
 
 #[test]
-#[cfg(not(feature = "physx"))]
-fn physx_is_refused_by_a_build_without_it() {
+fn an_engine_is_refused_by_a_build_without_it() {
     let scene = Scene::find("tower", &[]).expect("a scene");
-    let refused = Entrant::default_of(Engine::Physx).build(&scene, 1).err().expect("an error");
-    assert_eq!(refused.to_string(), "PhysX is not in this build; build with --features physx");
-    assert!(!Engine::built().contains(&Engine::Physx));
+    let named = [(Engine::Physx, "PhysX", "physx", cfg!(feature = "physx")), (Engine::Bullet, "Bullet", "bullet", cfg!(feature = "bullet"))];
+    for (engine, name, feature, is_built) in named {
+        let refused = Entrant::default_of(engine).build(&scene, 1).err().map(|error| error.to_string());
+        let line = format!("{name} is not in this build; build with --features {feature}");
+        assert_eq!(refused, (!is_built).then_some(line));
+        assert_eq!(Engine::built().contains(&engine), is_built);
+    }
 }
 
 #[test]
@@ -334,15 +337,6 @@ fn the_settings_of_bullet_reach_it() {
     );
     // The solvers differ.
     assert!(gradient != usual && pivots < 0.8 * usual, "{usual} mm, {gradient} mm by NNCG, {pivots} mm by Dantzig");
-}
-
-#[test]
-#[cfg(not(feature = "bullet"))]
-fn bullet_is_refused_by_a_build_without_it() {
-    let scene = Scene::find("tower", &[]).expect("a scene");
-    let refused = Entrant::default_of(Engine::Bullet).build(&scene, 1).err().expect("an error");
-    assert_eq!(refused.to_string(), "Bullet is not in this build; build with --features bullet");
-    assert!(!Engine::built().contains(&Engine::Bullet));
 }
 
 /// The board is a mesh that moves, and the ball as small as 3 cm: the world is given to Bullet larger.

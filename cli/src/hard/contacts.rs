@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::{Checks, DT, LEAST, Setup, cube, energy, floor, watch, weightless};
 use drystone::stats::largest;
-use drystone::{Body, MassProperties, Result, Shape, World, metrics};
+use drystone::{Body, MassProperties, Result, Scene, Shape, World, metrics};
 
 pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for share in [0.25, 0.5, 1.0_f32] {
@@ -43,6 +43,37 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
     trial("middle of a ball on a corner", vec![block(), ball(0.5, 0.5, 0.5)], g)?;
     trial("two balls in one place", vec![ball(0.0, 0.0, 0.0), ball(0.0, 0.0, 0.0)], Vec3::ZERO)?;
     trial("two cubes in one place", vec![cube(0.0, 0.0), cube(0.0, 0.0)], Vec3::ZERO)?;
+    Ok(())
+}
+
+/// Presses stand in a crate on the floor: nothing drives it, and no number of substeps helps.
+pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    for depth in [0.05, 0.1] {
+        let mut simulation = setup.sleeping(Scene::find_spec(&format!("press:depth={depth}"))?.world)?;
+        let fastest = largest(LEAST, watch(&mut simulation, 600, |world| metrics::fastest(world).0)?);
+        checks.at_most(format!("{depth} m deep: speed at any time [m/s]"), fastest, 0.5);
+        let crate_ = simulation.world.bodies.iter().position(|body| body.name == "crate").expect("a crate");
+        let substeps = simulation.substeps_of(crate_) / setup.config.substeps;
+        checks.at_most(format!("{depth} m deep: substeps, over those of the settings"), substeps.into(), 1.0);
+        let is_awake = !simulation.is_asleep(crate_);
+        checks.at_most(format!("{depth} m deep: awake after 10 s"), u8::from(is_awake).into(), 0.0);
+    }
+    Ok(())
+}
+
+/// Wheels that reach into the chassis: joints and contacts push against each other, and what the motors give is all that there is.
+pub(super) fn jammed_car(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    let free = Scene::find_spec("car")?.world;
+    let (mass, speed) = (free.dynamic().map(|body| f64::from(body.mass.mass)).sum::<f64>(), 5.0);
+    for inside in [0.05, 0.1, 0.2] {
+        let mut simulation = setup.simulation(Scene::find_spec(&format!("car:inside={inside}"))?.world)?;
+        let most = largest(LEAST, watch(&mut simulation, 600, World::kinetic_energy)?);
+        checks.at_most(
+            format!("{inside} m inside: kinetic energy at any time, over that at the speed of the motors"),
+            most / (0.5 * mass * speed * speed),
+            1.0,
+        );
+    }
     Ok(())
 }
 

@@ -86,6 +86,12 @@ impl Setup<'_> {
         Simulation::new(world, self.config.clone(), (self.open)()?)
     }
 
+    /// A simulation whose bodies fall asleep, as they do at the defaults.
+    fn sleeping(&self, world: World) -> Result<Simulation> {
+        let config = self.config.clone().with(|c| c.sleep_after = SolverConfig::default().sleep_after);
+        Simulation::new(world, config, (self.open)()?)
+    }
+
     fn run(&self, spec: &str, steps: u32) -> Result<Outcome> {
         self.outcome(Scene::find_spec(spec)?.world, steps)
     }
@@ -192,6 +198,15 @@ const CASES: &[Case] = &[
         "a load of 100 times the mass of a ball is removed from two balls: they stay in place",
         motions::release,
     ),
+    case("H21", "presses stand 5 and 10 cm deep in a crate: it lies still and sleeps", contacts::held),
+    case(
+        "H22",
+        "a car whose wheels reach 5, 10 and 20 cm into it: no energy but that of its motors",
+        contacts::jammed_car,
+    ),
+    case("H23", "twenty ragdolls fall on the floor: all sleep within 5 s", motions::ragdolls),
+    case("H24", "thin slabs, coins and balls fall from 5 and 50 m onto a mesh: none falls through", motions::terrain),
+    case("H25", "balls of 2 cm fly at 10 to 1000 m/s in a room of sheets of 1 mm: none leaves", motions::bullets),
 ];
 
 const fn case(name: &'static str, summary: &'static str, run: fn(&Setup, &mut Checks) -> Result<()>) -> Case {

@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
 use drystone::config::Friction;
 use drystone::stats::largest;
-use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World};
+use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World, metrics};
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const LINKS: usize = 100;
@@ -185,5 +185,42 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     simulation.world.bodies[top].position = Vec3::new(50.0, 0.5, 0.0);
     let highest = largest(LEAST, watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
     checks.at_most("rise of the ball under the load above its place [mm]", 1e3 * (highest - 1.5), 5.0);
+    Ok(())
+}
+
+/// Twenty ragdolls lie on the floor: nothing drives them.
+pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    let mut simulation = setup.sleeping(Scene::find("ragdolls", &[])?.world)?;
+    let speeds = watch(&mut simulation, 300, |world| metrics::fastest(world).0)?;
+    checks.at_most("speed in the fifth second [m/s]", largest(LEAST, speeds[240..].iter().copied()), 0.05);
+    let asleep = (0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count();
+    checks.at_most("parts awake after 5 s", (simulation.world.dynamic_count() - asleep) as f64, 0.0);
+    Ok(())
+}
+
+/// The bodies that a scene of the catalogue loses in some steps, and the energy at the end over that of the start.
+fn lost(setup: &Setup, spec: &str, steps: usize) -> Result<[f64; 2]> {
+    let scene = Scene::find_spec(spec)?;
+    let before = energy(&scene.world);
+    let mut simulation = setup.simulation(scene.world.clone())?;
+    (0..steps).try_for_each(|_| simulation.step(DT).map(drop))?;
+    Ok([scene.escaped(&simulation.world) as f64, energy(&simulation.world) / before])
+}
+
+/// What is thinner than its way in a step falls on triangles.
+pub(super) fn terrain(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    for (spec, name) in [("terrain", "from 5 m"), ("terrain:n=30,height=50", "from 50 m")] {
+        checks.at_most(format!("{name}: bodies lost"), lost(setup, spec, 400)?[0], 0.0);
+    }
+    Ok(())
+}
+
+/// What is fast meets thin walls, and keeps its energy.
+pub(super) fn bullets(setup: &Setup, checks: &mut Checks) -> Result<()> {
+    for speed in [10.0, 100.0, 1000.0] {
+        let [lost, energy] = lost(setup, &format!("bullets:speed={speed}"), 120)?;
+        checks.at_most(format!("{speed} m/s: balls lost"), lost, 0.0);
+        checks.at_most(format!("{speed} m/s: energy at the end, over that of the start"), energy, 1.001);
+    }
     Ok(())
 }

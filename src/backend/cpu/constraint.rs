@@ -5,8 +5,8 @@ use std::ops::Range;
 use crate::kernels::axis::{solve_axis, warm_start_axis};
 use crate::kernels::contact::{PointRows, restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
-use crate::kernels::joint_system::{apply_joint_change, measure_joint};
-use crate::kernels::{Axis, Contact, Joint, Pair, StepParams};
+use crate::kernels::joint_system::{measure_axis, measure_joint};
+use crate::kernels::{Axis, Contact, Joint, Pair, Rules, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
 use crate::problem::{Block, ContactRow, JointRow, MOST_AXES, StepProblem};
@@ -108,10 +108,11 @@ impl Constraint for JointRow {
     }
 }
 
-/// Applies a kernel to a contact of a lane.
+/// Applies a kernel to a contact of a lane; `as_one` is that of [`Kernel::presses_as_one`].
 #[inline(always)]
 pub(super) fn sweep_contact<L: Lane>(
     kernel: Kernel,
+    as_one: bool,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
@@ -119,8 +120,8 @@ pub(super) fn sweep_contact<L: Lane>(
 ) {
     match kernel {
         Kernel::WarmStart(rules) => warm_start(rules, pair, contact, rows),
-        Kernel::SolveContacts(rules) => solve_contact(rules, params, pair, contact, rows),
-        Kernel::ApplyRestitution(rules) => restitute_contact(rules, params, pair, contact, rows),
+        Kernel::SolveContacts(rules) => solve_contact(Rules { as_one, ..rules }, params, pair, contact, rows),
+        Kernel::ApplyRestitution(rules) if as_one => restitute_contact(rules, params, pair, contact, rows),
         _ => unreachable!("a kernel over other rows"),
     }
 }
@@ -148,7 +149,7 @@ impl<L: Lane> AxisRows<L> for (&[Axis<L>], &mut [Vec3<L>]) {
     }
 }
 
-/// Applies a kernel to a joint of a lane and its axes, and to their impulses; where it is solved at once with others, to its correction.
+/// Applies a kernel to a joint of a lane and its axes, and to their impulses; where it is solved at once with others, to their corrections.
 #[inline(always)]
 pub(super) fn sweep_joint<L: Lane>(
     kernel: Kernel,
@@ -159,7 +160,8 @@ pub(super) fn sweep_joint<L: Lane>(
     axes: &mut impl AxisRows<L>,
 ) {
     match kernel {
-        Kernel::WarmStartJoints { axes: has_axes } => {
+        // Corrections are applied as impulses are that a joint carries.
+        Kernel::WarmStartJoints { axes: has_axes } | Kernel::ApplyJointChanges(Rules { axes: has_axes, .. }) => {
             if has_axes {
                 for k in 0..axes.count() {
                     warm_start_axis(pair, joint, &axes.axis(k), axes.impulse(k));
@@ -171,14 +173,25 @@ pub(super) fn sweep_joint<L: Lane>(
             if rules.axes {
                 for k in 0..axes.count() {
                     let mut impulse = axes.impulse(k);
-                    solve_axis(rules, params, pair, joint, &axes.axis(k), &mut impulse);
+                    solve_axis(rules, false, params, pair, joint, &axes.axis(k), &mut impulse);
                     axes.set_impulse(k, impulse);
                 }
             }
             solve_joint(rules, params, pair, joint, impulse);
         }
-        Kernel::MeasureJoints(rules) => *impulse = measure_joint(rules, params, pair, joint),
-        Kernel::ApplyJointChanges(_) => apply_joint_change(pair, joint, *impulse),
+        Kernel::SolveAxes(rules) => {
+            for k in 0..axes.count() {
+                let mut impulse = axes.impulse(k);
+                solve_axis(rules, true, params, pair, joint, &axes.axis(k), &mut impulse);
+                axes.set_impulse(k, impulse);
+            }
+        }
+        Kernel::MeasureJoints(rules) => {
+            for k in 0..axes.count() {
+                axes.set_impulse(k, measure_axis(rules, params, pair, joint, &axes.axis(k)));
+            }
+            *impulse = measure_joint(rules, params, pair, joint);
+        }
         _ => unreachable!("a kernel over other rows"),
     }
 }

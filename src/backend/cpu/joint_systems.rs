@@ -9,18 +9,18 @@ use super::lane_layout::{ImpulsePlace, LaneLayout};
 use super::lane_rows::SharedImpulses;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use crate::kernels::joint_system::{
-    Block, JointChanges, JointFactors, JointNode, SystemFactors, factor_system, places, solve_system,
+    Block, JointChanges, JointFactors, JointNode, SystemFactors, begin_system, places, solve_system,
 };
-use crate::kernels::{Joint, Mass, Pair, Sym3};
+use crate::kernels::{Axis, Joint, Mass, Pair, Sym3};
 use crate::lanes::{Lanes, Shared, Work};
 use crate::math::{Vec3, vec3};
-use crate::problem::{JointRow, JointSystems, StepProblem};
+use crate::problem::{ImpulseNumber, JointRow, JointSystems, StepProblem};
 
 /// The systems of a step, and the places of their joints.
 #[derive(Default)]
 pub(super) struct SystemLayout {
     rows: PartitionedRows,
-    /// Joint by joint.
+    /// In the order of impulses: joints, then axes.
     impulses: Vec<ImpulsePlace>,
 }
 
@@ -34,7 +34,7 @@ impl SystemLayout {
         };
         self.rows.update(problem, partition, |block| block.systems..block.systems + 1, part_of);
         if problem.has_systems() {
-            joints.impulse_places(problem.joints.len(), &mut self.impulses);
+            joints.impulse_places(problem, &mut self.impulses);
         }
     }
 
@@ -75,8 +75,8 @@ impl<'a> SharedFactors<'a> {
 
 /// A pass over systems.
 pub(super) struct SystemWork<'a> {
-    /// Whether it factors, and does not solve.
-    pub factors_only: bool,
+    /// Whether systems begin, and are not solved.
+    pub begins: bool,
     pub problem: &'a StepProblem,
     pub layout: &'a SystemLayout,
     /// The slots of the bodies of the problem.
@@ -94,10 +94,10 @@ impl Work for SystemWork<'_> {
         for system in self.layout.rows.rows[range].iter().map(|&system| system as usize) {
             // SAFETY: tasks have different systems: `Threads::spread_each` cuts their range.
             let factors = unsafe { self.factors.of(systems, system) };
-            if self.factors_only {
-                factor_system(systems, system, |joint| self.load(joint), factors);
+            if self.begins {
+                begin_system(systems, system, |joint| self.load(joint), |joint, k| self.axis(joint, k), factors);
             } else {
-                solve_system(systems, system, &mut Changes(self), factors);
+                solve_system(self.problem, system, &mut Changes(self), factors);
             }
         }
     }
@@ -118,6 +118,11 @@ impl SystemWork<'_> {
         // A factorization reads no velocity.
         (Joint::load(row), Pair { a, b, mass_a, mass_b, ..Pair::default() })
     }
+
+    #[inline(always)]
+    fn axis(&self, joint: usize, k: usize) -> Axis<f32> {
+        Axis::load(&self.problem.axes[self.problem.joints[joint].first_axis as usize + k])
+    }
 }
 
 /// Corrections and impulses of joints among the lanes.
@@ -126,34 +131,27 @@ struct Changes<'a, 'b>(&'a SystemWork<'b>);
 impl Changes<'_, '_> {
     /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
     #[inline(always)]
-    fn numbers<'c>(rows: &SharedImpulses<'c>, place: ImpulsePlace, k: usize) -> &'c mut f32 {
+    fn number<'c>(&mut self, rows: &SharedImpulses<'c>, at: ImpulseNumber) -> &'c mut f32 {
+        let ImpulsePlace { row, lane } = self.0.layout.impulses[at.row];
         // SAFETY: this reaches one lane of the row, and no other task the same lane.
-        unsafe { rows.number(place.row as usize, k, place.lane as usize) }
+        unsafe { rows.number(row as usize, at.component, lane as usize) }
     }
 }
 
 impl JointChanges<f32> for Changes<'_, '_> {
     #[inline(always)]
-    fn impulse(&self, joint: usize) -> Vec3<f32> {
-        let place = self.0.layout.impulses[joint];
-        let [x, y, z] = [0, 1, 2].map(|k| *Self::numbers(&self.0.impulses, place, k));
-        vec3(x, y, z)
+    fn impulse(&mut self, at: ImpulseNumber) -> f32 {
+        *self.number(&self.0.impulses, at)
     }
 
     #[inline(always)]
-    fn lacking(&self, joint: usize) -> Vec3<f32> {
-        let place = self.0.layout.impulses[joint];
-        let [x, y, z] = [0, 1, 2].map(|k| *Self::numbers(&self.0.changes, place, k));
-        vec3(x, y, z)
+    fn lacking(&mut self, at: ImpulseNumber) -> f32 {
+        *self.number(&self.0.changes, at)
     }
 
     #[inline(always)]
-    fn change(&mut self, joint: usize, change: Vec3<f32>) {
-        let place = self.0.layout.impulses[joint];
-        for (k, x) in [change.x, change.y, change.z].into_iter().enumerate() {
-            *Self::numbers(&self.0.changes, place, k) = x;
-            let impulse = Self::numbers(&self.0.impulses, place, k);
-            *impulse += x;
-        }
+    fn change(&mut self, at: ImpulseNumber, change: f32) {
+        *self.number(&self.0.changes, at) = change;
+        *self.number(&self.0.impulses, at) += change;
     }
 }

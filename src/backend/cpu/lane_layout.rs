@@ -218,11 +218,14 @@ impl<C: Constraint> LaneLayout<C> {
     }
 
     /// The place of the first impulse of each of `count` rows.
-    pub fn impulse_places(&self, count: usize, places: &mut Vec<ImpulsePlace>) {
-        places.resize(count, ImpulsePlace::default());
+    pub fn impulse_places(&self, problem: &StepProblem, places: &mut Vec<ImpulsePlace>) {
+        let rows = C::rows(problem);
+        places.resize(C::impulses(problem).len(), ImpulsePlace::default());
         for group in &self.groups {
             for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
-                places[row as usize] = ImpulsePlace { row: group.first, lane: lane as u32 };
+                for (k, at) in group.impulses().enumerate().take(rows[row as usize].points() as usize) {
+                    places[C::impulse(rows, row, k)] = ImpulsePlace { row: at as u32, lane: lane as u32 };
+                }
             }
         }
     }

@@ -9,12 +9,12 @@ use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
     start_of,
 };
-use crate::kernels::joint_system::{JointChanges, JointFactors, factor_system, solve_system, turned_inertia};
+use crate::kernels::joint_system::{JointChanges, JointFactors, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
 use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, JointRow, StepProblem};
+use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 ///
@@ -32,7 +32,7 @@ pub struct Reference<S> {
     convergence: ConvergenceRow,
     /// Factors of the joints that are solved at once.
     factors: JointFactors<S>,
-    /// Their corrections, joint by joint.
+    /// Their corrections, in the order of impulses.
     joint_changes: Vec<Vec3<S>>,
     /// State of accelerated sweeps: velocities of the sweep before, impulses of points and joints, and how far a sweep moved the
     /// impulses.
@@ -155,19 +155,20 @@ impl<S: Scalar> Reference<S> {
                     self.rows.masses[row.body as usize].inv_inertia = turned_inertia(Sym3 { x, yz }, q);
                 }
             }
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => self.over_systems(problem, pass),
             Kernel::WarmStartJoints { .. }
             | Kernel::SolveJoints(_)
+            | Kernel::SolveAxes(_)
             | Kernel::MeasureJoints(_)
             | Kernel::ApplyJointChanges(_) => {
-                let is_swept = matches!(pass.kernel, Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_));
-                self.joint_changes.resize(problem.joints.len(), Vec3::default());
+                let are_changes = matches!(pass.kernel, Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_));
+                self.joint_changes.resize(self.rows.joint_impulses.len(), Vec3::default());
                 for i in places(problem, pass) {
                     let bodies = problem.joints[i].bodies();
                     let (mut pair, rows) = (self.load_pair(bodies), &mut self.rows);
-                    let numbers = if is_swept { &mut rows.joint_impulses } else { &mut self.joint_changes };
+                    let numbers = if are_changes { &mut self.joint_changes } else { &mut rows.joint_impulses };
                     let JointRow { first_axis, axis_count, .. } = problem.joints[i];
-                    let (first, count) = (first_axis as usize, if is_swept { axis_count as usize } else { 0 });
+                    let (first, count) = (first_axis as usize, axis_count as usize);
                     let (joint, axes) = (&rows.joints[i], &rows.axes[first..first + count]);
                     let (own, of_axes) = numbers.split_at_mut(problem.joints.len());
                     let of_axes = of_axes.get_mut(first..first + count).unwrap_or_default();
@@ -182,7 +183,14 @@ impl<S: Scalar> Reference<S> {
                     let own = first..first + row.point_count as usize + usize::from(rules.patch);
                     let (mut pair, rows) = (self.load_pair(row.bodies()), &mut self.rows);
                     let mut own = (&rows.points[own.clone()], &mut rows.impulses[own]);
-                    sweep_contact(pass.kernel, &params, &mut pair, &rows.contacts[i], &mut own);
+                    sweep_contact(
+                        pass.kernel,
+                        pass.kernel.presses_as_one(),
+                        &params,
+                        &mut pair,
+                        &rows.contacts[i],
+                        &mut own,
+                    );
                     self.store_pair(row.bodies(), &pair);
                 }
             }
@@ -216,16 +224,17 @@ impl<S: Scalar> Reference<S> {
     fn over_systems(&mut self, problem: &StepProblem, pass: &Pass) {
         let (systems, mut factors) = (&problem.systems, std::mem::take(&mut self.factors));
         factors.reset(systems);
-        self.joint_changes.resize(problem.joints.len(), Vec3::default());
+        self.joint_changes.resize(self.rows.joint_impulses.len(), Vec3::default());
         for system in places(problem, pass) {
             let own = factors.of(systems, system);
-            if pass.kernel == Kernel::FactorJoints {
+            if pass.kernel == Kernel::BeginSystems {
                 let load = |joint: usize| (self.rows.joints[joint], self.load_pair(problem.joints[joint].bodies()));
-                factor_system(systems, system, load, own);
+                let axis = |joint: usize, k: usize| self.rows.axes[problem.joints[joint].first_axis as usize + k];
+                begin_system(systems, system, load, axis, own);
             } else {
                 let impulses = &mut self.rows.joint_impulses;
                 let mut changes = Changes { changes: &mut self.joint_changes, impulses };
-                solve_system(systems, system, &mut changes, own);
+                solve_system(problem, system, &mut changes, own);
             }
         }
         self.factors = factors;
@@ -266,18 +275,25 @@ struct Changes<'a, S> {
     impulses: &'a mut [Vec3<S>],
 }
 
+/// A component of one of some rows.
+fn component<S>(rows: &mut [Vec3<S>], at: ImpulseNumber) -> &mut S {
+    let Vec3 { x, y, z } = &mut rows[at.row];
+    [x, y, z].into_iter().nth(at.component).expect("one of three")
+}
+
 impl<S: Scalar> JointChanges<S> for Changes<'_, S> {
-    fn impulse(&self, joint: usize) -> Vec3<S> {
-        self.impulses[joint]
+    fn impulse(&mut self, at: ImpulseNumber) -> S {
+        *component(self.impulses, at)
     }
 
-    fn lacking(&self, joint: usize) -> Vec3<S> {
-        self.changes[joint]
+    fn lacking(&mut self, at: ImpulseNumber) -> S {
+        *component(self.changes, at)
     }
 
-    fn change(&mut self, joint: usize, change: Vec3<S>) {
-        self.changes[joint] = change;
-        self.impulses[joint] += change;
+    fn change(&mut self, at: ImpulseNumber, change: S) {
+        *component(self.changes, at) = change;
+        let impulse = component(self.impulses, at);
+        *impulse = *impulse + change;
     }
 }
 

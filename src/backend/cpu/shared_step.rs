@@ -81,13 +81,18 @@ impl SharedStep<'_> {
                 self.sum(pass, part, self.joints, &sums, spread);
             }
             Kernel::WarmStart(_) | Kernel::SolveContacts(_) | Kernel::ApplyRestitution(_) => {
-                self.sweep(pass, part, self.contacts, (self.contact_points, self.contact_impulses), spread);
+                let rows = (self.contact_points, self.contact_impulses);
+                if kernel.presses_as_one() {
+                    self.sweep::<_, true>(pass, part, self.contacts, rows, spread);
+                } else {
+                    self.sweep::<_, false>(pass, part, self.contacts, rows, spread);
+                }
             }
-            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) => {
-                self.sweep(pass, part, self.joints, (self.joint_axes, self.joint_impulses), spread);
+            Kernel::WarmStartJoints { .. } | Kernel::SolveJoints(_) | Kernel::SolveAxes(_) => {
+                self.sweep::<_, false>(pass, part, self.joints, (self.joint_axes, self.joint_impulses), spread);
             }
             Kernel::MeasureJoints(_) | Kernel::ApplyJointChanges(_) => {
-                self.sweep(pass, part, self.joints, (self.joint_axes, self.joint_changes), spread);
+                self.sweep::<_, false>(pass, part, self.joints, (self.joint_axes, self.joint_changes), spread);
             }
             Kernel::TurnInertias => {
                 let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
@@ -96,9 +101,9 @@ impl SharedStep<'_> {
                 let work = TurningWork { rows: &self.turning[first..end], bodies };
                 spread(0..(end - first).div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
             }
-            Kernel::FactorJoints | Kernel::SolveJointSystems(_) => {
+            Kernel::BeginSystems | Kernel::SolveJointSystems(_) => {
                 let work = SystemWork {
-                    factors_only: kernel == Kernel::FactorJoints,
+                    begins: kernel == Kernel::BeginSystems,
                     problem: self.problem,
                     layout: self.systems,
                     slots: &self.partition.slots,
@@ -124,7 +129,7 @@ impl SharedStep<'_> {
         }
     }
 
-    fn sweep<C: Constraint>(
+    fn sweep<C: Constraint, const AS_ONE: bool>(
         &self,
         pass: &Pass,
         part: usize,
@@ -135,7 +140,8 @@ impl SharedStep<'_> {
         let (kernel, params, bodies, free, moving) = (pass.kernel, self.params, self.bodies, self.free, self.moving);
         let substep = &self.blocks[pass.block as usize].substep;
         let (groups, constraint) = (&layout.groups[..], PhantomData::<C>);
-        let work = Sweep { kernel, params, substep, bodies, free, groups, points, impulses, constraint, moving };
+        let work =
+            Sweep::<C, AS_ONE> { kernel, params, substep, bodies, free, groups, points, impulses, constraint, moving };
         for color in pass.colors.clone() {
             spread(layout.ranges.of(part, color), &|range| self.instructions.run(&work, range));
         }

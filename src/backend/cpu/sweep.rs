@@ -16,8 +16,9 @@ use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
 
-/// A pass over the groups of one color.
-pub(super) struct Sweep<'a, C> {
+/// A pass over the groups of one color; `AS_ONE` for kernels that press the points of a manifold as one, whose code would take registers from
+/// the sweeps.
+pub(super) struct Sweep<'a, C, const AS_ONE: bool> {
     pub kernel: Kernel,
     pub params: &'a Params,
     pub substep: &'a Substep,
@@ -31,7 +32,7 @@ pub(super) struct Sweep<'a, C> {
     pub moving: &'a AtomicBool,
 }
 
-impl<C: Constraint> Work for Sweep<'_, C> {
+impl<C: Constraint, const AS_ONE: bool> Work for Sweep<'_, C, AS_ONE> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = StepParams::<L>::load(self.params, self.substep);
@@ -41,7 +42,7 @@ impl<C: Constraint> Work for Sweep<'_, C> {
     }
 }
 
-impl<C: Constraint> Sweep<'_, C> {
+impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
         let states = self.bodies.as_ptr();
@@ -64,7 +65,7 @@ impl<C: Constraint> Sweep<'_, C> {
         if C::HAS_POINTS {
             // SAFETY: `Contact` is `repr(C)` and holds lanes only.
             let contact: &Contact<L> = unsafe { as_lanes(&group.header) };
-            sweep_contact(self.kernel, params, &mut pair, contact, &mut rows);
+            sweep_contact(self.kernel, AS_ONE, params, &mut pair, contact, &mut rows);
         } else {
             let [joint @ .., _]: &[Wide; 11] = &group.header;
             // SAFETY: `Joint` is `repr(C)` and holds lanes only.

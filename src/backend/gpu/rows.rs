@@ -8,7 +8,7 @@ use crate::problem::{JointImpulseRow, JointSystems, StepProblem};
 pub const SCRATCH_ROW: usize = 32;
 
 /// Size of the struct `JointNode` of the shaders (B).
-pub const JOINT_NODE: usize = 144;
+pub const JOINT_NODE: usize = 272;
 /// That of `JointBlock` (B).
 pub const JOINT_BLOCK: usize = 96;
 
@@ -90,7 +90,7 @@ pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Bindi
         (Binding::JointBlocks, JOINT_BLOCK * problem.systems.blocks.len()),
         (
             Binding::JointChanges,
-            if problem.systems.is_empty() { 0 } else { size_of::<JointImpulseRow>() * problem.joints.len() },
+            if problem.systems.is_empty() { 0 } else { size_of::<JointImpulseRow>() * problem.joint_impulses.len() },
         ),
     ]
 }

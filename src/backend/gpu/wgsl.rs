@@ -24,6 +24,17 @@ macro_rules! part {
     };
 }
 
+/// The files of a kernel over joints that have axes, or of one over joints that have none.
+macro_rules! of_joints {
+    ($axes:expr, $name:literal) => {
+        if $axes {
+            &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!($name)] as &[&str]
+        } else {
+            &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!($name)]
+        }
+    };
+}
+
 /// What a pipeline runs.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Program {
@@ -122,38 +133,33 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (&[part!("lib/sum"), part!("update_momentum")], Over::Own, "update_momentum(thread)".into())
         }
         Kernel::WarmStartJoints { axes } => {
-            let parts: &[&str] = if axes {
-                &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!("warm_start_joints")]
-            } else {
-                &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!("warm_start_joints")]
-            };
-            (parts, Over::Colors, "warm_start_joint(row)".into())
+            (of_joints!(axes, "warm_start_joints"), Over::Colors, "warm_start_joint(row)".into())
         }
         Kernel::TurnInertias => (&[part!("turn_inertias")], Over::Colors, "turn_inertia(row)".into()),
-        Kernel::FactorJoints => {
-            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("lib/joint_system"), part!("factor_joints")];
-            (parts, Over::Colors, "factor_system(row)".into())
+        Kernel::BeginSystems => {
+            let parts = &[
+                part!("lib/pair"),
+                part!("lib/joint"),
+                part!("lib/axes"),
+                part!("lib/joint_system"),
+                part!("begin_systems"),
+            ];
+            (parts, Over::Colors, "begin_system(row)".into())
         }
         Kernel::MeasureJoints(rules) => {
-            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("measure_joints")];
-            (parts, Over::Colors, with("measure_joint", rules))
+            (of_joints!(true, "measure_joints"), Over::Colors, with("measure_joint", rules))
         }
         Kernel::SolveJointSystems(rules) => {
             let parts = &[part!("lib/joint_system"), part!("solve_joint_systems")];
             (parts, Over::Colors, with("solve_system", rules))
         }
         Kernel::ApplyJointChanges(rules) => {
-            let parts = &[part!("lib/pair"), part!("lib/joint"), part!("apply_joint_changes")];
-            (parts, Over::Colors, with("apply_joint_change", rules))
+            (of_joints!(true, "apply_joint_changes"), Over::Colors, with("apply_joint_change", rules))
         }
         Kernel::SolveJoints(rules) => {
-            let parts: &[&str] = if rules.axes {
-                &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!("solve_joints")]
-            } else {
-                &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!("solve_joints")]
-            };
-            (parts, Over::Colors, with("solve_joint", rules))
+            (of_joints!(rules.axes, "solve_joints"), Over::Colors, with("solve_joint", rules))
         }
+        Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), Over::Colors, with("solve_swept_axes", rules)),
         Kernel::WarmStart(rules) => {
             (&[part!("lib/pair"), part!("warm_start")], Over::Colors, with("warm_start_contact", rules))
         }
@@ -161,9 +167,11 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
             (parts, Over::Colors, with("solve_contact", rules))
         }
-        Kernel::ApplyRestitution(rules) => {
-            (&[part!("lib/pair"), part!("apply_restitution")], Over::Colors, with("restitute_contact", rules))
-        }
+        Kernel::ApplyRestitution(rules) => (
+            &[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")],
+            Over::Colors,
+            with("restitute_contact", rules),
+        ),
     }
 }
 
@@ -175,6 +183,7 @@ fn rules_text(rules: Rules) -> String {
         friction_first,
         accumulated,
         round,
+        as_one,
         passes,
         driven,
         measured,
@@ -191,7 +200,7 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {as_one}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
     )
 }
 

@@ -1,13 +1,13 @@
-//! Scenes of joints with axes: four-bar linkage, drawbridge, car, ragdoll.
+//! Scenes of joints with axes: four-bar linkage, drawbridge, car, ragdolls; and a press.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 use glam::{Quat, Vec3};
 
 use super::common::floor;
-use crate::math::rotation::{about, arc};
+use crate::math::rotation::{about, arc, product};
 use crate::scenes::scene::Scene;
-use crate::world::{Axis, Body, Joint, Linear, Shape, World};
+use crate::world::{Axis, Body, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
 
 /// A crank, a coupler and a rocker in the plane z = 0, hinged to each other and to two points of the world 0.5 m apart. A motor turns the
 /// crank at `speed` (rad/s).
@@ -70,7 +70,8 @@ pub(super) fn drawbridge(load: f32) -> Scene {
 }
 
 /// A chassis of 1200 kg on four sprung wheels. Motors turn the rear wheels so that it drives along x at `speed` (m/s), over bumps.
-pub(super) fn car(speed: f32) -> Scene {
+/// `inside`: how far the wheels reach into the chassis (m), where they do.
+pub(super) fn car(speed: f32, inside: f32) -> Scene {
     const RADIUS: f32 = 0.35;
     const CHASSIS: f32 = 1200.0;
     const WHEEL: f32 = 30.0;
@@ -83,7 +84,8 @@ pub(super) fn car(speed: f32) -> Scene {
         let lies = about(Vec3::X, FRAC_PI_2);
         world.add(bump.rotation(lies).position(8.0 + 3.0 * k as f32, -0.44, 0.0));
     }
-    let chassis = Body::dynamic().named("chassis").shape(Shape::cuboid(1.8, 0.3, 0.7)).total_mass(CHASSIS);
+    let half_width = if inside > 0.0 { 0.78 + inside } else { 0.7 };
+    let chassis = Body::dynamic().named("chassis").shape(Shape::cuboid(1.8, 0.3, half_width)).total_mass(CHASSIS);
     let chassis = world.add(chassis.position(0.0, 0.75, 0.0));
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
@@ -103,8 +105,20 @@ pub(super) fn car(speed: f32) -> Scene {
         let own = (stiffness / moved).sqrt();
         let spring = Axis::limited(-0.15, 0.15).spring(-sag, own / TAU, damping / (2.0 * moved * own), f32::MAX);
         let spin = if x < 0.0 { Axis::FREE.motor(-speed / RADIUS, 800.0) } else { Axis::FREE };
-        let joint = Joint::new(wheel, Vec3::ZERO, chassis, Vec3::new(x, RADIUS - 0.75, z)).along(Vec3::Z);
-        let joint = joint.zero_at(turned, Quat::IDENTITY);
+        let place = Vec3::new(x, RADIUS - 0.75, z);
+        let joint = |body: usize| Joint::new(body, Vec3::ZERO, chassis, place).along(Vec3::Z);
+        if inside > 0.0 {
+            // On an axle of its own, so that the wheel collides with the chassis.
+            let mass = 0.5 * WHEEL;
+            let axle =
+                MassProperties { mass, principal_inertia: Vec3::splat(0.02 * mass), ..MassProperties::IMMOVABLE };
+            let axle = world.add(Body::dynamic().named("axle").mass_properties(axle).position(x, RADIUS, z));
+            world.join(joint(axle).generic([Axis::LOCKED, spring, Axis::LOCKED], [Axis::LOCKED; 3]));
+            let hinge = Joint::new(wheel, Vec3::ZERO, axle, Vec3::ZERO).along(Vec3::Z).zero_at(turned, Quat::IDENTITY);
+            world.join(hinge.generic([Axis::LOCKED; 3], [spin, Axis::LOCKED, Axis::LOCKED]));
+            continue;
+        }
+        let joint = joint(wheel).zero_at(turned, Quat::IDENTITY);
         world.join(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, Axis::LOCKED, Axis::LOCKED]));
     }
     Scene::new("car", world, 600)
@@ -152,7 +166,8 @@ pub(super) fn ragdoll(n: usize) -> Scene {
     const STEPS: usize = 12;
     const TREAD: f32 = 0.3;
     const RISE: f32 = 0.18;
-    let half_width = 0.8 * n as f32;
+    // Room beside them: one that turns as it falls does not leave the stairs.
+    let half_width = 0.8 * n as f32 + 1.2;
     let mut world = floor(12.0, half_width);
     let height = RISE * STEPS as f32;
     let landing = Shape::cuboid(1.0, 0.5 * height, half_width);
@@ -164,22 +179,58 @@ pub(super) fn ragdoll(n: usize) -> Scene {
     }
     for i in 0..n {
         let feet = Vec3::new(-0.3, height + 0.01, 1.6 * (i as f32 - 0.5 * (n as f32 - 1.0)));
-        let first = world.bodies.len();
-        for (name, middle, half, radius, held) in PARTS {
-            let Vec3 { x, y, z } = feet + Vec3::from(middle);
-            // Pushed at the chest.
-            let forwards = Vec3::X * (1.5 * y.max(height) - 1.5 * height);
-            let body = Body::dynamic().named(name).shape(Shape::capsule(half, radius)).density(1000.0);
-            let body = world.add(body.position(x, y, z).velocity(forwards, Vec3::ZERO));
-            let Some((holder, place)) = held else { continue };
-            let place = feet + Vec3::from(place);
-            let on = |body: usize| place - world.bodies[body].position;
-            let joint = Joint::new(body, on(body), first + holder, on(first + holder)).along(Vec3::Z);
-            let locked = Linear::Axes([Axis::LOCKED; 3]);
-            world.join(Joint { linear: locked, angular: limb(name), ..joint });
-        }
+        // Pushed at the chest.
+        let forwards = |y: f32| Vec3::X * (1.5 * y.max(height) - 1.5 * height);
+        add_ragdoll(&mut world, |part| feet + part, Quat::IDENTITY, forwards, limb);
     }
     Scene::new("ragdoll", world, 600)
+}
+
+/// A ragdoll whose parts are turned, and where `place` has them; `velocity` by the height of a part. `axes` are those of what holds a part.
+fn add_ragdoll(
+    world: &mut World,
+    place: impl Fn(Vec3) -> Vec3,
+    turn: Quat,
+    velocity: impl Fn(f32) -> Vec3,
+    axes: impl Fn(&str) -> [Axis; 3],
+) {
+    let first = world.bodies.len();
+    for (name, middle, half, radius, held) in PARTS {
+        let Vec3 { x, y, z } = place(Vec3::from(middle));
+        let body = Body::dynamic().named(name).shape(Shape::capsule(half, radius)).density(1000.0).rotation(turn);
+        let body = world.add(body.position(x, y, z).velocity(velocity(y), Vec3::ZERO));
+        let Some((holder, at)) = held else { continue };
+        let at = place(Vec3::from(at));
+        let on = |body: usize| turn.inverse() * (at - world.bodies[body].position);
+        let joint = Joint::new(body, on(body), first + holder, on(first + holder)).along(Vec3::Z);
+        let locked = Linear::Axes([Axis::LOCKED; 3]);
+        world.join(Joint { linear: locked, angular: axes(name), ..joint });
+    }
+}
+
+/// `n` ragdolls, each turned another way, in rows of five over a floor. All their axes have friction: a leg on the floor would roll to and fro for ever.
+pub(super) fn ragdolls(n: usize) -> Scene {
+    let axes = |name: &str| {
+        let is_loose = |axis: &Axis| axis.bounds != Bounds::Locked && axis.drive == Drive::None;
+        limb(name).map(|axis| if is_loose(&axis) { axis.motor(0.0, 1.0) } else { axis })
+    };
+    let mut world = floor(12.0, 12.0 + 0.4 * n as f32);
+    for i in 0..n {
+        let turns = [(Vec3::X, 0.7 * (i as f32 + 1.0)), (Vec3::Y, 1.3 * i as f32), (Vec3::Z, 0.9 * i as f32)];
+        let turn = turns.into_iter().fold(Quat::IDENTITY, |turn, (axis, angle)| product(turn, about(axis, angle)));
+        let hips = Vec3::new(2.0 * (i % 5) as f32 - 4.0, 1.5, 2.0 * (i / 5) as f32 - 0.2 * n as f32);
+        add_ragdoll(&mut world, |part| hips + turn * (part - Vec3::Y), turn, |_| Vec3::ZERO, axes);
+    }
+    Scene::new("ragdolls", world, 600)
+}
+
+/// A crate of 1 m on the floor, and a press that stands `depth` deep in it (m).
+pub(super) fn press(depth: f32) -> Scene {
+    let mut world = floor(5.0, 5.0);
+    let block = |body: Body| body.shape(Shape::cuboid(0.5, 0.5, 0.5));
+    world.add(block(Body::dynamic()).named("crate").density(1000.0).position(0.0, 0.5, 0.0));
+    world.add(block(Body::kinematic()).named("press").position(0.0, 1.5 - depth, 0.0));
+    Scene::new("press", world, 600)
 }
 
 #[cfg(test)]
@@ -188,7 +239,7 @@ mod tests {
 
     #[test]
     fn machines_begin_with_closed_joints_within_their_limits() {
-        for scene in [four_bar(6.0), drawbridge(100.0), car(5.0), ragdoll(3)] {
+        for scene in [four_bar(6.0), drawbridge(100.0), car(5.0, 0.0), ragdoll(3), ragdolls(6)] {
             scene.world.check().expect("a world");
             assert!(scene.world.joint_gap() < 1e-5, "{}: {}", scene.name, scene.world.joint_gap());
             for joint in &scene.world.joints {

@@ -6,6 +6,7 @@ mod common;
 mod drop;
 mod drum;
 mod entry;
+mod fast;
 mod flow;
 mod jointed;
 mod machines;
@@ -260,9 +261,17 @@ pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "car",
         summary: "a car on sprung wheels drives over bumps: it reaches its speed and stays upright",
-        parameters: &[Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]")],
-        bodies: |_| 5.0,
-        build: |v| Ok(machines::car(v[0] as f32)),
+        parameters: &[
+            Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]"),
+            Parameter::real(
+                "inside",
+                0.0,
+                (0.0, 0.2),
+                "how far the wheels reach into the chassis, and collide with it [m]",
+            ),
+        ],
+        bodies: |v| if v[1] > 0.0 { 9.0 } else { 5.0 },
+        build: |v| Ok(machines::car(v[0] as f32, v[1] as f32)),
     },
     Entry {
         name: "ragdoll",
@@ -270,6 +279,20 @@ pub static CATALOGUE: &[Entry] = &[
         parameters: &[Parameter::whole("n", 1, (1.0, 1000.0), "number of ragdolls")],
         bodies: |v| 11.0 * v[0],
         build: |v| Ok(machines::ragdoll(v[0] as usize)),
+    },
+    Entry {
+        name: "ragdolls",
+        summary: "n ragdolls, each turned another way, fall on the floor: all come to rest and sleep",
+        parameters: &[Parameter::whole("n", 20, (1.0, 1000.0), "number of ragdolls")],
+        bodies: |v| 11.0 * v[0],
+        build: |v| Ok(machines::ragdolls(v[0] as usize)),
+    },
+    Entry {
+        name: "press",
+        summary: "a press stands inside of a crate on the floor: the crate is held and lies still",
+        parameters: &[Parameter::real("depth", 0.05, (0.0, 0.4), "how deep the press is in the crate [m]")],
+        bodies: |_| 1.0,
+        build: |v| Ok(machines::press(v[0] as f32)),
     },
     Entry {
         name: "arch",
@@ -371,5 +394,27 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |_| 0.0,
         build: |v| Ok(flow::galton(v[0] as u32, v[1] as usize, v[2] as u32, v[3] as u64)),
+    },
+    Entry {
+        name: "terrain",
+        summary: "thin slabs, coins and balls fall on hills of triangles: none goes through",
+        parameters: &[
+            Parameter::whole("n", 60, (1.0, 10_000.0), "number of bodies"),
+            Parameter::real("height", 5.0, (0.0, 100.0), "height of the fall of the lowest [m]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the places and tilts"),
+        ],
+        bodies: |v| v[0],
+        build: |v| fast::terrain(v[0] as usize, v[1] as f32, v[2] as u64),
+    },
+    Entry {
+        name: "bullets",
+        summary: "balls of 2 cm, marked as swept, fly to and fro in a room of sheets of 1 mm: none leaves",
+        parameters: &[
+            Parameter::whole("n", 64, (1.0, 10_000.0), "number of balls"),
+            Parameter::real("speed", 300.0, (1.0, 1000.0), "speed of each at the start [m/s]"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of the directions"),
+        ],
+        bodies: |v| v[0],
+        build: |v| Ok(fast::bullets(v[0] as usize, v[1] as f32, v[2] as u64)),
     },
 ];

@@ -76,6 +76,7 @@ fn body(file: &BodyFile) -> Result<Body> {
     (body.force, body.torque) = (load("force", file.force)?.into(), load("torque", file.torque)?.into());
     [body.gravity_scale] = finite("gravity_scale", [file.gravity_scale])?;
     body.groups = file.groups;
+    body.swept = file.swept;
     let [friction, restitution] =
         [("friction", file.friction), ("restitution", file.restitution)].map(|(name, x)| finite(name, [x]));
     let mut body = body

@@ -147,6 +147,8 @@ pub struct BodyFile {
     pub restitution: f64,
     /// Which bodies it meets: 32 groups, one bit each.
     pub groups: Groups,
+    /// Whether it is a bullet, which passes through nothing that moves.
+    pub swept: bool,
     /// When it leaves the scene; never if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves: Option<LeavesFile>,
@@ -172,6 +174,7 @@ impl Default for BodyFile {
             friction: 0.5,
             restitution: 0.0,
             groups: Groups::ALL,
+            swept: false,
             leaves: None,
             shapes: Vec::new(),
         }

@@ -86,6 +86,7 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         friction: number(b.material.friction),
         restitution: number(b.material.restitution),
         groups: b.groups,
+        swept: b.swept,
         leaves: leaves.map(|Leaves { below, after }| LeavesFile { below: below.map(number), after: after.map(number) }),
         shapes: b.colliders.iter().map(shape).collect::<Result<_>>()?,
     })

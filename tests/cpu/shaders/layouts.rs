@@ -43,14 +43,16 @@ struct ImpulseStep {
 /// These, too.
 #[repr(C)]
 struct JointNode {
-    r_a: [f32; 3],
-    mass_a: f32,
-    r_b: [f32; 3],
-    mass_b: f32,
+    along: [[f32; 4]; 3],
+    about_a: [[f32; 4]; 3],
+    about_b: [[f32; 4]; 3],
     turn_a: [[f32; 4]; 3],
     turn_b: [[f32; 4]; 3],
     right: [f32; 3],
     softness: f32,
+    mass_a: f32,
+    mass_b: f32,
+    pad: [f32; 2],
 }
 #[repr(C)]
 struct JointBlock {
@@ -78,7 +80,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
             direction is_linear gap left speed max_impulse rate mass_scale impulse_scale length
         }
         JointImpulse = JointImpulseRow { linear }
-        JointNode = JointNode { r_a mass_a r_b mass_b turn_a turn_b right softness }
+        JointNode = JointNode { along about_a about_b turn_a turn_b right softness mass_a mass_b }
         JointBlock = JointBlock { lower upper }
         Turning = TurningRow { inv_inertia_x body inv_inertia_yz }
         Convergence = ConvergenceRow { moving done sweeps planned }

@@ -89,6 +89,8 @@ impl PairRecord {
         let mut track = Track::of(&pair, colliders);
         (pair.takes_part, track.takes_part) = (self.flags.takes_part, f32::from(self.flags.takes_part));
         track.predicted = self.predicted;
+        // Such a manifold is written as it is, as those that do not follow for another reason are.
+        pair.is_mended = !self.flags.are_remade;
         (pair, track)
     }
 

@@ -8,6 +8,7 @@ use crate::collide::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
 use crate::collide::manifold::Manifold;
 use crate::collide::pair::{Pair, PairScratch, Side};
 use crate::collide::pairs::{Placed, Track};
+use crate::collide::path::ANEW;
 use crate::error::{Result, ensure, input};
 use crate::lanes::InstructionSet;
 
@@ -17,9 +18,10 @@ const PAIRS_A_TASK: usize = 512;
 impl WorldContacts {
     /// Whether the manifolds of a pair follow from the rest, where its colliders and all that follows from them are as they were.
     pub(super) fn is_remade(&self, i: usize) -> bool {
-        let then = self.pairs.computed_at(i);
+        let then = self.pairs.computed_at(i).filter(|_| self.pairs.with_track(i).1.predicted != ANEW);
         then.is_some_and(|then| then.iter().all(|place| place.is_centered == 1.0))
             && !self.pairs[i].manifolds.is_empty()
+            && !self.pairs[i].is_mended
     }
 
     /// Whether the manifolds of pairs come out with the same bits when they are made again.
@@ -64,10 +66,11 @@ impl WorldContacts {
         let mut scratch = PairScratch::default();
         let mut again = self.pairs[first as usize].clone();
         let begin = |pair: &Pair, again: &mut Pair| {
-            let Pair { body_a, body_b, manifolds: _, colliders, collider_a, collider_b, size, takes_part } = *pair;
+            let Pair { body_a, body_b, manifolds: _, colliders, collider_a, collider_b, size, takes_part, is_mended } =
+                *pair;
             let mut manifolds = std::mem::take(&mut again.manifolds);
             manifolds.clear();
-            *again = Pair { body_a, body_b, manifolds, colliders, collider_a, collider_b, size, takes_part };
+            *again = Pair { body_a, body_b, manifolds, colliders, collider_a, collider_b, size, takes_part, is_mended };
         };
         let mut states = Vec::with_capacity(2 * chunk.len());
         let mut cuboids = Vec::with_capacity(chunk.len());
@@ -91,7 +94,7 @@ impl WorldContacts {
                 });
             } else {
                 begin(pair, &mut again);
-                again.compute(self.sides_of(pair, &states[2 * number..]), track.predicted, &mut scratch);
+                again.compute(self.sides_of(pair, &states[2 * number..]), track.predicted, None, &mut scratch);
                 with(number, &mut again.manifolds);
             }
         }
@@ -100,7 +103,7 @@ impl WorldContacts {
             let number = number as usize;
             let (pair, track) = self.pairs.with_track(chunk[number] as usize);
             begin(pair, &mut again);
-            again.take_over(self.sides_of(pair, &states[2 * number..]), track.predicted, write, &mut scratch);
+            again.take_over(self.sides_of(pair, &states[2 * number..]), track.predicted, write, None, &mut scratch);
             with(number, &mut again.manifolds);
         });
     }

@@ -1,0 +1,91 @@
+//! Cones of normals.
+
+use glam::Vec3;
+use parry3d::query::details::NormalConstraints;
+use parry3d::shape::TrianglePseudoNormals;
+
+/// How far a direction in a cone may be outside of it by rounding.
+const ROUNDING: f32 = 1e-6;
+/// Cosine of the angle from which on a direction is across a normal.
+const ACROSS: f32 = 1e-3;
+
+/// The unit vector in the cone of some directions that is nearest to `d`; one of them where all are across it, and none without any. The
+/// directions have unit length and are in one half-space.
+pub(super) fn nearest(directions: &[Vec3], d: Vec3) -> Option<Vec3> {
+    let mut best = *directions.iter().max_by(|f, g| f.dot(d).total_cmp(&g.dot(d)))?;
+    for (i, &f) in directions.iter().enumerate() {
+        for (j, &g) in directions[..i].iter().enumerate() {
+            let (both, with_f, with_g) = (f.dot(g), d.dot(f), d.dot(g));
+            let (of_f, of_g) = (with_f - both * with_g, with_g - both * with_f);
+            if of_f > 0.0 && of_g > 0.0 {
+                let between = (of_f * f + of_g * g).normalize();
+                best = if between.dot(d) > best.dot(d) { between } else { best };
+            }
+            let is_inside = |h: &Vec3| {
+                let volume = f.dot(g.cross(*h));
+                let shares = [d.dot(g.cross(*h)), d.dot(h.cross(f)), d.dot(f.cross(g))];
+                volume.abs() > ROUNDING && shares.into_iter().all(|share| share * volume.signum() >= -ROUNDING)
+            };
+            if directions[..j].iter().any(is_inside) {
+                return Some(d);
+            }
+        }
+    }
+    Some(best)
+}
+
+/// The normals that a triangle of a mesh may touch with: its own, those of the triangles beside it, and those between. parry lets a direction
+/// pass that is as far from the triangle's normal as one of the neighbors' is, whatever side it leans to.
+pub(super) struct FacetCone {
+    face: Vec3,
+    directions: [Vec3; 4],
+}
+
+impl FacetCone {
+    pub fn new(TrianglePseudoNormals { face, edges, .. }: &TrianglePseudoNormals) -> Self {
+        let [a, b, c] = edges.map(|edge| 2.0 * face.dot(edge) * edge - face);
+        Self { face: *face, directions: [*face, a, b, c] }
+    }
+}
+
+impl NormalConstraints for FacetCone {
+    fn project_local_normal_mut(&self, d: &mut Vec3) -> bool {
+        let is_in_front = d.dot(self.face) >= 0.0;
+        // Rounding alone would choose among normals that are all across the direction.
+        *d = nearest(&self.directions, *d).filter(|normal| normal.dot(*d) > ACROSS).unwrap_or(self.face);
+        is_in_front
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_direction_of_a_cone_is_inside_on_a_side_or_on_an_edge() {
+        let axes = Vec3::AXES;
+        let inside = Vec3::new(0.2, 0.5, 0.3).normalize();
+        assert_eq!(nearest(&axes, inside), Some(inside));
+        let beside = nearest(&axes, Vec3::new(0.6, 0.8, -3.0)).expect("a direction");
+        assert!(beside.distance(Vec3::new(0.6, 0.8, 0.0)) < 1e-6, "{beside}");
+        assert_eq!(nearest(&axes, Vec3::new(1.0, -0.1, -0.2)), Some(Vec3::X));
+        assert_eq!(nearest(&[Vec3::Y], Vec3::NEG_X), Some(Vec3::Y));
+        assert_eq!(nearest(&[], Vec3::X), None);
+    }
+
+    /// The outer edge of a field has a normal aside, and the edges within it have none: what comes along the field is turned up.
+    #[test]
+    fn an_edge_aside_lets_no_direction_along_the_triangle_pass() {
+        let edges = [Vec3::Y, Vec3::new(0.0, 1.0, -1.0).normalize(), Vec3::Y];
+        let cone = FacetCone::new(&TrianglePseudoNormals { face: Vec3::Y, edges, two_sided: false });
+        for (d, expected) in [
+            (Vec3::NEG_X, Vec3::Y),
+            (Vec3::new(-0.6, 0.8, 0.0), Vec3::Y),
+            (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.0, 0.6, -0.8)),
+            (Vec3::new(0.0, 0.6, 0.8), Vec3::Y),
+        ] {
+            let mut turned = d;
+            assert!(cone.project_local_normal_mut(&mut turned) && turned.distance(expected) < 1e-5, "{d}: {turned}");
+        }
+    }
+}

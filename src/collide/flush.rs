@@ -1,0 +1,251 @@
+//! The contacts of shapes that lie flush with others.
+//!
+//! Each pair of shapes is seen alone. Of a row of boxes each has edges and sides that the boxes do not have together: a body that
+//! slides along the row, and overlaps it by a hair, is nearest to the next box at the edge or even at the side that the box before
+//! it hides. Here the normal of a contact is brought into the cone of normals that all shapes at the point of contact have
+//! together: the plane across such a normal leaves all of them on one side.
+
+use glam::Vec3;
+use parry3d::bounding_volume::Aabb;
+use parry3d::math::Pose;
+
+use super::collider::ColliderInfo;
+use super::cone::nearest;
+use super::pair::{Side, pose};
+use super::query::{TRUE, flip, flush_contact};
+use super::solid::{ClipBuffers, ContactQuery, EXACT, ParryManifold, Solid};
+use super::tree::Tree;
+use super::world_contacts::{DetectionInput, Plane, key};
+use crate::world::{BodyKind, seen_from};
+
+/// Sine of the angle up to which a direction is the same as another.
+const SAME: f32 = 1e-5;
+/// Deepest overlap along a normal in the cone, relative to the thinner shape's smallest half extent, beside five times the overlap along
+/// the normal outside of it: one that was turned into the cone may go far through the shape.
+const DEEPEST: f32 = 0.5;
+
+/// Sine of the angle by which the direction of a contact may be off: parry's search ends where the distance is right to 1e-3 of itself. A point
+/// is off by as much of the distance and of the radius of what is round.
+const ASLANT: f32 = 0.05;
+/// How far off a place may be by rounding, relative to its distance from the origin.
+const ROUNDING: f32 = 5e-7;
+
+/// The colliders of a world, as far as contacts with what lies flush depend on them.
+pub(super) struct Neighbors<'a> {
+    pub colliders: &'a [ColliderInfo],
+    pub tree: &'a Tree,
+    pub planes: &'a [Plane],
+    pub input: &'a DetectionInput<'a>,
+}
+
+/// Memory that one thread reuses from pair to pair.
+#[derive(Default)]
+pub(super) struct FlushScratch {
+    near: Vec<u32>,
+    faces: Vec<Face>,
+    directions: Vec<Vec3>,
+}
+
+/// A direction out of a face that is one of all shapes at a point.
+#[derive(Clone, Copy)]
+struct Face {
+    normal: Vec3,
+    /// Whether the shape of the contact has it.
+    is_own: bool,
+}
+
+impl Face {
+    /// Whether another direction is the same but for rounding and for what flush faces may differ by.
+    fn is_as(&self, normal: Vec3) -> bool {
+        self.normal.distance(normal) < EXACT
+    }
+}
+
+/// A shape, in the frame of the one whose contact it is.
+struct Flush<'a> {
+    collider: &'a ColliderInfo,
+    pose: Pose,
+}
+
+impl Flush<'_> {
+    fn holds(&self, p: Vec3, exact: f32) -> bool {
+        self.collider.shape.distance_to_local_point(self.pose.inverse_transform_point(p), true) <= exact
+    }
+
+    /// How far it reaches beyond the plane through `p` with the unit normal `n`, and how far from `p` (m).
+    fn beyond(&self, n: Vec3, p: Vec3, size: f32) -> (f32, f32) {
+        let own = self.pose.rotation.inverse() * n;
+        if let Some(plane) = self.collider.shape.as_halfspace() {
+            return (size * own.distance(plane.normal), size);
+        }
+        let Some(map) = self.collider.shape.as_support_map() else { return (0.0, 0.0) };
+        let away = self.pose * map.local_support_point(own) - p;
+        (n.dot(away), away.length())
+    }
+
+    fn each_face(&self, faces: &mut Vec<Face>) {
+        let mut add = |normal: Vec3| {
+            let normal = self.pose.rotation * normal;
+            if faces.iter().all(|face| !face.is_as(normal)) {
+                faces.push(Face { normal, is_own: false });
+            }
+        };
+        if let Some(plane) = self.collider.shape.as_halfspace() {
+            add(plane.normal);
+        } else if let Some(solid) = Solid::new(&*self.collider.shape, Pose::IDENTITY) {
+            solid.each_normal(add);
+        }
+    }
+}
+
+/// Whose contact it is, where that shape and the other are, and how near the two may be.
+#[derive(Clone, Copy)]
+struct Of {
+    own: u32,
+    other: u32,
+    pose: Pose,
+    other_pose: Pose,
+    search: ContactQuery,
+}
+
+impl Neighbors<'_> {
+    /// Brings the contact of two convex colliders into the cones of normals of what lies flush with either; returns whether that changed it.
+    pub fn mend(
+        &self,
+        [a, b]: [u32; 2],
+        sides: [Side; 2],
+        search: ContactQuery,
+        found: &mut ParryManifold,
+        buffers: &mut ClipBuffers,
+        scratch: &mut FlushScratch,
+    ) -> bool {
+        let [pose_a, pose_b] = sides.map(pose);
+        let mut is_mended = false;
+        if !found.points.is_empty() && self.may_lie_flush(a) {
+            let of = Of { own: a, other: b, pose: pose_a, other_pose: pose_b, search };
+            is_mended |= self.mend_first(of, found, buffers, scratch);
+        }
+        if !found.points.is_empty() && self.may_lie_flush(b) {
+            let of = Of { own: b, other: a, pose: pose_b, other_pose: pose_a, search };
+            flip(found);
+            is_mended |= self.mend_first(of, found, buffers, scratch);
+            flip(found);
+        }
+        is_mended
+    }
+
+    /// Whether the second of two bodies is fixed, and meets the first.
+    pub fn may_hold(&self, body: u32, other: u32) -> bool {
+        let DetectionInput { kinds, groups, jointed, .. } = self.input;
+        let meets = || groups[body as usize].meets(groups[other as usize]);
+        kinds[other as usize] == BodyKind::Fixed && meets() && !jointed.contains(&key(body, other))
+    }
+
+    /// Whether other colliders may stay where they are as seen from one: those of a body that nothing pushes.
+    fn may_lie_flush(&self, own: u32) -> bool {
+        let c = &self.colliders[own as usize];
+        !c.unbounded && self.input.kinds[c.body as usize] != BodyKind::Dynamic
+    }
+
+    /// The same with what lies flush with the first shape.
+    fn mend_first(
+        &self,
+        of: Of,
+        found: &mut ParryManifold,
+        buffers: &mut ClipBuffers,
+        FlushScratch { near, faces, directions }: &mut FlushScratch,
+    ) -> bool {
+        let ContactQuery { prediction, size } = of.search;
+        let [own, other] = [of.own, of.other].map(|c| &self.colliders[c as usize]);
+        // No finer than places are.
+        let exact = (EXACT * size).max(ROUNDING * of.pose.translation.abs().max_element());
+        let Some(solid) = Solid::new(&*own.shape, Pose::IDENTITY) else { return false };
+        let other_pose = seen_from(of.pose, of.other_pose);
+        let Some(touching) = Solid::or_point(&*other.shape, other_pose) else { return false };
+        let n = found.local_n1;
+        let flush = |&c: &u32| {
+            let collider = &self.colliders[c as usize];
+            let body = &self.input.moving[collider.body as usize];
+            Flush { collider, pose: seen_from(of.pose, pose((collider, body))) }
+        };
+        let mut best: Option<(f32, Face)> = None;
+        let nearest_dist = found.points.iter().map(|point| point.dist).fold(f32::INFINITY, f32::min);
+        let is_exact = other.cuboid.is_some() || other.shape.as_ball().is_some();
+        let bend = if is_exact { 0.0 } else { other.size };
+        for point in &found.points {
+            let p = point.local_p1;
+            let around = exact.max(TRUE * size).max(ASLANT * (bend + point.dist));
+            // parry's other points may lie anywhere on the shape.
+            if point.dist > nearest_dist + around {
+                continue;
+            }
+            self.find_near(of, of.pose * p, around, near);
+            near.retain(|c| flush(c).holds(p, around));
+            let is_behind = |c: &u32| {
+                let (beyond, distance) = flush(c).beyond(n, p, size);
+                beyond <= SAME * (distance + 0.1 * size)
+            };
+            if near.iter().all(is_behind) {
+                return false;
+            }
+            faces.clear();
+            solid.each_normal(|normal| faces.push(Face { normal, is_own: true }));
+            near.iter().for_each(|c| flush(c).each_face(faces));
+            // Points that parry finds on an edge lie beside it by more than flush faces differ.
+            faces.retain(|face| {
+                let d = face.normal;
+                let top = solid.furthest(d);
+                d.dot(top - p) <= around && near.iter().all(|c| flush(c).beyond(d, top, size).0 <= exact)
+            });
+            let mut consider = |face: Face| {
+                let d = face.normal;
+                let along = d.dot(touching.furthest(-d) - solid.furthest(d)) - touching.radius;
+                if best.is_none_or(|best| along > best.0) {
+                    best = Some((along, face));
+                }
+            };
+            faces.iter().for_each(|face| consider(*face));
+            directions.clear();
+            directions.extend(faces.iter().map(|face| face.normal));
+            if let Some(normal) = nearest(directions, n).filter(|d| faces.iter().all(|face| !face.is_as(*d))) {
+                consider(Face { normal, is_own: false });
+            }
+        }
+        let is_near = |best: &(f32, Face)| best.0 >= 5.0 * nearest_dist.min(0.0) - DEEPEST * size;
+        let Some((along, face)) = best.filter(is_near) else { return false };
+        if face.normal.distance(n) <= SAME {
+            return false;
+        }
+        found.points.clear();
+        if along <= prediction {
+            flush_contact(&solid, &touching, (face.normal, face.is_own), of.search, buffers, found);
+        }
+        true
+    }
+
+    /// Finds the colliders whose boxes hold a point of the world, that stay where they are as seen from `own`, and that meet the other.
+    fn find_near(&self, Of { own, other, .. }: Of, p: Vec3, around: f32, near: &mut Vec<u32>) {
+        let DetectionInput { kinds, groups, jointed, .. } = *self.input;
+        let [body, guest] = [own, other].map(|c| self.colliders[c as usize].body);
+        let stays = |c: u32| {
+            let collider = &self.colliders[c as usize];
+            let is_fixed = |body: u32| kinds[body as usize] == BodyKind::Fixed;
+            c != own
+                && !collider.is_gone()
+                && !collider.sensor
+                && collider.body != guest
+                && (collider.body == body || is_fixed(collider.body) && is_fixed(body))
+                && groups[collider.body as usize].meets(groups[guest as usize])
+                && !jointed.contains(&key(collider.body, guest))
+        };
+        near.clear();
+        self.tree.visit(&Aabb::from_half_extents(p, Vec3::splat(around)), |c| {
+            if stays(c) {
+                near.push(c);
+            }
+        });
+        near.extend(self.planes.iter().map(|plane| plane.collider).filter(|&c| stays(c)));
+        // Whatever order the tree has.
+        near.sort_unstable();
+    }
+}

@@ -1,0 +1,724 @@
+//! The law that constraints make no energy: contacts, joints, their springs, limits and preloads only pass energy on or take it. What a step
+//! adds to the kinetic energy of an island is at most the work of gravity, forces and drives, and what the springs of joints and contacts give
+//! back. Velocities that have more are brought back to that energy; momentum stays where nothing outside holds the island.
+//!
+//! A constraint whose impulse J changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so that work counts at mean velocities.
+//! An island that made energy and whose bodies went further than they could was torn apart within the step: that step is not taken, and the next
+//! one has shorter substeps. Derivation: docs/derivation.md, section 11.
+
+mod springs;
+
+use glam::{DMat3, DVec3, Quat, Vec3};
+use rayon::prelude::*;
+
+use crate::config::SolverConfig;
+use crate::effort::Effort;
+use crate::error::{Result, ensure};
+use crate::graph::Islands;
+use crate::math::rotation::{product, unit};
+use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
+use crate::saved::{Archive, Saved};
+use crate::world::{Body, World};
+
+/// The share of its kinetic energy that an island may regain of what it lost, and the share of the weight of a body over its size.
+const REGAINED: f64 = 1e-3;
+const ROUNDING: f64 = 1e-6;
+/// The most substeps of 1/60 s that add to velocities and not to changes of them.
+const MOST_ROUNDINGS: f64 = 16.0;
+
+/// The share of its energy that an island with joints may make in a step without shorter substeps from then on.
+const COARSE: f64 = 0.1;
+/// What shorter substeps have to leave of that share before an island takes them again. Joints and contacts that push against each other make the more,
+/// the shorter the substeps are.
+const HELPS: f32 = 0.5;
+
+/// The accounts of all islands.
+#[derive(Debug, Default)]
+pub struct Energy {
+    /// Body by body.
+    kept: Vec<Kept>,
+    entries: Vec<Entry>,
+    /// The islands that contacts and joints make, each with its account.
+    islands: Islands,
+    accounts: Vec<Account>,
+    /// The island of each body; [`UNTOUCHED`] of one that nothing touches.
+    numbers: Vec<u32>,
+    /// Whether the islands are those of the contacts of this step.
+    are_known: bool,
+    /// The bodies of islands that made energy, each after its island.
+    members: Vec<(u32, u32)>,
+    /// Whether a joint holds each body.
+    jointed: Vec<bool>,
+    /// Bodies that are new in this step, or whose joints are.
+    fresh: Vec<usize>,
+}
+
+impl Clone for Energy {
+    fn clone(&self) -> Self {
+        Self { kept: self.kept.clone(), ..Self::default() }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.kept.clone_from(&from.kept);
+        self.are_known = false;
+    }
+}
+
+/// The island of a body that no contact and no joint touches.
+const UNTOUCHED: u32 = u32::MAX;
+
+/// What a body keeps from step to step (J).
+#[derive(Clone, Copy, Debug, Default)]
+struct Kept {
+    /// What it may regain of what was lost.
+    reserve: f32,
+    /// What the springs of its joints and of their bodies hold.
+    springs: f32,
+    /// The share of its energy that its island made when it last took shorter substeps for that; 0 before.
+    made: f32,
+}
+
+crate::saved::fields!(Kept { reserve, springs, made });
+
+/// What a body, or an island, has in a step (J).
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// Kinetic energy when the step began, and at its end.
+    before: f64,
+    after: f64,
+    /// Work of gravity, forces and drives.
+    work: f64,
+    /// What may be regained of what was lost before, and the most of that from this step on.
+    reserve: f64,
+    slack: f64,
+    /// What was kept by the springs of joints, and of contacts of bodies on joints, and what they hold now, with the energy of lent inertia.
+    kept: f64,
+    springs: f64,
+    /// What is as slow as this counts as rest.
+    rest: f64,
+    /// What the rounding of velocities may add in this step.
+    rounding: f64,
+    /// The longest lever of a joint (m).
+    lever: f64,
+}
+
+/// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times their ways (kg m).
+#[derive(Clone, Copy, Debug, Default)]
+struct Common {
+    mass: f64,
+    momenta: [DVec3; 2],
+    force: DVec3,
+    moved: DVec3,
+}
+
+impl Common {
+    fn add(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.force += other.force;
+        self.moved += other.moved;
+        self.momenta = [0, 1].map(|i| self.momenta[i] + other.momenta[i]);
+    }
+}
+
+impl Entry {
+    /// What motion leaves; below zero where constraints made energy.
+    fn left(&self) -> f64 {
+        self.given() - self.after
+    }
+
+    /// What motion had, and got.
+    fn given(&self) -> f64 {
+        self.before + self.work + self.reserve + self.kept
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.before += other.before;
+        self.after += other.after;
+        self.work += other.work;
+        self.reserve += other.reserve;
+        self.kept += other.kept;
+        self.springs += other.springs;
+        self.slack += other.slack;
+        self.rest += other.rest;
+        self.rounding += other.rounding;
+        self.lever = self.lever.max(other.lever);
+    }
+
+    /// Leaves out the motion that all have in common: nothing within changes it.
+    fn leave_out(&mut self, Common { mass, momenta, force, moved }: Common) {
+        let [before, after] = momenta.map(|momentum| 0.5 * momentum.length_squared() / mass);
+        let whole = self.before.max(f64::MIN_POSITIVE);
+        (self.before, self.after) = (self.before - before, self.after - after);
+        self.work -= force.dot(moved) / mass;
+        // Rounding of the velocity of all acts on the motion beside it.
+        self.rounding *= (self.before.max(0.0) / whole).sqrt().min(1.0);
+        self.slack = REGAINED * self.after.max(0.0) + self.rest;
+        self.reserve = self.reserve.min(self.slack);
+    }
+}
+
+/// What an island has.
+#[derive(Clone, Copy, Debug, Default)]
+struct Account {
+    all: Entry,
+    mass: f64,
+    /// What its bodies have in common, where nothing holds them.
+    common: Common,
+    /// What the springs of its contacts gave back, and the energy of what they push out (J).
+    released: f64,
+    pushed: f64,
+    /// Whether anything but its bodies holds it.
+    is_held: bool,
+    is_refused: bool,
+    /// What its bodies keep of what their springs hold, and for their mass (J/kg).
+    shares: [f64; 2],
+}
+
+impl Account {
+    /// What constraints made: not above 0 where motion is as slow as rest, or no faster than what is pushed out.
+    fn made(&self) -> f64 {
+        let made = -(self.all.left() + self.released + self.all.rounding);
+        made.min(self.all.after - self.pushed.max(self.all.rest))
+    }
+
+    fn is_over(&self) -> bool {
+        let made = self.made();
+        made > 0.0 || made.is_nan()
+    }
+}
+
+/// What the law changed in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Taken {
+    /// Energy that constraints had made (J).
+    pub energy: f64,
+    /// Islands whose step was not taken.
+    pub refused: usize,
+}
+
+impl Saved for Energy {
+    fn blank() -> Self {
+        Self::default()
+    }
+
+    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+        self.are_known &= !A::READS;
+        let bodies = archive.count(self.kept.len())?;
+        self.kept.resize(bodies, Kept::default());
+        archive.runs(bodies, |i, archive| {
+            self.kept[i].walk(archive)?;
+            let Kept { reserve, springs, made } = self.kept[i];
+            ensure(reserve >= 0.0 && springs >= 0.0 && made >= 0.0, || {
+                format!("body {i} keeps {reserve} J and {springs} J, after {made}")
+            })
+        })
+    }
+}
+
+impl Energy {
+    /// Takes over that contacts came or went.
+    pub fn follow_contacts(&mut self) {
+        self.are_known = false;
+    }
+
+    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
+        self.kept.resize(world.bodies.len(), Kept::default());
+        for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
+            self.kept[i] = Kept::default();
+            self.fresh.push(i);
+        }
+    }
+
+    /// Takes over the joints of a body that began or changed.
+    pub fn follow_joints_of(&mut self, body: usize) {
+        self.fresh.push(body);
+    }
+
+    /// Holds the law over the step of `dt` seconds that `problem` has run; `world` is as the step found it.
+    pub fn hold(
+        &mut self,
+        world: &World,
+        problem: &mut StepProblem,
+        effort: &mut Effort,
+        config: &SolverConfig,
+        dt: f32,
+    ) -> Taken {
+        self.fresh.extend(self.kept.len()..world.bodies.len());
+        self.kept.resize(world.bodies.len(), Kept::default());
+        let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
+        let entry = |(i, body): (usize, &Body)| Entry {
+            reserve: self.kept[i].reserve.into(),
+            kept: self.kept[i].springs.into(),
+            ..entry(body, i, problem, dt.into(), substep(i))
+        };
+        world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
+        self.add_lent_inertia(world, problem);
+        springs::add_springs(&mut self.entries, problem, world, substep);
+        self.add_contacts_of_jointed(problem, effort);
+        self.fresh.sort_unstable();
+        springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
+        self.fresh.clear();
+        springs::add_work_of_drives(&mut self.entries, problem, world, substep);
+        let is_fine = |entry: &Entry| entry.left() + entry.rounding >= entry.springs;
+        if self.entries.iter().all(is_fine) {
+            let all = self.kept.iter_mut().zip(&self.entries);
+            all.for_each(|(kept, entry)| *kept = Kept { made: kept.made, ..Kept::of(entry, entry.left()) });
+            return Taken::default();
+        }
+        self.join(problem);
+        self.add_up(world, problem, effort);
+        let mut taken = Taken::default();
+        if self.accounts.iter().any(Account::is_over) {
+            self.add_released(problem, effort);
+            taken = self.settle(world, problem, effort, config, dt);
+        }
+        let share = |of: f32, sum: f64| if sum > 0.0 { f64::from(of) / sum } else { 0.0 };
+        for account in &mut self.accounts {
+            let Account { all, mass, released, .. } = account;
+            let Kept { springs, reserve, .. } = Kept::of(all, all.left() + *released);
+            account.shares = [share(springs, all.springs), share(reserve, *mass)];
+        }
+        for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
+            let [springs, reserve] =
+                self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
+            kept.springs = (springs * self.entries[i].springs) as f32;
+            kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
+        }
+        taken
+    }
+
+    /// Adds the energy of the inertia that joints lent to bodies in this step to that of their springs: it counts only as far as motion lost it, since
+    /// the inertia is gone in the next step.
+    fn add_lent_inertia(&mut self, world: &World, problem: &StepProblem) {
+        for row in &problem.turning {
+            let i = row.body as usize;
+            let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
+            let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
+            let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
+            // The inertia turns with the body.
+            let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
+            entry.springs += (0.5 * spin.dot(lent * spin)).max(0.0);
+        }
+    }
+
+    /// Finds the islands of bodies that contacts and joints hold together.
+    fn join(&mut self, problem: &StepProblem) {
+        let joints = problem.rows_of(&problem.joint_colors());
+        if self.are_known && joints.is_empty() {
+            return;
+        }
+        let Self { islands, accounts, numbers, entries, .. } = self;
+        islands.reset(entries.len());
+        // First whether what touches a body holds it.
+        const HELD: u32 = 0;
+        const FREE: u32 = 1;
+        numbers.clear();
+        numbers.resize(entries.len(), UNTOUCHED);
+        let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
+        for [a, b] in contacts.chain(joints.iter().map(|&j| ends(&problem.joints[j as usize]))) {
+            match [can_move(problem, a), can_move(problem, b)] {
+                [true, true] => {
+                    islands.join(a, b);
+                    [a, b].into_iter().for_each(|body| numbers[body as usize] = numbers[body as usize].min(FREE));
+                }
+                [true, false] => numbers[a as usize] = HELD,
+                [false, true] => numbers[b as usize] = HELD,
+                [false, false] => {}
+            }
+        }
+        accounts.clear();
+        // A root comes before the other bodies of its island.
+        for (body, &root) in islands.roots().iter().enumerate() {
+            let state = std::mem::replace(&mut numbers[body], UNTOUCHED);
+            if state == UNTOUCHED {
+                continue;
+            }
+            if root as usize == body {
+                numbers[body] = accounts.len() as u32;
+                accounts.push(Account::default());
+            } else {
+                numbers[body] = numbers[root as usize];
+            }
+            accounts[numbers[body] as usize].is_held |= state == HELD;
+        }
+        self.are_known = joints.is_empty();
+    }
+
+    /// Adds up what islands have.
+    fn add_up(&mut self, world: &World, problem: &StepProblem, effort: &Effort) {
+        let Self { accounts, numbers, entries, .. } = self;
+        for account in accounts.iter_mut() {
+            *account = Account { is_held: account.is_held, ..Account::default() };
+        }
+        let members = || numbers.iter().enumerate().filter(|(_, number)| **number != UNTOUCHED);
+        for (i, &number) in members() {
+            let account = &mut accounts[number as usize];
+            account.all.add(&entries[i]);
+            account.mass += f64::from(world.bodies[i].mass.mass);
+        }
+        if accounts.iter().all(|account| account.is_held) {
+            return;
+        }
+        for (i, &number) in members() {
+            let account = &mut accounts[number as usize];
+            if !account.is_held {
+                let substep = f64::from(problem.blocks[effort.block_of(i)].substep.length);
+                account.common.add(&common(&world.bodies[i], i, problem, substep));
+            }
+        }
+        let free = accounts.iter_mut().filter(|account| !account.is_held && account.mass > 0.0);
+        free.for_each(|account| account.all.leave_out(account.common));
+    }
+
+    /// Adds what the springs of contacts hold now that touch bodies on joints. Joints and contacts may push against each other without an end, so
+    /// that the springs of these contacts have a budget, too.
+    fn add_contacts_of_jointed(&mut self, problem: &StepProblem, effort: &Effort) {
+        self.jointed.clear();
+        self.jointed.resize(problem.bodies.len(), false);
+        let joints = problem.rows_of(&problem.joint_colors());
+        if joints.is_empty() {
+            return;
+        }
+        joints
+            .iter()
+            .flat_map(|&j| ends(&problem.joints[j as usize]))
+            .for_each(|body| self.jointed[body as usize] = true);
+        for contact in problem.swept_contacts().filter(|contact| is_jointed(&self.jointed, contact)) {
+            let body = moved_by(problem, contact);
+            let substep = &problem.blocks[effort.block_of(body)].substep;
+            self.entries[body].springs += springs::held_by_contact(problem, contact, substep)[1];
+        }
+    }
+
+    /// Adds what the springs of other contacts gave back, in the islands that made energy without it.
+    fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
+        for contact in problem.swept_contacts().filter(|contact| !is_jointed(&self.jointed, contact)) {
+            let body = moved_by(problem, contact);
+            let account = &mut self.accounts[self.numbers[body] as usize];
+            if account.all.left() < 0.0 {
+                let [before, after] =
+                    springs::held_by_contact(problem, contact, &problem.blocks[effort.block_of(body)].substep);
+                account.released += before - after;
+                account.pushed += before;
+            }
+        }
+        self.accounts.iter_mut().for_each(|account| account.released = account.released.max(0.0));
+    }
+
+    /// Takes out what constraints made.
+    fn settle(
+        &mut self,
+        world: &World,
+        problem: &mut StepProblem,
+        effort: &mut Effort,
+        config: &SolverConfig,
+        dt: f32,
+    ) -> Taken {
+        let mut taken = Taken::default();
+        self.members.clear();
+        let is_over = |island: u32| self.accounts.get(island as usize).is_some_and(Account::is_over);
+        let numbers = self.numbers.iter().copied();
+        self.members.extend(numbers.zip(0..).filter(|(island, _)| is_over(*island)));
+        self.members.sort_unstable();
+        for members in self.members.chunk_by(|a, b| a.0 == b.0) {
+            let account = &mut self.accounts[members[0].0 as usize];
+            let over = account.made();
+            let Account { all, released, is_held, is_refused, .. } = account;
+            let members = members.iter().map(|(_, body)| *body as usize);
+            taken.energy += if over.is_finite() { over } else { all.after };
+            let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
+            let is_whole = over.is_finite()
+                && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
+                && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
+            if is_whole {
+                let share = (over / all.after) as f32;
+                let before = members.clone().map(|i| self.kept[i].made).fold(0.0, f32::max);
+                let helped = before == 0.0 || share < HELPS * before;
+                if all.lever > 0.0 && over > COARSE * all.after && helped && effort.refine(members.clone()) {
+                    members.for_each(|i| self.kept[i].made = share);
+                }
+            } else {
+                taken.refused += 1;
+                *is_refused = true;
+                let is_finer = effort.refine(members.clone());
+                stand_still(world, problem, members, dt.into(), *is_held, is_finer);
+                all.springs = 0.0;
+            }
+            // Nothing is left.
+            *released = 0.0;
+            all.after = all.given();
+        }
+        if taken.refused > 0 {
+            self.forget_impulses(problem);
+        }
+        taken
+    }
+
+    /// Lets joints and contacts of the islands whose step was not taken begin without impulses.
+    fn forget_impulses(&mut self, problem: &mut StepProblem) {
+        let (numbers, accounts) = (&self.numbers, &self.accounts);
+        let is_refused = |[a, b]: [u32; 2], problem: &StepProblem| {
+            let body = if can_move(problem, a) { a } else { b };
+            let account = || accounts.get(numbers[body as usize] as usize);
+            can_move(problem, body) && account().is_some_and(|account| account.is_refused)
+        };
+        for i in 0..problem.joints.len() {
+            let joint = problem.joints[i];
+            if is_refused(ends(&joint), problem) {
+                let axes = problem.joints.len() + joint.first_axis as usize;
+                problem.joint_impulses[i] = JointImpulseRow::default();
+                problem.joint_impulses[axes..axes + joint.axis_count as usize].fill(JointImpulseRow::default());
+            }
+        }
+    }
+}
+
+impl Kept {
+    /// What is kept where so much is left.
+    fn of(entry: &Entry, left: f64) -> Self {
+        let springs = left.min(entry.springs).max(0.0);
+        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32, made: 0.0 }
+    }
+}
+
+/// Whether constraints can move a body.
+fn can_move(problem: &StepProblem, body: u32) -> bool {
+    problem.masses.get(body as usize).is_some_and(|mass| mass.inv_mass > 0.0)
+}
+
+/// The body of a contact that it can move; the first of two.
+fn moved_by(problem: &StepProblem, contact: &ContactRow) -> usize {
+    let [a, b] = [contact.body_a, contact.body_b];
+    if can_move(problem, a) { a as usize } else { b as usize }
+}
+
+/// Whether a joint holds one of the bodies of a contact.
+fn is_jointed(jointed: &[bool], contact: &ContactRow) -> bool {
+    jointed[contact.body_a as usize] || jointed[contact.body_b as usize]
+}
+
+fn ends(joint: &JointRow) -> [u32; 2] {
+    [joint.body_a, joint.body_b]
+}
+
+/// What a body has, with the work of gravity and forces.
+fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) -> Entry {
+    let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
+    if mass.inv_mass <= 0.0 {
+        return Entry::default();
+    }
+    let m = f64::from(body.mass.mass);
+    let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
+    let acceleration = Vec3::from(mass.acceleration);
+    let pushed = m * acceleration.as_dvec3().dot(way(row, v, v_0, substep));
+    let torque = body.whole_torque();
+    let w = Vec3::from(row.w);
+    let turned = if torque == Vec3::ZERO { 0.0 } else { f64::from(torque.dot(w + body.angular_velocity)) * (0.5 * dt) };
+    let spinning = |rotation: &dyn Fn() -> Quat, w: Vec3| {
+        let inertia = body.mass.principal_inertia;
+        if inertia.x == inertia.y && inertia.y == inertia.z {
+            return 0.5 * f64::from(inertia.x) * w.as_dvec3().length_squared();
+        }
+        let spin = (product(rotation(), body.mass.principal_frame).inverse() * w).as_dvec3();
+        0.5 * (inertia.as_dvec3() * spin * spin).element_sum()
+    };
+    let before = 0.5 * m * v_0.length_squared() + spinning(&|| body.rotation, body.angular_velocity);
+    let after = 0.5 * m * v.length_squared() + spinning(&|| product(turn_of(row), body.rotation), w);
+    // The radius of gyration is a size.
+    let size = f64::from(body.mass.principal_inertia.min_element() / body.mass.mass).sqrt();
+    let rest = ROUNDING * m * f64::from(acceleration.length()) * size;
+    let slack = REGAINED * after + rest;
+    // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less. Energy that constraints made does not count.
+    let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
+    Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
+}
+
+/// The way of a body from and to the times of its velocities, which belong to the middle of a substep (m): it went half a substep further at the
+/// last of them, and not at the first.
+fn way(row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
+    Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep)
+}
+
+/// What a body adds to the common motion of its island.
+fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common {
+    let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
+    let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
+    let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
+    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(row, v, v_0, substep) }
+}
+
+/// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
+/// longest lever (m) of their joints, or out of each other.
+fn is_in_reach(
+    world: &World,
+    problem: &StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    lever: f64,
+    config: &SolverConfig,
+    dt: f64,
+) -> bool {
+    let speed = |i: usize| {
+        let fallen = Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt;
+        world.bodies[i].linear_velocity.as_dvec3().length() + fallen.length()
+    };
+    let fastest = members.clone().map(speed).fold(0.0, f64::max);
+    let reach = (2.0 * fastest + f64::from(config.push_limit)) * dt + lever;
+    members.into_iter().all(|i| Vec3::from(problem.bodies[i].dp).as_dvec3().length() <= reach)
+}
+
+/// How far a body turned in the step, as its pose will have it.
+fn turn_of(row: &BodyRow) -> Quat {
+    unit(Quat::from_array(row.dq))
+}
+
+/// The motion that some bodies have as one rigid body.
+#[derive(Clone, Copy, Default)]
+struct RigidMotion {
+    center: DVec3,
+    drift: DVec3,
+    spin: DVec3,
+    /// The energy of the spin (J).
+    turning: f64,
+}
+
+/// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
+#[derive(Clone, Copy, Default)]
+struct Momenta {
+    mass: f64,
+    center: DVec3,
+    linear: DVec3,
+    angular: DVec3,
+    inertia: DMat3,
+}
+
+impl Momenta {
+    /// Of bodies, each with its center of mass, its velocities, and its turn in the step.
+    fn of(world: &World, bodies: impl Iterator<Item = (usize, DVec3, [DVec3; 2], Quat)> + Clone) -> Self {
+        let mut all = Self::default();
+        for (i, place, [v, _], _) in bodies.clone() {
+            let m = f64::from(world.bodies[i].mass.mass);
+            all.mass += m;
+            all.center += m * place;
+            all.linear += m * v;
+        }
+        all.center /= all.mass;
+        for (i, place, [v, w], turn) in bodies {
+            let body = &world.bodies[i];
+            let m = f64::from(body.mass.mass);
+            let r = place - all.center;
+            let own = body.mass.world_inertia(product(turn, body.rotation)).as_dmat3();
+            all.angular += m * r.cross(v) + own * w;
+            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+            all.inertia += own + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * m;
+        }
+        all
+    }
+
+    fn rigid(&self) -> RigidMotion {
+        let spin = self.inertia.inverse() * self.angular;
+        let spin = if spin.is_finite() { spin } else { DVec3::ZERO };
+        let drift = self.linear / self.mass;
+        RigidMotion { center: self.center, drift, spin, turning: 0.5 * spin.dot(self.inertia * spin) }
+    }
+}
+
+/// Some bodies as the step left them.
+fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize> + Clone) -> Momenta {
+    let body = |i: usize| {
+        let row = &problem.bodies[i];
+        let [v, w, way] = [row.v, row.w, row.dp].map(|u| Vec3::from(u).as_dvec3());
+        (i, world.bodies[i].center_of_mass().as_dvec3() + way, [v, w], turn_of(row))
+    };
+    Momenta::of(world, members.map(body))
+}
+
+/// Some bodies as the step found them, with what forces and torques gave them since.
+fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<Item = usize> + Clone) -> Momenta {
+    let body = |i: usize| {
+        let body = &world.bodies[i];
+        let [place, v, w] = [body.center_of_mass(), body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
+        (i, place, [v + Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt, w], Quat::IDENTITY)
+    };
+    let mut all = Momenta::of(world, members.clone().map(body));
+    all.angular += members.map(|i| world.bodies[i].whole_torque().as_dvec3() * dt).sum::<DVec3>();
+    all
+}
+
+/// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies (where nothing holds them, of that beside their common motion), and no momentum where nothing holds them: their
+/// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`. Places may be so wrong that
+/// the turn with this angular momentum has more energy than is left: it gives way, if the energy is more by the share [`COARSE`] at most;
+/// beyond that nothing changes, and the result is false.
+fn brake(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    [over, kinetic]: [f64; 2],
+    from_start: Option<&Momenta>,
+) -> bool {
+    let now = now(world, problem, members.clone());
+    let [from, mut to] = rigid_motions(&now, from_start);
+    let (inner, left) = (kinetic - from.turning, kinetic - over);
+    if to.turning > left {
+        if to.turning > left + COARSE * kinetic {
+            return false;
+        }
+        let share = (left.max(0.0) / to.turning).sqrt();
+        (to.spin, to.turning) = (to.spin * share, left.max(0.0));
+    }
+    let scale = if inner > 0.0 { ((left - to.turning) / inner).clamp(0.0, 1.0).sqrt() } else { 1.0 };
+    slow_down(world, problem, members, [from, to], scale);
+    true
+}
+
+/// The rigid motion of some bodies now, and the one with the momentum from the begin of the step; at rest where something holds them.
+fn rigid_motions(now: &Momenta, from_start: Option<&Momenta>) -> [RigidMotion; 2] {
+    let of_start = |&Momenta { linear, angular, .. }: &Momenta| Momenta { linear, angular, ..*now }.rigid();
+    from_start.map_or([RigidMotion::default(); 2], |start| [now.rigid(), of_start(start)])
+}
+
+/// Scales the motion of some bodies against one rigid motion, and gives them another instead of that.
+fn slow_down(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize>,
+    [from, to]: [RigidMotion; 2],
+    scale: f64,
+) {
+    for i in members {
+        let place = world.bodies[i].center_of_mass().as_dvec3() + Vec3::from(problem.bodies[i].dp).as_dvec3();
+        let row = &mut problem.bodies[i];
+        let [v, w] = [row.v, row.w].map(|u| Vec3::from(u).as_dvec3());
+        let at = |motion: &RigidMotion| motion.drift + motion.spin.cross(place - motion.center);
+        row.v = (at(&to) + (v - at(&from)) * scale).as_vec3().to_array();
+        row.w = (to.spin + (w - from.spin) * scale).as_vec3().to_array();
+    }
+}
+
+/// Brings some bodies back to where the step found them, but for a fall of all together where nothing holds them. `is_kept`: they keep their
+/// velocities; else they move as one.
+fn stand_still(
+    world: &World,
+    problem: &mut StepProblem,
+    members: impl Iterator<Item = usize> + Clone,
+    dt: f64,
+    is_held: bool,
+    is_kept: bool,
+) {
+    let after = before(world, problem, dt, members.clone());
+    let start = before(world, problem, 0.0, members.clone());
+    let gained = (after.linear - start.linear) / start.mass;
+    for i in members.clone() {
+        let (body, row) = (&world.bodies[i], &mut problem.bodies[i]);
+        (row.dp, row.dq) = ([0.0; 3], Quat::IDENTITY.to_array());
+        (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
+        if !is_held {
+            row.v = (Vec3::from(row.v) + gained.as_vec3()).to_array();
+            row.dp = ((start.linear / start.mass + 0.5 * gained) * dt).as_vec3().to_array();
+        }
+    }
+    if !is_kept {
+        let motions = rigid_motions(&now(world, problem, members.clone()), (!is_held).then_some(&after));
+        slow_down(world, problem, members, motions, 0.0);
+    }
+}

@@ -1,0 +1,211 @@
+//! What the springs of joints and contacts hold, and the work of what the caller drives.
+
+use glam::{Quat, Vec3};
+
+use super::{Entry, can_move, ends};
+use crate::config::SolverConfig;
+use crate::kernels::Rules;
+use crate::kernels::axis::{axis_inverse_mass, axis_motion, axis_speed};
+use crate::kernels::pair::relative_movement;
+use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Mass, Pair};
+use crate::math::dot3;
+use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count};
+use crate::world::{Body, BodyKind, World};
+
+/// Adds what the springs that hold joints shut hold now, half of their force times their gap each; and notes the levers of joints.
+pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &World, substep: impl Fn(usize) -> f64) {
+    for &row in problem.rows_of(&problem.joint_colors()) {
+        let joint = &problem.joints[row as usize];
+        let Some(body) = ends(joint).into_iter().find(|&b| can_move(problem, b)) else { continue };
+        let lever =
+            [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length())).into_iter().fold(0.0, f64::max);
+        entries[body as usize].lever = entries[body as usize].lever.max(lever);
+        let (of_joint, pair) = (Joint::<f64>::load(joint), pair_of(problem, joint));
+        let mut energy = 0.0;
+        if joint.is_loose == 0.0 {
+            let gap = of_joint.gap + relative_movement(&pair, of_joint.r_a, of_joint.r_b);
+            let force = Vec3::from(problem.joint_impulses[row as usize].linear).as_dvec3().length();
+            energy += force * dot3(gap, gap).sqrt();
+        }
+        for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
+            let axis = Axis::<f64>::load(&problem.axes[k]);
+            let moved = axis_motion(&pair, &of_joint, &axis).moved;
+            let (place, left) = (axis.gap + moved, axis.left - moved);
+            let gap = if problem.axes[k].is_limit() { place.min(left).min(0.0) } else { place };
+            energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
+        }
+        entries[body as usize].springs += 0.5 * energy / substep(body as usize);
+    }
+}
+
+/// Adds what the springs of joints of new bodies, and of new joints, held when the step began: m (w gap)²/2, m the mass that moves and w the
+/// frequency, and no more than `push_limit` lets their bodies part. `fresh` has the bodies, ascending.
+pub(super) fn add_springs_at_start(
+    entries: &mut [Entry],
+    problem: &StepProblem,
+    world: &World,
+    config: &SolverConfig,
+    fresh: &[usize],
+    substep: impl Fn(usize) -> f64,
+) {
+    let is_fresh = |end: u32| fresh.binary_search(&(end as usize)).is_ok();
+    for &row in problem.rows_of(&problem.joint_colors()) {
+        let joint = &problem.joints[row as usize];
+        let Some(body) = ends(joint).into_iter().find(|&b| can_move(problem, b)) else { continue };
+        if !ends(joint).into_iter().any(is_fresh) {
+            continue;
+        }
+        let (of_joint, pair) = (Joint::<f64>::load(joint), pair_at_start(&pair_of(problem, joint), world, joint));
+        let frequency = std::f64::consts::TAU * f64::from(config.joint_frequency) / substep(body as usize);
+        let mass = (pair.mass_a.inv_mass + pair.mass_b.inv_mass).recip();
+        let mut energy =
+            if joint.is_loose == 0.0 { 0.5 * mass * frequency.powi(2) * dot3(of_joint.gap, of_joint.gap) } else { 0.0 };
+        for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
+            let axis = Axis::<f64>::load(&problem.axes[k]);
+            let gap = if problem.axes[k].is_limit() { axis.gap.min(axis.left).min(0.0) } else { axis.gap };
+            energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &axis_motion(&pair, &of_joint, &axis));
+        }
+        entries[body as usize].kept += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
+    }
+}
+
+/// Adds the work of kinematic bodies that move, and of the drives of joints. That of a motor is its impulse at the faster of the speeds that its
+/// axis had; a spring of the caller gives back the energy of its deflection.
+pub(super) fn add_work_of_drives(
+    entries: &mut [Entry],
+    problem: &StepProblem,
+    world: &World,
+    substep: impl Fn(usize) -> f64,
+) {
+    let driver = |body: u32| world.bodies.get(body as usize).filter(|b| b.kind != BodyKind::Dynamic && b.is_driven());
+    if !problem.totals.is_empty() {
+        for contact in problem.swept_contacts() {
+            for (from, to, sign) in [(contact.body_a, contact.body_b, 1.0), (contact.body_b, contact.body_a, -1.0)] {
+                if let Some(driver) = driver(from).filter(|_| can_move(problem, to)) {
+                    let work = sign * work_of_contact(driver, contact, from == contact.body_a, problem);
+                    entries[to as usize].work += work.max(0.0);
+                }
+            }
+        }
+    }
+    for &row in problem.rows_of(&problem.joint_colors()) {
+        let joint = &problem.joints[row as usize];
+        let of_world = &world.joints[row as usize];
+        let drives = drive_count(of_world);
+        if drives == 0 && ends(joint).into_iter().all(|end| driver(end).is_none()) {
+            continue;
+        }
+        let Some(body) = ends(joint).into_iter().find(|&b| can_move(problem, b)) else { continue };
+        let mut work = 0.0;
+        for (end, arm, sign) in [(joint.body_a, joint.r_a, -1.0), (joint.body_b, joint.r_b, 1.0)] {
+            if let Some(driver) = driver(end) {
+                let pull = problem.joint_impulse(&problem.joint_totals, row as usize);
+                let twist = problem.axis_impulse(&problem.joint_totals, row as usize, false);
+                let velocity = driver.linear_velocity + driver.angular_velocity.cross(Vec3::from(arm));
+                // What the driver gives is what it does not take.
+                work -= sign * f64::from(velocity.dot(pull) + driver.angular_velocity.dot(twist));
+            }
+        }
+        let (of_joint, end) = (Joint::<f64>::load(joint), pair_of(problem, joint));
+        let start = pair_at_start(&end, world, joint);
+        for k in axes_of(joint).take(drives) {
+            let axis = Axis::<f64>::load(&problem.axes[k]);
+            let motions = [&start, &end].map(|pair| (pair, axis_motion(pair, &of_joint, &axis)));
+            let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
+            if axis.impulse_scale > 0.0 {
+                let masses = motions.each_ref().map(|(pair, motion)| axis_inverse_mass(pair, motion).recip());
+                let (mass, h) = (0.5 * (masses[0] + masses[1]), substep(body as usize));
+                // Places at the times of the velocities.
+                let held =
+                    |i: usize| held_by_drive(&axis, axis.gap + motions[i].1.moved - 0.5 * h * speeds[i], mass, h);
+                work += held(0) - held(1);
+            } else {
+                let impulse = axis_impulse(problem, k, &problem.joint_totals);
+                work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
+            }
+        }
+        entries[body as usize].work += work;
+    }
+}
+
+/// What a spring of the caller holds at a deflection where its axis moves a mass, up to its largest force (J).
+fn held_by_drive(axis: &Axis<f64>, deflection: f64, mass: f64, substep: f64) -> f64 {
+    let (stiffness, most) = (mass * axis.rate / substep, axis.max_impulse / substep);
+    let reach = deflection.abs().min(most / stiffness);
+    stiffness * reach * (deflection.abs() - 0.5 * reach)
+}
+
+fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {
+    joint.first_axis as usize..(joint.first_axis + joint.axis_count) as usize
+}
+
+fn axis_impulse(problem: &StepProblem, axis: usize, impulses: &[JointImpulseRow]) -> f64 {
+    f64::from(impulses[problem.joints.len() + axis].linear[0])
+}
+
+/// The bodies of a joint at the end of the step.
+fn pair_of(problem: &StepProblem, joint: &JointRow) -> Pair<f64> {
+    let [a, b] = ends(joint).map(|end| BodyOf::load(&problem.bodies[end as usize]));
+    let [mass_a, mass_b] = ends(joint).map(|end| Mass::load(&problem.masses[end as usize]));
+    Pair { a, b, mass_a, mass_b, ..Pair::default() }
+}
+
+/// The same when the step began.
+fn pair_at_start(pair: &Pair<f64>, world: &World, joint: &JointRow) -> Pair<f64> {
+    let body = |end: u32| {
+        let mut row = BodyRow::AT_REST;
+        if let Some(body) = world.bodies.get(end as usize) {
+            (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
+        }
+        BodyOf::load(&row)
+    };
+    let [a, b] = ends(joint).map(body);
+    Pair { a, b, ..*pair }
+}
+
+/// The work of a body that moves through a contact, by the impulse of the whole step (J).
+fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &StepProblem) -> f64 {
+    let (t_1, t_2) = contact.tangents();
+    let normal = Vec3::from(contact.normal);
+    let first = contact.first_point as usize;
+    let points = first..first + contact.point_count as usize;
+    let patch = problem.has_patches().then_some(points.end);
+    let mut work = 0.0;
+    for k in points.chain(patch) {
+        let (total, point) = (&problem.totals[k], &problem.points[k]);
+        let arm = Vec3::from(if is_a { point.r_a } else { point.r_b });
+        let velocity = driver.linear_velocity + driver.angular_velocity.cross(arm);
+        let slip = t_1 * total.tangent_1 + t_2 * total.tangent_2;
+        // The normal impulse of a patch is that of its twist.
+        work += f64::from(match Some(k) == patch {
+            true => velocity.dot(slip) + driver.angular_velocity.dot(normal) * total.normal,
+            false => velocity.dot(normal * total.normal + slip),
+        });
+    }
+    work
+}
+
+/// What the springs of a contact held when the step began, and hold now (J): m (w s)²/2 at the overlap s, as far as `push_limit` lets them push.
+pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, substep: &Substep) -> [f64; 2] {
+    let both = can_move(problem, contact.body_a) && can_move(problem, contact.body_b);
+    let softness = if both { substep.movable } else { substep.fixed };
+    let compliance = f64::from(softness.compliance() * substep.length);
+    let frequency = if compliance > 0.0 { compliance.sqrt().recip() } else { softness.bias_rate.into() };
+    let most = f64::from(softness.push_limit);
+    let [a, b] = [contact.body_a, contact.body_b].map(|body| &problem.bodies[body as usize]);
+    let normal = Vec3::from(contact.normal);
+    // An arm that turned moves along the normal by its part along the difference of the normal, turned back, from the normal.
+    let [back_a, back_b] = [a, b].map(|row| Quat::from_array(row.dq).inverse() * normal - normal);
+    let shift = normal.dot(Vec3::from(b.dp) - Vec3::from(a.dp));
+    let mut held = [0.0; 2];
+    for k in contact.first_point as usize..(contact.first_point + contact.point_count) as usize {
+        let point = &problem.points[k];
+        let moved = shift + Vec3::from(point.r_b).dot(back_b) - Vec3::from(point.r_a).dot(back_a);
+        let before = point.separation - contact.preload;
+        for (held, separation) in held.iter_mut().zip([before, before + moved]) {
+            let speed = (frequency * f64::from(-separation).max(0.0)).min(most);
+            *held += 0.5 * f64::from(point.normal_mass) * speed * speed;
+        }
+    }
+    held
+}

@@ -1,0 +1,156 @@
+//! Blows: on several points of a manifold at once, and of anything on anything.
+
+use crate::common::random::Random;
+use drystone::glam::Vec3;
+use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
+
+const DT: f32 = 1.0 / 60.0;
+
+/// A cuboid that falls flat onto a half-space from `height`, for 100 steps: how far it went aside (m),
+/// how high it bounced (m), its fastest way up (m/s) and its fastest spin (rad/s).
+fn fallen_flat(half_extents: Vec3, restitution: f32, height: f32) -> [f32; 4] {
+    let Vec3 { x, y, z } = half_extents;
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(restitution));
+    let body = world.add(Body::dynamic().shape(Shape::cuboid(x, y, z)).restitution(restitution).position(
+        0.0,
+        y + height,
+        0.0,
+    ));
+    let config = SolverConfig::default().without_sleep();
+    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    let [mut bounced, mut fastest, mut spin] = [0.0_f32; 3];
+    let mut has_met = false;
+    for _ in 0..100 {
+        simulation.step(DT).expect("a step");
+        let body = &simulation.world.bodies[body];
+        has_met |= body.linear_velocity.y > -0.5 && body.position.y < y + 0.5 * height;
+        if has_met {
+            bounced = bounced.max(body.position.y - y);
+            fastest = fastest.max(body.linear_velocity.y);
+            spin = spin.max(body.angular_velocity.length());
+        }
+    }
+    let Vec3 { x, z, .. } = simulation.world.bodies[body].position;
+    [x.hypot(z), bounced, fastest, spin]
+}
+
+/// Swept one after another the first of its four points took more than its share: the cube went 94 mm aside and rebounded at 0.37 m/s.
+#[test]
+fn a_cube_that_falls_flat_stays_where_it_lands() {
+    for half_extents in [Vec3::ONE, Vec3::new(1.0, 0.5, 2.0)] {
+        let [aside, _, fastest, spin] = fallen_flat(half_extents, 0.0, 5.0);
+        assert!(aside < 1e-4 && fastest < 1e-2 && spin < 1e-2, "{aside} m, {fastest} m/s, {spin} rad/s");
+    }
+}
+
+/// A plate kept 0.51 of its height at restitution 1, and turned.
+#[test]
+fn a_plate_bounces_flat() {
+    for (half_extents, restitution) in [
+        (Vec3::new(1.0, 0.5, 2.0), 1.0),
+        (Vec3::splat(0.5), 1.0),
+        (Vec3::new(1.0, 0.05, 2.0), 0.8),
+        (Vec3::splat(0.3), 0.5),
+    ] {
+        let [_, bounced, _, spin] = fallen_flat(half_extents, restitution, 2.0);
+        let expected = 2.0 * restitution * restitution;
+        assert!((bounced - expected).abs() < 0.02 * expected, "{bounced} m in place of {expected} m");
+        assert!(spin < 0.05, "{spin} rad/s");
+    }
+}
+
+fn started(world: World) -> Simulation {
+    Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+}
+
+/// A shape of 0.1 to 0.5 m.
+fn any_shape(random: &mut Random) -> Shape {
+    let size = random.within(0.1, 0.5);
+    let (narrow, wide) = (size * random.within(0.2, 0.9), size * random.within(0.3, 1.5));
+    match random.below(4) {
+        0 => Shape::ball(size),
+        1 => Shape::cuboid(size, narrow, wide),
+        2 => Shape::capsule(size, narrow),
+        _ => Shape::cylinder(size, wide),
+    }
+}
+
+/// A body that was set back to where it met the floor kept its spin and not its energy: 32 of 2,000 blows gained more than 0.1 %, up to 91 %. What is
+/// left, 9 of 2,000 and up to 2.2 %, is overlap that a fast spin made within a step and that springs give back.
+#[test]
+fn blows_make_no_energy() {
+    const BLOWS: u32 = 600;
+    let mut random = Random::new(19);
+    let mut above = 0;
+    for blow in 0..BLOWS {
+        let (friction, restitution) = (random.within(0.0, 1.0), random.within(0.0, 1.0));
+        let surface = |body: Body| body.friction(friction).restitution(restitution);
+        let spin = random.vector(1.0).normalize() * 500.0 * random.within(0.0, 1.0).powi(2);
+        let falls = random.vector(3.0).with_y(random.within(-15.0, -2.0));
+        let body = surface(Body::dynamic().shape(any_shape(&mut random)).density(1000.0));
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        world.add(body.position(0.0, 2.5, 0.0).rotation(random.rotation()).velocity(falls, spin));
+        world.add(surface(match blow % 2 {
+            0 => Body::fixed().shape(Shape::half_space(Vec3::Y)),
+            _ => Body::dynamic().shape(any_shape(&mut random)).density(1000.0),
+        }));
+        let before = world.kinetic_energy();
+        let mut simulation = started(world);
+        let mut most = 0.0_f64;
+        for _ in 0..90 {
+            simulation.step(DT).expect("a step");
+            most = most.max(simulation.world.kinetic_energy() / before);
+        }
+        assert!(
+            most < 1.03,
+            "blow {blow}: {most} of the energy before, friction {friction}, restitution {restitution}"
+        );
+        above += u32::from(most > 1.001);
+    }
+    assert!(above <= BLOWS / 100, "{above} of {BLOWS} blows made energy");
+}
+
+/// Of ten bounces the heights fall by 0.8 squared each.
+#[test]
+fn a_ball_keeps_its_restitution_over_ten_bounces() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(0.8));
+    let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).restitution(0.8).position(0.0, 50.5, 0.0));
+    let mut simulation = started(world);
+    let (mut heights, mut highest, mut rose) = (Vec::new(), 0.0_f32, false);
+    while heights.len() < 10 {
+        simulation.step(DT).expect("a step");
+        let body = &simulation.world.bodies[ball];
+        let rises = body.linear_velocity.y > 0.0;
+        highest = highest.max(if rises || rose { body.position.y - 0.5 } else { 0.0 });
+        if rose && !rises {
+            heights.push(std::mem::take(&mut highest));
+        }
+        rose = rises;
+    }
+    for (bounces, height) in (1..).zip(heights) {
+        let expected = 50.0 * 0.64_f32.powi(bounces);
+        assert!((height / expected - 1.0).abs() < 1e-3, "bounce {bounces}: {height} m in place of {expected} m");
+    }
+}
+
+/// Two cubes meet face to face, and one meets one that lies still: 0.87 of the speed came back.
+#[test]
+fn cubes_bounce_off_each_other_face_to_face() {
+    for (speeds, restitution, expected) in
+        [([5.0, -5.0], 1.0, [-5.0, 5.0]), ([5.0, -5.0], 0.5, [-2.5, 2.5]), ([120.0, 0.0], 1.0, [0.0, 120.0])]
+    {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        for (x, speed) in [-5.0, 5.0].into_iter().zip(speeds) {
+            let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).restitution(restitution);
+            world.add(cube.position(x, 0.0, 0.0).velocity(Vec3::X * speed, Vec3::ZERO));
+        }
+        let mut simulation = started(world);
+        (0..90).for_each(|_| drop(simulation.step(DT).expect("a step")));
+        for (body, expected) in simulation.world.bodies.iter().zip(expected) {
+            let (v, w) = (body.linear_velocity, body.angular_velocity);
+            assert!(v.distance(Vec3::X * expected) < 2e-3 * speeds[0] && w.length() < 1e-2, "{speeds:?}: {v}, {w}");
+        }
+    }
+}
