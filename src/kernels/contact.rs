@@ -158,12 +158,12 @@ fn press_as_one<L: Lane>(
     let (mut arms_a, mut arms_b) = (Vec3::default(), Vec3::default());
     let (mut count, mut all, mut gain, mut mass) = (zero, zero, zero, zero);
     let (mut middle_a, mut middle_b) = (Vec3::default(), Vec3::default());
-    for k in 0..rules.contact_points(rows.count()) {
+    for (k, own) in changes.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
         let point = rows.point(k);
         let impulse = rows.impulse(k);
         let (sum, lacking) = wanted(pair, &point, &impulse);
         let change = sum - impulse.normal;
-        changes[k] = change;
+        *own = change;
         arms_a += point.r_a * change;
         arms_b += point.r_b * change;
         all = all + change;
@@ -187,9 +187,9 @@ fn press_as_one<L: Lane>(
     let alike = reciprocal(mass * ((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning));
     let best = smaller(gain * reciprocal(moved), larger(alike, one));
     let share = L::select(zero, best, L::and(count.gt(one), gain.gt(zero)));
-    for k in 0..rules.contact_points(rows.count()) {
+    for (k, &change) in changes.iter().enumerate().take(rules.contact_points(rows.count())) {
         let impulse = rows.impulse(k);
-        let sum = impulse.normal + share * changes[k];
+        let sum = impulse.normal + share * change;
         rows.set_normal(k, sum);
         if rules.bounces {
             rows.set_peak(k, larger(impulse.peak, sum));

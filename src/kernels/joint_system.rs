@@ -483,7 +483,8 @@ fn let_go<S: Scalar>(
         for (i, number) in problem.numbers_of(row).into_iter().enumerate() {
             let Some(at) = number.filter(|_| row.is_limit(i) && (is_new || held[i] > S::default())) else { continue };
             let before = joints.impulse(at);
-            if !(before * (before + changes[i]) > S::default()) {
+            let still_pushes = before * (before + changes[i]) > S::default();
+            if !still_pushes {
                 node.remove(i);
                 any = true;
             }
