@@ -33,10 +33,19 @@ pub struct Interface {
     pub b: u32,
     /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
     pub need: f32,
-    /// The force under which a contact sags as deep as promised with the substeps of the settings; of a joint the most force of its drives (N).
+    /// The force under which it sags as deep as promised with the substeps of the settings (N).
     pub force: f32,
-    /// Whether it is a joint, which no other takes load from.
-    pub is_joint: bool,
+    /// What a joint needs; none of a contact.
+    pub joint: Option<JointNeed>,
+}
+
+/// What a joint needs beside its load, which no other joint of its bodies takes from it.
+#[derive(Clone, Copy, Debug)]
+pub struct JointNeed {
+    /// The most force of its drives (N).
+    pub drives: f32,
+    /// The need by how fast its arms turn.
+    pub turns: f32,
 }
 
 /// The class of effort of each island, and which islands are heaps.
@@ -297,7 +306,7 @@ impl Effort {
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
             // What statics finds is a load, however strong the contact is.
-            Interface { a, b, need: need as f32, force: 0.0, is_joint: false }
+            Interface { a, b, need: need as f32, force: 0.0, joint: None }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
         self.follow_islands(world, &[], interfaces.iter().copied(), dt, false);
@@ -341,18 +350,22 @@ impl Effort {
             }
         }
         let body_of = |a: u32, b: u32| Some(if a == IMMOVABLE { b } else { a }).filter(|&body| body != IMMOVABLE);
-        for Interface { a, b, need, force, is_joint } in interfaces.clone() {
-            if let Some(body) = body_of(a, b).filter(|_| is_joint) {
+        for Interface { a, b, joint, .. } in interfaces.clone() {
+            if let Some((body, JointNeed { drives, turns })) = body_of(a, b).zip(joint) {
                 let island = &mut self.of_root[root(body)];
-                island.load += force;
-                island.whole_need = island.whole_need.max(need);
+                island.load += drives;
+                island.whole_need = island.whole_need.max(turns);
                 island.has_joints = true;
             }
         }
-        for Interface { a, b, need, force, is_joint } in interfaces {
-            if let Some(body) = body_of(a, b).filter(|_| !is_joint) {
-                let island = &mut self.of_root[root(body)];
-                island.needs.add(need.min(LEVERAGE * island.load / force));
+        for Interface { a, b, need, force, joint } in interfaces {
+            let Some(body) = body_of(a, b) else { continue };
+            let island = &mut self.of_root[root(body)];
+            let need = need.min(LEVERAGE * island.load / force);
+            if joint.is_some() {
+                island.whole_need = island.whole_need.max(need);
+            } else {
+                island.needs.add(need);
                 island.contacts += 1;
             }
         }

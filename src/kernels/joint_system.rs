@@ -223,7 +223,7 @@ pub struct JointNode<L> {
     pub turns: [Block<L>; 2],
     /// Inverse masses of a and b.
     pub inv_masses: [L; 2],
-    /// The velocity that a row gives way by per impulse; 0 of a rigid joint, [`NOT_FACTORED`] before it is known.
+    /// The velocity that a row gives way by per impulse; 0 of a rigid joint, `NOT_FACTORED` before it is known.
     pub softness: L,
     /// The right side, then the correction.
     pub right: Vec3<L>,

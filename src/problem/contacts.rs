@@ -232,7 +232,7 @@ impl ContactRows {
                     }
                 }
             }
-            Interface { a, b, need: slot.need, force, is_joint: false }
+            Interface { a, b, need: slot.need, force, joint: None }
         })
     }
 

@@ -30,27 +30,49 @@ pub fn gap_of_sweeps(
     gaps.fold(0.0, f32::max)
 }
 
-/// The gap that sweeps leave in a joint, as a share of its arms, or the angle that they leave under the moment of the weight (rad). `weight` is mass
-/// times place (kg m) and mass (kg) of what hangs on it; `omega` is the frequency of the springs of sweeps.
-fn gap_of_joint(joint: &Joint, weight: Vec4, world: &World, omega: f32) -> f32 {
-    let (a, b) = joint.indices();
-    let body = |i: usize| &world.bodies[i];
-    let bodies = || [Some(a), b].into_iter().flatten();
-    let movable = || bodies().map(body).filter(|body| body.kind == BodyKind::Dynamic);
-    let anchors = world.anchors(joint);
-    let arms: f32 = bodies().zip(anchors).map(|(i, anchor)| anchor.distance(body(i).center_of_mass())).sum();
-    let force = weight.w * world.gravity_of(world.bodies.worlds()[a] as usize).length();
+/// The gap that a force of 1 N opens a swept joint by, as a share of its arms (1/N); none if it has no arms, or holds no point. `omega` is the frequency
+/// of the springs of sweeps.
+fn share_of_force(joint: &Joint, world: &World, omega: f32) -> Option<f32> {
     let bears = match &joint.linear {
         Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
         Linear::Distance(distance) => distance.bounds != Bounds::Free,
     };
-    let softness: f32 = movable().map(|body| body.mass.mass.recip()).sum();
-    // A joint without arms has no length to be held against.
-    let gap = Some(force * softness / (omega * omega * arms)).filter(|gap| bears && gap.is_finite());
+    let softness: f32 = movable(joint, world).map(|body| body.mass.mass.recip()).sum();
+    Some(softness / (omega * omega * arms(joint, world))).filter(|share| bears && share.is_finite())
+}
+
+/// The lengths of the arms of a joint (m).
+fn arms(joint: &Joint, world: &World) -> f32 {
+    let ends = bodies(joint).zip(world.anchors(joint));
+    ends.map(|(i, anchor)| anchor.distance(world.bodies[i].center_of_mass())).sum()
+}
+
+fn bodies(joint: &Joint) -> impl Iterator<Item = usize> {
+    let (a, b) = joint.indices();
+    [Some(a), b].into_iter().flatten()
+}
+
+fn movable<'a>(joint: &Joint, world: &'a World) -> impl Iterator<Item = &'a Body> {
+    bodies(joint).map(|i| &world.bodies[i]).filter(|body| body.kind == BodyKind::Dynamic)
+}
+
+/// The gap of a swept joint that the settings promise (m), and the force that opens it as far (N); none if no force does. `substep` is the length of
+/// a substep (s).
+pub fn promised_gap(joint: &Joint, world: &World, config: &SolverConfig, substep: f32) -> Option<[f32; 2]> {
+    let omega = TAU * config.joint_frequency / substep;
+    let share = share_of_force(joint, world, omega)?;
+    Some([config.max_joint_gap_share * arms(joint, world), config.max_joint_gap_share / share])
+}
+
+/// The gap that sweeps leave in a joint, as a share of its arms, or the angle that they leave under the moment of the weight (rad). `weight` is mass
+/// times place (kg m) and mass (kg) of what hangs on it.
+fn gap_of_joint(joint: &Joint, weight: Vec4, world: &World, omega: f32) -> f32 {
+    let force = weight.w * world.gravity_of(world.bodies.worlds()[joint.indices().0] as usize).length();
+    let gap = share_of_force(joint, world, omega).map(|share| force * share);
     let is_locked = joint.angular.iter().any(|axis| axis.bounds == Bounds::Locked);
     let angle = Some(weight).filter(|weight| is_locked && weight.w > 0.0).map(|weight| {
-        let lever = weight.truncate() / weight.w - anchors[0];
-        let turn: f32 = movable().map(|body| turn_across(body, lever)).sum();
+        let lever = weight.truncate() / weight.w - world.anchors(joint)[0];
+        let turn: f32 = movable(joint, world).map(|body| turn_across(body, lever)).sum();
         force * lever.length() * turn / (omega * omega)
     });
     gap.unwrap_or(0.0).max(angle.filter(|angle| angle.is_finite()).unwrap_or(0.0))

@@ -32,7 +32,7 @@ pub struct NodeRow {
     pub first_block: u32,
     /// One past the last block of its column.
     pub end_block: u32,
-    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint, with [`NodeRow::LIMIT`]; 0 for
+    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint, with `NodeRow::LIMIT`; 0 for
     /// no row.
     pub rows: u32,
 }

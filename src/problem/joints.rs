@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, HashMap};
 use glam::Vec3;
 
 use super::axes;
-use super::joint_sets::gap_of_sweeps;
+use super::joint_sets::{gap_of_sweeps, promised_gap};
 use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
-use crate::effort::{Effort, Interface};
+use crate::effort::{self, Effort, Interface, JointNeed};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
 use crate::world::{BodyKind, Joint, JointHandle, World};
@@ -35,8 +35,8 @@ pub struct JointRows {
     /// The gravity that the bodies of joints felt then.
     gravity: Vec<Vec3>,
     swept_gap: f32,
-    /// The gap at rest of each joint that is left to sweeps although the gap is too large, over the promised one; else 0.
-    needs: Vec<f32>,
+    /// What each joint needs that is left to sweeps.
+    left: Vec<LeftToSweeps>,
     /// What turns opens joints by, over the promised gap: this times ω² (s²).
     gap_of_turns: f32,
     /// Inertia that joints lend to bodies, in memory that every step uses again.
@@ -54,16 +54,31 @@ crate::saved::state!(JointRows {
     chosen_for,
     gravity,
     swept_gap,
-    needs,
+    left,
 } scratch { graph, gap_of_turns, lent });
+
+/// How much further a joint of a net that swings may open in the next step.
+const GROWTH: f32 = 2.5;
+
+/// What a joint needs that is left to sweeps; nothing of one that is not.
+#[derive(Clone, Copy, Debug)]
+struct LeftToSweeps {
+    /// The gap that it would have with the substeps of the settings, over the promised one.
+    need: f32,
+    /// The promised gap (m), and the force that opens it as far with these substeps (N).
+    gap: f32,
+    force: f32,
+}
+
+crate::saved::fields!(LeftToSweeps { need, gap, force });
+
+impl LeftToSweeps {
+    const NONE: Self = Self { need: 0.0, gap: f32::INFINITY, force: f32::INFINITY };
+}
 
 /// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
 /// substeps are cheaper there.
 const MOST_TERMS_A_NODE: usize = 24;
-
-/// The gap of a net that swings over its gap at rest, as substeps for it are chosen. A net of 16 x 16 balls under 300 times opens 6 times as
-/// far as at rest with 8 substeps, and 20 times with 128.
-const SWING: f32 = 8.0;
 
 /// The system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;
@@ -94,7 +109,7 @@ impl JointRows {
         let are_joints = order.iter().all(|&joint| (joint as usize) < count);
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
-        let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.needs.len()] == [count; 2];
+        let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.left.len()] == [count; 2];
         ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
     }
 
@@ -126,8 +141,8 @@ impl JointRows {
         self.systems.clear();
         self.systems.resize(self.joints.len(), SWEPT);
         self.swept_gap = 0.0;
-        self.needs.clear();
-        self.needs.resize(self.joints.len(), 0.0);
+        self.left.clear();
+        self.left.resize(self.joints.len(), LeftToSweeps::NONE);
         if config.joint_solver == JointSolver::Sweeps {
             return;
         }
@@ -144,13 +159,34 @@ impl JointRows {
         for joints in members.into_values() {
             let gap = gap_of_sweeps(&joints, world, config, substep, |joint| self.sides(joint));
             self.swept_gap = self.swept_gap.max(gap);
-            self.decide(&joints, gap, config, problem);
+            self.decide(&joints, gap, (world, config, substep), problem);
+        }
+    }
+
+    /// Takes over what the joints bore in the last substep that are left to sweeps, and how far they are open: a net that swings opens further than
+    /// its load tells. `substep` is the length of a substep of class 0 (s).
+    pub fn follow_loads(&mut self, world: &World, substep: f32, problem: &StepProblem) {
+        let rows = self.left.iter_mut().zip(&self.joints).zip(&self.shares).zip(&problem.joint_impulses);
+        for (((left, joint), share), impulse) in
+            rows.filter(|(((left, _), share), _)| left.gap.is_finite() && **share > 0.0)
+        {
+            let borne = Vec3::from(impulse.linear).length() / (share * substep);
+            let [a, b] = world.anchors(joint);
+            // Gaps fall with the square of the substep.
+            let need = (borne / left.force).max(GROWTH * a.distance(b) / (left.gap * share * share));
+            left.need = effort::lasting(need, left.need);
         }
     }
 
     /// Solves the anchors and locks of some joints at once, which sweeps would leave open by `gap`, where that costs little enough; else they
     /// need more substeps.
-    fn decide(&mut self, joints: &[u32], gap: f32, config: &SolverConfig, problem: &mut StepProblem) {
+    fn decide(
+        &mut self,
+        joints: &[u32],
+        gap: f32,
+        (world, config, substep): (&World, &SolverConfig, f32),
+        problem: &mut StepProblem,
+    ) {
         let of_joint = |&joint: &u32| axes::nodes(&self.joints[joint as usize]).map(move |rows| (joint, rows));
         let nodes: Vec<_> = joints.iter().flat_map(of_joint).collect();
         let most_terms = match config.joint_solver {
@@ -161,9 +197,12 @@ impl JointRows {
         if problem.systems.add(&nodes, |joint| self.sides(joint), most_terms) {
             nodes.iter().for_each(|(joint, _)| self.systems[*joint as usize] = system);
         } else {
-            let share = gap / config.max_joint_gap_share;
-            let need = if share > 1.0 { SWING * share } else { 0.0 };
-            joints.iter().for_each(|&joint| self.needs[joint as usize] = need);
+            for joint in joints.iter().map(|&joint| joint as usize) {
+                let need = gap / config.max_joint_gap_share;
+                let promised = promised_gap(&self.joints[joint], world, config, substep);
+                self.left[joint] =
+                    promised.map_or(LeftToSweeps::NONE, |[gap, force]| LeftToSweeps { need, gap, force });
+            }
         }
     }
 
@@ -232,12 +271,17 @@ impl JointRows {
 
     /// Whether any joint needs more than class 0 gives.
     pub fn are_above(&self, world: &World) -> bool {
-        (0..self.joints.len()).any(|joint| self.need(world, joint) > 1.0)
+        self.left.iter().any(|left| left.need > 1.0)
+            || (0..self.joints.len()).any(|joint| self.need_of_turns(world, joint) > 1.0)
     }
 
-    /// The gap that a joint would have in class 0, over the promised one: that at rest, or that of its turning arms. Arms turn, and centers of mass go
-    /// straight: in a substep h that opens a joint that is solved at once by (h ω)²/2 of an arm.
-    fn need(&self, world: &World, joint: usize) -> f32 {
+    /// The gap that turning arms would open a joint by in class 0, over the promised one. Arms turn, and centers of mass go straight: in a substep h
+    /// that opens a joint that is solved at once by (h ω)²/2 of an arm.
+    fn need_of_turns(&self, world: &World, joint: usize) -> f32 {
+        // Springs of swept joints would change their stiffness as bodies turn.
+        if self.systems.get(joint).is_none_or(|&system| system == SWEPT) {
+            return 0.0;
+        }
         let Joint { body_a, anchor_a, body_b, anchor_b, .. } = self.joints[joint];
         let (mut arms, mut opened) = (0.0, 0.0);
         for (body, anchor) in [(Some(body_a), anchor_a), (body_b, anchor_b)] {
@@ -246,10 +290,7 @@ impl JointRows {
                 (arms, opened) = (arms + arm, opened + arm * body.angular_velocity.length_squared());
             }
         }
-        // Springs of swept joints would change their stiffness as bodies turn.
-        let is_direct = self.systems.get(joint).is_some_and(|&system| system != SWEPT);
-        let of_turns = if is_direct && arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 };
-        self.needs.get(joint).copied().unwrap_or(0.0).max(of_turns)
+        if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 }
     }
 
     /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
@@ -261,10 +302,11 @@ impl JointRows {
             _ => IMMOVABLE,
         };
         awake.map(move |(i, joint)| {
-            let force = axes::driving_force(joint, world);
             let (a, b) = joint.indices();
-            let need = self.need(world, i);
-            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, is_joint: true }
+            let LeftToSweeps { need, force, .. } = self.left.get(i).copied().unwrap_or(LeftToSweeps::NONE);
+            let need_of_joint =
+                JointNeed { drives: axes::driving_force(joint, world), turns: self.need_of_turns(world, i) };
+            Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, joint: Some(need_of_joint) }
         })
     }
 

@@ -305,6 +305,7 @@ impl Stages {
                 energy.follow_contacts();
             }
             joints.choose(world, config, dt / config.substeps as f32, problem);
+            joints.follow_loads(world, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
             stats.hardest = contacts.follow_loads(config, effort.is_one_class(), problem);
             if are_sorted_anew {
