@@ -139,7 +139,7 @@ fn a_net_under_a_heavy_ball_keeps_its_joints_closed() {
     let scene = find("joint-grid", &["n=16", "ratio=300"]);
     let largest_gap = |config: SolverConfig| {
         let mut simulation = started(&scene, config);
-        (0..360).fold(0.0_f32, |gap, k| {
+        (0..360).fold(0.0_f32, |gap, _| {
             simulation.step(DT).expect("a step");
             gap.max(simulation.world.joint_gap())
         })
@@ -164,7 +164,7 @@ fn a_net_that_catches_a_heavy_ball_keeps_its_joints_closed() {
     world.add(ball);
     let largest_gap = |config: SolverConfig| {
         let mut simulation = Simulation::new(world.clone(), config, Box::new(Cpu::new())).expect("a world");
-        (0..360).fold(0.0_f32, |gap, k| {
+        (0..360).fold(0.0_f32, |gap, _| {
             simulation.step(DT).expect("a step");
             gap.max(simulation.world.joint_gap())
         })
