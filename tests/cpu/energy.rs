@@ -126,6 +126,8 @@ fn scenes_that_make_no_energy_lose_none_to_the_law() {
         let share = match name {
             "bullets" => 0.05,
             "four-bar" | "ragdoll" | "ragdolls" => 0.02,
+            // A net takes shorter substeps as it swings, and stiffer springs pull its gaps shut.
+            "joint-grid" => 5e-3,
             _ => 1e-3,
         };
         if taken > share * most + rounding || refused > 0 {
