@@ -39,6 +39,10 @@ pub enum Column {
     Force,
     /// Lasting torque on each body (N m).
     Torque,
+    /// Coefficient of friction of each body.
+    Friction,
+    /// Coefficient of restitution of each body.
+    Restitution,
     /// Gravity of the world (m/s²).
     Gravity,
     /// Speed of each motor and target of each spring: those of [`drives`].
@@ -60,6 +64,8 @@ named!(Column {
     AngularVelocity = "angular_velocity",
     Force = "force",
     Torque = "torque",
+    Friction = "friction",
+    Restitution = "restitution",
     Gravity = "gravity",
     Control = "ctrl",
     JointPosition = "joint_position",
@@ -72,7 +78,7 @@ impl Column {
     /// Numbers in a row.
     pub const fn width(self) -> usize {
         match self {
-            Self::Control => 1,
+            Self::Control | Self::Friction | Self::Restitution => 1,
             Self::Rotation => 4,
             Self::JointPosition | Self::JointSpeed => 6,
             _ => 3,
@@ -169,6 +175,8 @@ impl Member {
             Column::AngularVelocity => put(rows, bodies().map(|b| b.map(|b| b.angular_velocity.to_array()))),
             Column::Force => put(rows, bodies().map(|b| b.map(|b| b.force.to_array()))),
             Column::Torque => put(rows, bodies().map(|b| b.map(|b| b.torque.to_array()))),
+            Column::Friction => put(rows, bodies().map(|b| b.map(|b| [b.material.friction]))),
+            Column::Restitution => put(rows, bodies().map(|b| b.map(|b| [b.material.restitution]))),
             Column::Gravity => put(rows, [Some(world.gravity_of(0).to_array())]),
             Column::Control => put(rows, world.joints.iter().flat_map(aims).map(|aim| Some([aim]))),
             Column::JointPosition => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).position))),
@@ -180,7 +188,7 @@ impl Member {
         }
     }
 
-    /// Takes a column over: poses, velocities, forces, torques, gravity or drives. Rows of bodies that are gone are passed over. Contacts
+    /// Takes a column over: poses, velocities, forces, torques, materials, gravity or drives. Rows of bodies that are gone are passed over. Contacts
     /// that still touch keep their impulses, and so do joints.
     ///
     /// # Errors
@@ -218,6 +226,8 @@ pub fn write(world: &mut World, column: Column, values: &[f32]) -> Result<()> {
         Column::AngularVelocity => bodies.for_each(|(body, row)| body.angular_velocity = vector(row)),
         Column::Force => bodies.for_each(|(body, row)| body.force = vector(row)),
         Column::Torque => bodies.for_each(|(body, row)| body.torque = vector(row)),
+        Column::Friction => bodies.for_each(|(body, row)| body.material.friction = row[0]),
+        Column::Restitution => bodies.for_each(|(body, row)| body.material.restitution = row[0]),
         _ => return Err(input!("{column} follows from the state: it cannot be written")),
     }
     Ok(())

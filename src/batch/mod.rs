@@ -221,19 +221,52 @@ impl Batch {
         before: impl Fn(&T, u64, &mut World) -> Result<()> + Sync,
         after: impl Fn(&mut T, u64, &Member) + Sync,
     ) -> Result<Vec<usize>> {
-        self.check(tasks.iter().map(|task| task.0))?;
-        let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
-        let mut own = tasks.iter_mut().map(|task| &mut task.1);
-        let mut next = chosen.iter().peekable();
-        let all = self.members.iter_mut().enumerate();
-        let named = all.filter_map(|(k, member)| next.next_if_eq(&&k).and_then(|_| Some((member, own.next()?))));
-        let jobs: Vec<_> = named.collect();
         let is_over = AtomicBool::new(false);
         let way = Way { steps: run.steps, dt: run.dt, is_over: &is_over };
-        let work = |(member, own): (&mut Member, &mut T)| member.run(way, own, &before, &after);
+        let work = |own: &mut T, member: &mut Member| member.run(way, own, &before, &after);
         let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
-        spread(&self.pools, jobs, &work, &meanwhile);
+        let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
+        self.spread(&mut tasks, &work, &meanwhile)?;
         Ok(chosen.into_iter().filter(|&world| self.members[world].error().is_some()).collect())
+    }
+
+    /// Does something with some worlds between two steps, each with a value of its own, on the threads of the batch.
+    ///
+    /// ```
+    /// use drystone::batch::{Batch, Measure};
+    /// use drystone::{Scene, SolverConfig};
+    ///
+    /// let mut batch = Batch::of(&Scene::find("pile", &["n=8".into()])?, &SolverConfig::default(), 3)?;
+    /// let mut overlaps = [0.0; 3];
+    /// let tasks = overlaps.iter_mut().enumerate().collect();
+    /// batch.each(tasks, |overlap, member| **overlap = member.measure([Measure::OverlapMax])[0])?;
+    /// assert!(overlaps.iter().all(|overlap| *overlap == overlaps[0]));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn each<T: Send>(
+        &mut self,
+        mut tasks: Vec<(usize, T)>,
+        work: impl Fn(&mut T, &mut Member) + Sync,
+    ) -> Result<()> {
+        self.spread(&mut tasks, &work, &|| {})
+    }
+
+    /// Spreads work on worlds over the threads.
+    fn spread<T: Send>(
+        &mut self,
+        tasks: &mut [(usize, T)],
+        work: &(impl Fn(&mut T, &mut Member) + Sync),
+        meanwhile: &dyn Fn(),
+    ) -> Result<()> {
+        self.check(tasks.iter().map(|task| task.0))?;
+        let mut named = tasks.iter_mut().peekable();
+        let of_task = |(k, member)| named.next_if(|task| task.0 == k).map(|task| (&mut task.1, member));
+        let jobs = self.members.iter_mut().enumerate().filter_map(of_task).collect();
+        spread(&self.pools, jobs, &|(own, member): (&mut T, &mut Member)| work(own, member), meanwhile);
+        Ok(())
     }
 
     /// Lets worlds begin again: each has the bits of one that never ran.

@@ -4,6 +4,7 @@ use crate::backend::cpu::Cpu;
 use crate::config::check_step_length;
 use crate::error::{Error, Result, input};
 use crate::simulation::{Simulation, Snapshot};
+use crate::world::World;
 
 /// The state of a world of a [`Batch`](super::Batch) between two steps, with its time and steps.
 ///
@@ -42,6 +43,11 @@ impl State {
     /// Time since the start (s).
     pub fn time(&self) -> f64 {
         self.time
+    }
+
+    /// The bodies and joints.
+    pub fn world(&self) -> &World {
+        self.simulation.world()
     }
 
     /// [`Simulation::hash`] of the state.

@@ -33,6 +33,11 @@ pub struct Snapshot {
 crate::saved::cloned!(Snapshot { world, config, stages });
 
 impl Snapshot {
+    /// The world of the state.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
     /// [`Simulation::hash`] of the state.
     pub fn hash(&self) -> u64 {
         super::hashes(&self.world.bodies).0

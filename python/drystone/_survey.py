@@ -1,0 +1,3 @@
+class NotTheSame(Exception): pass
+class Rows: pass
+def survey(): pass
