@@ -69,6 +69,9 @@ class WorldError(RuntimeError):
         more = f" (and {len(worlds) - 1} more)" if len(worlds) > 1 else ""
         super().__init__(f"world {worlds[0]}: {messages[0]}{more}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return WorldError, (self.worlds, self.messages), {"records": self.records}
+
 
 def wxyz(rotation: ArrayLike) -> NDArray[Any]:
     """Rotations x y z w in the order w x y z.
