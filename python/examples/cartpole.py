@@ -14,7 +14,7 @@ import numpy as np
 
 from drystone.gym import VectorEnv, cart_pole
 
-DIRECTIONS, BEST, SPREAD, STEP, GENERATIONS, MOST = 32, 8, 0.1, 0.5, 15, 500
+DIRECTIONS, BEST, SPREAD, STEP, GENERATIONS, MOST = 32, 8, 0.03, 0.05, 12, 500
 # Roughly the size of each observation, so that all count alike.
 SCALE = np.array([1.0, 1.0, 0.1, 0.5])
 
