@@ -1,7 +1,7 @@
 //! One world of a batch.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use super::State;
 use crate::backend::cpu::Cpu;
@@ -117,39 +117,71 @@ impl Member {
         self.stats = StepStats::default();
     }
 
-    /// Goes through the steps; see [`Batch::run`](super::Batch::run).
-    pub(super) fn run<T>(
-        &mut self,
-        way: Way,
-        own: &mut T,
-        before: &impl Fn(&T, u64, &mut World) -> Result<()>,
-        after: &impl Fn(&mut T, u64, &Self),
-    ) {
+    /// Begins a run: a step that fails goes back to where it began.
+    pub(super) fn begin_run(&mut self) {
         self.error = None;
         self.keep();
-        for step in 0..way.steps {
-            if way.is_over.load(Ordering::Relaxed) {
-                break;
-            }
-            if let Err(error) = self.step(way.dt, |world| before(own, step, world)) {
-                self.go_back(step, way.dt, |step, world| before(own, step, world));
-                self.error = Some(error.to_string());
-                break;
-            }
-            after(own, step, self);
-        }
     }
 
-    fn step(&mut self, dt: Option<f32>, before: impl FnOnce(&mut World) -> Result<()>) -> Result<()> {
+    /// Assembles a step; false if nothing moves in it.
+    pub(super) fn begin_step(
+        &mut self,
+        dt: Option<f32>,
+        before: impl FnOnce(&mut World) -> Result<()>,
+    ) -> Result<bool> {
         let (dt, simulation) = (dt.unwrap_or(self.dt), &mut self.simulation);
-        let ran = panics::caught(|| before(&mut simulation.world).and_then(|()| simulation.step(dt)));
-        self.stats = ran.unwrap_or_else(|panic| Err(Error::Panicked(panic.text)))?;
+        let mut stats = StepStats::default();
+        let begun = guarded(|| before(&mut simulation.world).and_then(|()| simulation.begin_step(dt, &mut stats)))?;
+        self.stats = stats;
+        Ok(begun)
+    }
+
+    /// Runs what is assembled, unless it ran, and stores it.
+    pub(super) fn end_step(&mut self, dt: Option<f32>, ran: bool) -> Result<()> {
+        let Self { simulation, stats, .. } = self;
+        let length = dt.unwrap_or(self.dt);
+        guarded(|| {
+            if ran {
+                simulation.store_step(length, stats);
+                return Ok(());
+            }
+            simulation.end_step(length, stats)
+        })?;
+        self.note_step(dt)
+    }
+
+    /// Counts a step that is done.
+    ///
+    /// # Errors
+    /// It left numbers that are none.
+    pub(super) fn note_step(&mut self, dt: Option<f32>) -> Result<()> {
         if let Some(body) = self.stats.first_non_finite {
             return Err(input!("{}: is no longer finite after a step", self.simulation.world.name_of(body)));
         }
         self.steps += 1;
-        self.time += f64::from(dt);
+        self.time += f64::from(dt.unwrap_or(self.dt));
         Ok(())
+    }
+
+    /// Goes back to before the step that failed, and says why it did.
+    pub(super) fn fail(
+        &mut self,
+        error: Error,
+        steps: u64,
+        dt: Option<f32>,
+        before: impl Fn(u64, &mut World) -> Result<()>,
+    ) {
+        // A panic may have left the backend half done.
+        self.simulation.set_backend(Box::new(Cpu::new()));
+        self.simulation.restore(&self.before.simulation);
+        (self.dt, self.steps, self.time) = (self.before.dt, self.before.steps, self.before.time);
+        // Through the same steps again: after one that failed, contacts are not as they were.
+        for step in 0..steps {
+            let begun = self.begin_step(dt, |world| before(step, world));
+            let again = begun.and_then(|begun| if begun { self.end_step(dt, false) } else { self.note_step(dt) });
+            debug_assert!(again.is_ok(), "{again:?}");
+        }
+        self.error = Some(error.to_string());
     }
 
     /// Keeps the state of now.
@@ -157,16 +189,9 @@ impl Member {
         self.simulation.snapshot_into(&mut self.before.simulation);
         (self.before.dt, self.before.steps, self.before.time) = (self.dt, self.steps, self.time);
     }
+}
 
-    /// Goes through the first steps again from the state that was kept: after a step that failed, contacts are not as they were.
-    fn go_back(&mut self, steps: u64, dt: Option<f32>, before: impl Fn(u64, &mut World) -> Result<()>) {
-        // A panic may have left the backend half done.
-        self.simulation.set_backend(Box::new(Cpu::new()));
-        self.simulation.restore(&self.before.simulation);
-        (self.dt, self.steps, self.time) = (self.before.dt, self.before.steps, self.before.time);
-        for step in 0..steps {
-            let again = self.step(dt, |world| before(step, world));
-            debug_assert!(again.is_ok(), "{again:?}");
-        }
-    }
+/// A step that may panic.
+fn guarded<R>(step: impl FnOnce() -> Result<R>) -> Result<R> {
+    panics::caught(step).unwrap_or_else(|panic| Err(Error::Panicked(panic.text)))
 }

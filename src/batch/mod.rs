@@ -24,13 +24,14 @@
 
 mod column;
 mod contacts;
+mod group;
 mod measure;
 mod member;
 mod state;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use rayon::prelude::*;
@@ -43,6 +44,7 @@ use crate::world::World;
 
 pub use column::{Column, DriveOf, drives, write};
 pub use contacts::{Contacts, EventRow};
+use group::Group;
 pub use measure::Measure;
 pub use member::Member;
 use member::Way;
@@ -58,6 +60,8 @@ pub struct Batch {
     /// threads.
     pools: Vec<ThreadPool>,
     threads: usize,
+    /// Memory for worlds that go side by side.
+    groups: Mutex<Vec<Group>>,
 }
 
 /// How far [`Batch::run`] goes.
@@ -94,7 +98,7 @@ impl Batch {
     /// # Errors
     /// No world; a scene or settings that [`Simulation::new`](crate::Simulation::new) refuses; a scene whose bodies come or leave by themselves.
     pub fn new<'a>(worlds: impl IntoIterator<Item = (&'a Scene, &'a SolverConfig)>) -> Result<Self> {
-        let member = |(k, (scene, config))| Member::new(scene, config).map_err(|error| named(k, error));
+        let member = |(k, (scene, config))| Member::new(scene, config).map_err(|error| of_world(k, error));
         Self::of_members(worlds.into_iter().enumerate().map(member).collect::<Result<_>>()?)
     }
 
@@ -119,7 +123,7 @@ impl Batch {
 
     fn of_members(members: Vec<Member>) -> Result<Self> {
         ensure(!members.is_empty(), || "a batch of 0 worlds: must be at least one".to_owned())?;
-        Self { members, pools: Vec::new(), threads: 0 }.on_threads(0)
+        Self { members, pools: Vec::new(), threads: 0, groups: Mutex::default() }.on_threads(0)
     }
 
     /// The same worlds on so many threads, 0 for as many as the pool of the caller has. No result depends on it.
@@ -189,7 +193,7 @@ impl Batch {
     /// Moves some worlds, each with a value of its own: before each step `before` may change the world, and after it `after` may look at it.
     /// Both are told the step, from 0 on. Returns the worlds that failed, ascending.
     ///
-    /// A world goes through all its steps on one thread and waits for no other world. Where a step fails, `before` is called again for the steps
+    /// Up to sixteen worlds go side by side on one thread, and wait for no other world. Where a step fails, `before` is called again for the steps
     /// that go before it, and has to do the same again.
     ///
     /// ```
@@ -223,10 +227,19 @@ impl Batch {
     ) -> Result<Vec<usize>> {
         let is_over = AtomicBool::new(false);
         let way = Way { steps: run.steps, dt: run.dt, is_over: &is_over };
-        let work = |own: &mut T, member: &mut Member| member.run(way, own, &before, &after);
         let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
         let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
-        self.spread(&mut tasks, &work, &meanwhile)?;
+        self.check(chosen.iter().copied())?;
+        // As many worlds beside each other as fill the lanes, and at least one for each thread.
+        let each = chosen.len().div_ceil(self.threads).clamp(1, group::WORLDS);
+        let Self { members, pools, groups, .. } = self;
+        let mut jobs = named(members, &mut tasks);
+        let work = |jobs: &mut [(&mut T, &mut Member)]| {
+            let mut group = lock(groups).pop().unwrap_or_default();
+            group::run(jobs, way, &before, &after, &mut group);
+            lock(groups).push(group);
+        };
+        spread(pools, jobs.chunks_mut(each).collect(), &work, &meanwhile);
         Ok(chosen.into_iter().filter(|&world| self.members[world].error().is_some()).collect())
     }
 
@@ -251,21 +264,9 @@ impl Batch {
         mut tasks: Vec<(usize, T)>,
         work: impl Fn(&mut T, &mut Member) + Sync,
     ) -> Result<()> {
-        self.spread(&mut tasks, &work, &|| {})
-    }
-
-    /// Spreads work on worlds over the threads.
-    fn spread<T: Send>(
-        &mut self,
-        tasks: &mut [(usize, T)],
-        work: &(impl Fn(&mut T, &mut Member) + Sync),
-        meanwhile: &dyn Fn(),
-    ) -> Result<()> {
         self.check(tasks.iter().map(|task| task.0))?;
-        let mut named = tasks.iter_mut().peekable();
-        let of_task = |(k, member)| named.next_if(|task| task.0 == k).map(|task| (&mut task.1, member));
-        let jobs = self.members.iter_mut().enumerate().filter_map(of_task).collect();
-        spread(&self.pools, jobs, &|(own, member): (&mut T, &mut Member)| work(own, member), meanwhile);
+        let jobs = named(&mut self.members, &mut tasks);
+        spread(&self.pools, jobs, &|(own, member): (&mut T, &mut Member)| work(own, member), &|| {});
         Ok(())
     }
 
@@ -337,7 +338,7 @@ fn spread<J: Send>(pools: &[ThreadPool], jobs: Vec<J>, work: &(impl Fn(J) + Sync
         });
     }
     let jobs = Mutex::new(jobs.into_iter());
-    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let next = || lock(&jobs).next();
     let drain = || {
         while let Some(job) = next() {
             work(job);
@@ -362,8 +363,19 @@ fn on_each(pools: &[ThreadPool], is_running: Sender<()>, drain: &(dyn Fn() + Syn
     });
 }
 
+/// The worlds that tasks name, each with its task.
+fn named<'a, T>(members: &'a mut [Member], tasks: &'a mut [(usize, T)]) -> Vec<(&'a mut T, &'a mut Member)> {
+    let mut tasks = tasks.iter_mut().peekable();
+    let of_task = |(k, member)| tasks.next_if(|task| task.0 == k).map(|task| (&mut task.1, member));
+    members.iter_mut().enumerate().filter_map(of_task).collect()
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// An error of a world.
-fn named(world: usize, error: crate::Error) -> crate::Error {
+fn of_world(world: usize, error: crate::Error) -> crate::Error {
     match error {
         crate::Error::Input(line) => input!("world {world}: {line}"),
         other => other,

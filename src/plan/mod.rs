@@ -120,7 +120,7 @@ impl PlanKey {
 }
 
 /// Whether any axis is a limit or a drive.
-fn has_swept_axes(problem: &StepProblem) -> bool {
+pub(crate) fn has_swept_axes(problem: &StepProblem) -> bool {
     problem.axes.iter().any(|axis| !axis.is_lock())
 }
 

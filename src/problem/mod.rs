@@ -9,6 +9,7 @@ mod check;
 mod check_systems;
 mod contacts;
 pub mod effective;
+pub(crate) mod join;
 mod joint_loads;
 mod joint_sets;
 mod joint_systems;
