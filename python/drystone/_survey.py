@@ -31,7 +31,9 @@ ENGINES = ("auto", "here", "processes", "ray")
 
 # A task of a survey takes about so many seconds: of a shorter one the overhead counts, and of a longer one more is lost with a worker.
 TASK_SECONDS = 1.0
-MOST_RUNS_A_TASK = 256
+MOST_RUNS_A_TASK = 4096
+# And so much longer for each task that runs at the same time, because the driver takes 2 ms a task (docs/cluster.md).
+SECONDS_A_TASK = 0.005
 # Tasks for each worker at the same time: one that runs and one that waits.
 TASKS_A_WORKER = 2
 # How often a run may end its worker.
@@ -307,7 +309,8 @@ class _Survey:
                 self.progress.tell(len(self.store.have))
 
     def _next(self, todo: deque[int], mean: float, room: int) -> Task:
-        size = self.chunk or min(MOST_RUNS_A_TASK, max(1, round(TASK_SECONDS / mean)) if mean else 1)
+        wanted = max(TASK_SECONDS, SECONDS_A_TASK * room)
+        size = self.chunk or min(MOST_RUNS_A_TASK, max(1, round(wanted / mean)) if mean else 1)
         if self.chunk is None:
             # At the end each worker has something left to do.
             size = max(1, min(size, len(todo) // max(1, room)))
@@ -464,6 +467,8 @@ class _Ray:
             raise ValueError("engine = 'ray': Ray is not installed; pip install 'drystone[ray]'") from None
         self.running: dict[Any, int] = {}
         self.count = 0
+        # Nodes come and go, and to ask for them takes as long as a task.
+        self.processors, self.asked = 1, -1.0
 
     def __enter__(self) -> _Ray:
         if not self.ray.is_initialized():
@@ -477,7 +482,10 @@ class _Ray:
 
     @property
     def room(self) -> int:
-        return TASKS_A_WORKER * max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+        if time.monotonic() > self.asked + 1:
+            self.processors = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+            self.asked = time.monotonic()
+        return TASKS_A_WORKER * self.processors
 
     @property
     def has_others(self) -> bool:
