@@ -4,7 +4,8 @@ use std::cell::Cell;
 
 use drystone::batch::{Batch, Column, Measure, Run, State, drives, write};
 use drystone::glam::Vec3;
-use drystone::{Cpu, Joint, Listen, Scene, Simulation, SolverConfig, World};
+use drystone::scenes::CATALOGUE;
+use drystone::{BodyKind, Cpu, Joint, Listen, Scene, Simulation, SolverConfig, World};
 
 const SCENES: [(&str, &[&str]); 5] = [
     ("tower", &["n=5"]),
@@ -73,6 +74,65 @@ fn a_world_has_the_bits_of_the_world_alone() {
             assert_eq!((batch.world(k).steps(), batch.threads()), (60, threads));
         }
     }
+}
+
+/// Sixteen worlds whose steps run as one, in other states each: every scene of the catalogue that is small enough, with torques and listeners in some.
+#[test]
+fn worlds_that_run_as_one_have_the_bits_of_each_alone() {
+    let listen = Listen { contacts: true, ..Listen::default() };
+    let disturb = |world: usize, step: u64, bodies: &mut World| {
+        let movable = bodies.bodies.iter().rposition(|body| body.kind == BodyKind::Dynamic);
+        let Some(body) = movable.filter(|_| step == 3 * world as u64) else { return };
+        let push = bodies.bodies[body].mass.mass * (0.2 + 0.05 * world as f32);
+        bodies.bodies[body].apply_impulse(Vec3::new(push, 0.5 * push, -0.3 * push));
+        if world % 5 == 4 {
+            bodies.bodies[body].torque = Vec3::new(0.0, push, 0.1 * push);
+        }
+    };
+    let mut tried = 0;
+    for entry in CATALOGUE {
+        let scene = entry.build(&[]).expect("a scene");
+        if scene.world.bodies.len() > 150 || !scene.spawners.is_empty() || !scene.leaving.is_empty() {
+            continue;
+        }
+        tried += 1;
+        let configs = [SolverConfig::default(), SolverConfig::default().without_sleep()];
+        let config = |world: usize| &configs[usize::from(world % 4 == 3)];
+        let mut batch = Batch::new((0..16).map(|world| (&scene, config(world)))).expect("worlds");
+        batch = batch.on_threads(1).expect("a thread");
+        let listens = |world: usize| world % 8 == 6;
+        for world in (0..16).filter(|&world| listens(world)) {
+            batch.world_mut(world).simulation_mut().listen(listen).expect("a listener");
+        }
+        let tasks = (0..16).map(|world| (world, (world, Vec::new()))).collect();
+        let seen = std::sync::Mutex::new(vec![Vec::new(); 16]);
+        let before = |own: &(usize, Vec<u64>), step, bodies: &mut World| {
+            disturb(own.0, step, bodies);
+            Ok(())
+        };
+        let run = Run { steps: 60, ..Run::default() };
+        let failed = batch.run(run, tasks, before, |(world, hashes), step, member| {
+            hashes.push(member.hash());
+            if step == 59 {
+                seen.lock().expect("no panic")[*world] = std::mem::take(hashes);
+            }
+        });
+        assert!(failed.expect("worlds").is_empty());
+        let seen = seen.into_inner().expect("no panic");
+        for (world, hashes) in seen.iter().enumerate() {
+            let mut one =
+                Simulation::new(scene.world.clone(), config(world).clone(), Box::new(Cpu::new())).expect("one");
+            if listens(world) {
+                one.listen(listen).expect("a listener");
+            }
+            for (step, hash) in hashes.iter().enumerate() {
+                disturb(world, step as u64, &mut one.world);
+                one.step(scene.dt).expect("a step");
+                assert_eq!(one.hash(), *hash, "{}, world {world}, step {step}", entry.name);
+            }
+        }
+    }
+    assert!(tried > 20, "{tried} scenes");
 }
 
 /// Teleports, and bodies taken out and put in again, did not give the bits of a fresh world.
