@@ -16,7 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::columns::{Inputs, Named, Outputs, Record, RecordArray, parts};
+use crate::columns::{InputParts, Inputs, Named, OutputParts, Outputs, Record, RecordArray, parts};
 use crate::raised;
 use crate::scene::{Config, Scene};
 
@@ -64,8 +64,8 @@ pub struct Batch(Mutex<drystone::batch::Batch>);
 
 /// What a world has while it runs.
 struct Task<'a> {
-    inputs: Vec<(Column, &'a [f32])>,
-    outputs: Vec<(Column, &'a mut [f32])>,
+    inputs: InputParts<'a>,
+    outputs: OutputParts<'a>,
     /// Numbers of all drives for each step, or for all steps.
     ctrl: Option<&'a [f32]>,
     records: Vec<Record<'a>>,
@@ -73,6 +73,8 @@ struct Task<'a> {
 
 /// Indices of worlds, and arrays of another kind of numbers.
 type Worlds<'py> = PyReadonlyArray1<'py, i64>;
+/// World, kind, bodies (-1 for none) and value.
+type Event = (u32, &'static str, i64, i64, f32);
 /// Bodies, normals, impulses, and where the contacts of worlds and the points of contacts begin.
 type ContactArrays<'py> = (
     Bound<'py, PyArray1<u32>>,
@@ -126,8 +128,8 @@ impl Batch {
     fn listen(&self, contacts: bool, impulses: bool, hits_above: Option<f32>) -> PyResult<()> {
         let listen = Listen { contacts, impulses, hits_above };
         let mut batch = self.lock();
-        let worlds = batch.worlds_mut().iter_mut();
-        worlds.map(|world| world.simulation_mut().listen(listen)).collect::<Outcome<()>>().map_err(raised)
+        let mut worlds = batch.worlds_mut().iter_mut();
+        worlds.try_for_each(|world| world.simulation_mut().listen(listen)).map_err(raised)
     }
 
     /// Steps worlds; returns those that failed and why.
@@ -329,7 +331,7 @@ impl Batch {
     }
 
     /// World, kind, bodies (-1 for none) and value of what happened in the last step.
-    fn events(&self, worlds: Worlds<'_>) -> PyResult<Vec<(u32, &'static str, i64, i64, f32)>> {
+    fn events(&self, worlds: Worlds<'_>) -> PyResult<Vec<Event>> {
         let all = self.lock().events(&indices(&worlds)?).map_err(raised)?;
         let body = |body: Option<u32>| body.map_or(-1, i64::from);
         Ok(all.into_iter().map(|event| (event.world, event.kind, body(event.a), body(event.b), event.value)).collect())

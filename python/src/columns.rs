@@ -9,6 +9,11 @@ use crate::raised;
 /// An array of single precision with a row of numbers for each world.
 pub type Named<'py> = (String, Bound<'py, PyArrayDyn<f32>>);
 
+/// The numbers of a world in each column.
+pub type InputParts<'a> = Vec<(Column, &'a [f32])>;
+/// Places for them.
+pub type OutputParts<'a> = Vec<(Column, &'a mut [f32])>;
+
 /// Columns that are read while threads step worlds.
 pub struct Inputs<'py>(Vec<(Column, PyReadonlyArrayDyn<'py, f32>)>);
 
@@ -19,7 +24,7 @@ impl<'py> Inputs<'py> {
     }
 
     /// The columns, each with the numbers of every world that was chosen.
-    pub fn cut(&self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<Vec<(Column, &[f32])>>> {
+    pub fn cut(&self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<InputParts<'_>>> {
         let mut all: Vec<Vec<_>> = chosen.iter().map(|_| Vec::with_capacity(self.0.len())).collect();
         for (column, array) in &self.0 {
             let numbers = array.as_slice()?;
@@ -42,7 +47,7 @@ impl<'py> Outputs<'py> {
     }
 
     /// The columns, each with the place for every world that was chosen.
-    pub fn cut(&mut self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<Vec<(Column, &mut [f32])>>> {
+    pub fn cut(&mut self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<OutputParts<'_>>> {
         let mut all: Vec<Vec<_>> = chosen.iter().map(|_| Vec::with_capacity(self.0.len())).collect();
         for (column, array) in &mut self.0 {
             let parts = parts(array.as_slice_mut()?, worlds).into_iter().enumerate();

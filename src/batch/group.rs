@@ -3,9 +3,9 @@
 use std::sync::atomic::Ordering;
 
 use super::member::{Member, Way};
-use crate::backend::Backend;
-use crate::backend::CheckedStep;
 use crate::backend::cpu::Cpu;
+use crate::backend::{Backend, CheckedStep};
+use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::panics;
 use crate::plan::{PlanKey, StepPlan};
@@ -25,9 +25,11 @@ pub(super) struct Group {
     backend: Cpu,
     problem: StepProblem,
     plan: StepPlan,
-    /// What the plan was made for.
-    key: Option<(PlanKey, Alike, crate::config::SolverConfig)>,
+    key: Option<MadeFor>,
 }
+
+/// What a plan was made for.
+type MadeFor = (PlanKey, Alike, SolverConfig);
 
 /// Where a world is in a step.
 #[derive(Clone, Copy, PartialEq)]
@@ -115,17 +117,11 @@ impl Group {
         }
     }
 
-    fn run_as_one(
-        &mut self,
-        problems: &mut [&mut StepProblem],
-        config: &crate::config::SolverConfig,
-        kind: Alike,
-    ) -> Result<()> {
+    fn run_as_one(&mut self, problems: &mut [&mut StepProblem], config: &SolverConfig, kind: Alike) -> Result<()> {
         let Self { backend, problem, plan, key } = self;
         join(problems, problem);
-        let is_of = |(of_plan, of_kind, of_config): &(PlanKey, Alike, crate::config::SolverConfig)| {
-            *of_kind == kind && of_config == config && of_plan.is_of(problem)
-        };
+        let is_of =
+            |(of_plan, of_kind, of_config): &MadeFor| *of_kind == kind && of_config == config && of_plan.is_of(problem);
         if !key.as_ref().is_some_and(is_of) {
             *plan = StepPlan::with_summary(config, problem, &ContactSummary::of(problem));
             *key = Some((PlanKey::of(problem), kind, config.clone()));

@@ -6,8 +6,9 @@
 
 use std::ops::Range;
 
-use super::{Block, ContactRow, JointRow, Params, StepProblem, TurningRow};
-use super::{BlockRow, InertiaRow, JointSystems, NodeRow};
+use super::{
+    Block, BlockRow, ContactRow, InertiaRow, JointRow, JointSystems, NodeRow, Params, StepProblem, Substep, TurningRow,
+};
 use crate::config::{Method, SolverConfig};
 use crate::plan::has_swept_axes;
 
@@ -57,7 +58,7 @@ impl Alike {
 #[derive(Clone, Copy, PartialEq)]
 struct BlockKind {
     substeps: u32,
-    substep: super::Substep,
+    substep: Substep,
     isotropic: bool,
     has_contacts: bool,
     has_joints: bool,
