@@ -101,9 +101,12 @@ impl Column {
 /// A drive of a joint: the joint, and which of its axes, those to shift along (or the distance) before those to turn about.
 ///
 /// ```
+/// use drystone::batch::{Column, DriveOf, drives};
+///
 /// let scene = drystone::Scene::find("drawbridge", &[])?;
-/// let names: Vec<String> = drystone::batch::drives(&scene.world).map(|drive| drive.name).collect();
-/// assert_eq!(names, ["joint 1: deck - tower", "joint 2: deck - tower"]);
+/// let all: Vec<DriveOf> = drives(&scene.world).collect();
+/// assert_eq!((all[0].name.as_str(), all[1].name.as_str()), ("joint 1: deck - tower", "joint 2: deck - tower"));
+/// assert_eq!((Column::Control.rows(&scene.world), Column::Control.width()), (2, 1));
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -75,6 +75,20 @@ fn order(contact: &Contact) -> impl Ord + use<> {
 }
 
 /// Something that happened in a step: an [`Event`] with the indices of its bodies.
+///
+/// ```
+/// use drystone::batch::{Batch, EventRow};
+/// use drystone::{Listen, Scene, SolverConfig};
+///
+/// let mut batch = Batch::of(&Scene::find("tower", &["n=1".into()])?, &SolverConfig::default(), 2)?;
+/// for world in batch.worlds_mut() {
+///     world.simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
+/// }
+/// batch.step(1, &[0, 1])?;
+/// let began = |world| EventRow { world, kind: "began", a: Some(0), b: Some(1), value: 0.0 };
+/// assert_eq!(batch.events(&[0, 1])?, [began(0), began(1)]);
+/// # Ok::<(), drystone::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventRow {
     /// The world.

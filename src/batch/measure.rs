@@ -16,6 +16,9 @@ use crate::names::named;
 /// batch.step(60, &[0])?;
 /// let [overlap, contacts] = batch.world(0).measure([Measure::OverlapMax, Measure::Contacts]);
 /// assert!(overlap < 1e-3 && contacts == 10.0, "{overlap} m, {contacts}");
+/// let mut values = [0.0; 2];
+/// batch.world(0).measure_into(&[Measure::Finite, Measure::JointGap], &mut values);
+/// assert_eq!(values, [1.0, 0.0]);
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

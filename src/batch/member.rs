@@ -14,6 +14,28 @@ use crate::stats::StepStats;
 use crate::world::World;
 
 /// A world of a [`Batch`](super::Batch).
+///
+/// ```
+/// use drystone::batch::{Batch, Member, State};
+/// use drystone::{Scene, SolverConfig, glam::Vec3};
+///
+/// let scene = Scene::find("tower", &["n=2".into()])?;
+/// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?.on_threads(1)?;
+/// batch.world_mut(0).simulation_mut().world.bodies[1].force = Vec3::X * 50.0;
+/// batch.worlds_mut()[1].simulation_mut().world.bodies[1].force.x = f32::NAN;
+/// assert_eq!((batch.step(6, &[0, 1])?, batch.threads()), (vec![1], 1));
+/// let member: &Member = batch.world(0);
+/// assert_eq!((member.dt(), member.steps(), member.time() as f32), (scene.dt, 6, 0.1));
+/// assert!(member.error().is_none() && member.stats().manifolds == 2);
+/// assert_eq!(member.hash(), member.simulation().hash());
+/// let state: State = member.state();
+/// assert_eq!((state.time(), state.to_simulation().hash()), (member.time(), member.hash()));
+/// // The other one stopped before its first step, and says why.
+/// let failed = batch.world(1);
+/// assert!(failed.steps() == 0 && failed.error().is_some_and(|line| line.contains("force")));
+/// assert_eq!(failed.start().hash(), failed.hash());
+/// # Ok::<(), drystone::Error>(())
+/// ```
 pub struct Member {
     simulation: Simulation,
     dt: f32,

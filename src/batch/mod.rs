@@ -5,8 +5,8 @@
 //! before the step that failed; the others finish.
 //!
 //! ```
-//! use drystone::batch::{Batch, Run};
-//! use drystone::{Scene, SolverConfig};
+//! use drystone::batch::Batch;
+//! use drystone::{Listen, Scene, SolverConfig};
 //!
 //! let scene = Scene::find("tower", &["n=3".into()])?;
 //! let mut batch = Batch::of(&scene, &SolverConfig::default(), 4)?;
@@ -19,6 +19,12 @@
 //! batch.step(5, &[0, 1])?;
 //! assert_eq!(batch.world(0).hash(), batch.world(1).hash());
 //! assert_eq!(batch.world(2).hash(), batch.world(3).hash());
+//! // Single worlds may be changed and listened to, and begin from states.
+//! let mut again = Batch::of_states([state])?.on_threads(1)?;
+//! again.world_mut(0).simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
+//! again.worlds_mut()[0].simulation_mut().world.gravity.x = 0.1;
+//! again.step(1, &[0])?;
+//! assert_eq!((again.threads(), again.events(&[0])?.len(), again.contacts(&[0])?.bodies.len()), (1, 3, 3));
 //! # Ok::<(), drystone::Error>(())
 //! ```
 

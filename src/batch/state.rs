@@ -14,7 +14,9 @@ use crate::world::World;
 ///
 /// let mut batch = Batch::of(&Scene::find("tower", &[])?, &SolverConfig::default(), 1)?;
 /// batch.step(7, &[0])?;
-/// let bytes: Vec<u8> = batch.world(0).state().save();
+/// let state = batch.world(0).state();
+/// assert_eq!((state.time(), state.to_simulation().hash()), (batch.world(0).time(), state.hash()));
+/// let bytes: Vec<u8> = state.save();
 /// let mut again = Batch::of_states([State::load(&bytes)?])?;
 /// batch.step(7, &[0])?;
 /// again.step(7, &[0])?;

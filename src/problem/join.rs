@@ -10,7 +10,6 @@ use super::{
     Block, BlockRow, ContactRow, InertiaRow, JointRow, JointSystems, NodeRow, Params, StepProblem, Substep, TurningRow,
 };
 use crate::config::{Method, SolverConfig};
-use crate::plan::has_swept_axes;
 
 /// What the rules of a plan follow from, besides the settings, in all blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +47,7 @@ impl Alike {
             totals: !problem.totals.is_empty(),
             joint_totals: !problem.joint_totals.is_empty(),
             axes: !problem.axes.is_empty(),
-            swept_axes: has_swept_axes(problem),
+            swept_axes: problem.has_swept_axes(),
             params: Params { body_count: 0, point_count: 0, joint_count: 0, axis_count: 0, ..problem.params },
         })
     }

@@ -248,6 +248,11 @@ impl StepProblem {
         self.params.patches != 0
     }
 
+    /// Whether any axis is a limit or a drive.
+    pub(crate) fn has_swept_axes(&self) -> bool {
+        self.axes.iter().any(|axis| !axis.is_lock())
+    }
+
     /// The impulse of a joint on its body b, of the rows `joint_impulses` or `joint_totals`.
     pub(crate) fn joint_impulse(&self, impulses: &[JointImpulseRow], joint: usize) -> Vec3 {
         Vec3::from(impulses[joint].linear) + self.axis_impulse(impulses, joint, true)
