@@ -22,6 +22,7 @@
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
 //! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
+//! | step many worlds, each by itself | [`batch::Batch`] |
 //! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
@@ -42,6 +43,7 @@
 #![warn(missing_docs)]
 
 pub mod backend;
+pub mod batch;
 mod collide;
 mod compare;
 pub mod config;

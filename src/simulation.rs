@@ -303,7 +303,7 @@ impl Simulation {
     }
 
     /// Assembles a step; false if there is nothing to do in it.
-    fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
+    pub(crate) fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         self.stages.events.all.clear();
         check_step_length(dt)?;
         if self.is_pending {
@@ -358,7 +358,7 @@ impl Simulation {
     }
 
     /// Runs and stores what is assembled.
-    fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
+    pub(crate) fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         loop {
             let (step, carry) = assembled(&mut self.stages);
             let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
@@ -386,7 +386,7 @@ impl Simulation {
     }
 
     /// Stores what ran.
-    fn store_step(&mut self, dt: f32, stats: &mut StepStats) {
+    pub(crate) fn store_step(&mut self, dt: f32, stats: &mut StepStats) {
         let stages = &mut self.stages;
         self.on_device = self.backend.keeps_rows();
         stats.traffic = self.backend.traffic();
@@ -594,6 +594,11 @@ impl Simulation {
     /// The last step's problem, with the impulses that solved it.
     pub fn problem(&self) -> &StepProblem {
         &self.stages.problem
+    }
+
+    /// The step that is assembled, for others to run.
+    pub(crate) fn problem_mut(&mut self) -> &mut StepProblem {
+        &mut self.stages.problem
     }
 
     /// The last step's plan.

@@ -99,7 +99,7 @@ impl PlanKey {
             && self.totals != problem.totals.is_empty()
             && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
-            && self.swept_axes == has_swept_axes(problem)
+            && self.swept_axes == problem.has_swept_axes()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
@@ -114,14 +114,9 @@ impl PlanKey {
             isotropic,
             has_torques: !problem.torques.is_empty(),
             axes: !problem.axes.is_empty(),
-            swept_axes: has_swept_axes(problem),
+            swept_axes: problem.has_swept_axes(),
         }
     }
-}
-
-/// Whether any axis is a limit or a drive.
-fn has_swept_axes(problem: &StepProblem) -> bool {
-    problem.axes.iter().any(|axis| !axis.is_lock())
 }
 
 /// Whether the bodies of each block have equal moments of inertia.
@@ -197,7 +192,7 @@ impl StepPlan {
         let [bodies, inertias, systems, turning] =
             [bodies, inertias, systems, turning].map(|color| Some(color).filter(kept));
         let [bodies, inertias, systems, turning] = [&bodies, &inertias, &systems, &turning].map(Option::as_slice);
-        let has_swept_axes = has_swept_axes(problem);
+        let has_swept_axes = problem.has_swept_axes();
         // Momentum begins with the third sweep.
         let method = |count: u32| if count < 3 { Method::Plain } else { config.method };
         let sweeps = |count: u32| Sweeps {

@@ -9,6 +9,7 @@ mod check;
 mod check_systems;
 mod contacts;
 pub mod effective;
+pub(crate) mod join;
 mod joint_loads;
 mod joint_sets;
 mod joint_systems;
@@ -245,6 +246,11 @@ impl StepProblem {
     /// Whether a patch follows the points of every contact.
     pub fn has_patches(&self) -> bool {
         self.params.patches != 0
+    }
+
+    /// Whether any axis is a limit or a drive.
+    pub(crate) fn has_swept_axes(&self) -> bool {
+        self.axes.iter().any(|axis| !axis.is_lock())
     }
 
     /// The impulse of a joint on its body b, of the rows `joint_impulses` or `joint_totals`.

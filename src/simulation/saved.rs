@@ -32,6 +32,18 @@ pub struct Snapshot {
 
 crate::saved::cloned!(Snapshot { world, config, stages });
 
+impl Snapshot {
+    /// The world of the state.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// [`Simulation::hash`] of the state.
+    pub fn hash(&self) -> u64 {
+        super::hashes(&self.world.bodies).0
+    }
+}
+
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
 /// The version of the bytes that follow them. It grows with every change of what is saved.
@@ -57,7 +69,12 @@ impl Simulation {
     /// # Ok::<(), drystone::Error>(())
     /// ```
     pub fn fork(&self, backend: Box<dyn Backend>) -> Self {
-        let Snapshot { world, config, stages } = self.snapshot();
+        Self::of_snapshot(self.snapshot(), backend)
+    }
+
+    /// The simulation of a state.
+    pub(crate) fn of_snapshot(snapshot: Snapshot, backend: Box<dyn Backend>) -> Self {
+        let Snapshot { world, config, stages } = snapshot;
         Self::between_steps(world, config, *stages, backend)
     }
 

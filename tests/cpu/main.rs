@@ -25,6 +25,7 @@ mod laws_own;
 mod laws_properties;
 
 mod allocations;
+mod batch;
 mod changes;
 #[cfg(feature = "serde")]
 mod checked;

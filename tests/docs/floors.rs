@@ -13,7 +13,7 @@ const LIBRARY: &[&[&str]] = &[
     &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
     &["backend", "energy", "solver"],
     &["simulation"],
-    &["compare", "recording"],
+    &["batch", "compare", "recording"],
     &["conform"],
     &["stages"],
 ];

@@ -11,7 +11,8 @@ use std::path::Path;
 /// Kinds of files whose words are names; files without a kind are scripts.
 const KINDS: [&str; 10] = ["rs", "wgsl", "toml", "js", "mjs", "html", "py", "yml", "sh", ""];
 /// Folders that a build or a test fills, and those of other programs.
-const LEFT_OUT: [&str; 5] = [".git", "target", "node_modules", "dist", "findings"];
+const LEFT_OUT: [&str; 8] =
+    [".git", "target", "node_modules", "dist", "findings", ".venv", ".pytest_cache", ".mypy_cache"];
 /// Names of compilers, drivers, batch systems, browsers and other crates, names to fill in, and what a build makes.
 const OF_OTHERS: [&str; 16] = [
     "cmake",

@@ -28,6 +28,7 @@ mod words;
 
 pub use report::SurveyArgs;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
@@ -122,17 +123,17 @@ fn with_negative_numbers(command: clap::Command) -> clap::Command {
 }
 
 /// Parses the arguments; ends the process if they are invalid or ask for help.
-fn arguments() -> Cli {
+fn arguments(words: &[OsString]) -> Cli {
     let command = with_negative_numbers(Cli::command());
-    let parsed = command.clone().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let parsed = command.clone().try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.unwrap_or_else(|mut error| {
         let typed = match error.get(ContextKind::InvalidSubcommand) {
             Some(ContextValue::String(typed)) if error.kind() == Usage::InvalidSubcommand => typed.clone(),
             _ => error.exit(),
         };
         let mut place = &command;
-        for word in std::env::args().skip(1) {
-            place = place.find_subcommand(&word).unwrap_or(place);
+        for word in words.iter().skip(1) {
+            place = place.find_subcommand(word).unwrap_or(place);
         }
         if CATALOGUE.iter().any(|e| e.name == typed) {
             let meant = format!("did you mean `drystone run {typed}`?");
@@ -148,7 +149,12 @@ fn arguments() -> Cli {
 /// cannot be written; 3 for a missing adapter or too little memory; 128 and the number of the signal that stopped the command: 130 for Ctrl-C,
 /// 141 where nobody reads standard output any more.
 pub fn main() -> ExitCode {
-    let cli = arguments();
+    main_of(&std::env::args_os().collect::<Vec<_>>())
+}
+
+/// The same, with the words of a command line: the first is the name of the program.
+pub fn main_of(words: &[OsString]) -> ExitCode {
+    let cli = arguments(words);
     stop::guarded(|| cli.command.run())
 }
 

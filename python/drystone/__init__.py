@@ -1,0 +1,37 @@
+"""Many worlds of rigid bodies in contact, with the same bits on every machine.
+
+>>> import drystone as ds
+>>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+>>> batch.step(60)
+>>> batch.position.shape
+(2, 4, 3)
+>>> bool(batch.measure("overlap_max")["overlap_max"].max() < 1e-3)
+True
+"""
+
+from ._batch import Batch, Contacts, Hits, Snapshots, WorldError, wxyz
+from ._build import Body, Joint, World
+from ._drystone import InternalError
+from ._scene import Config, Parameter, Scene, SceneInfo, scenes
+from ._survey import NotTheSame, Rows, survey
+
+__all__ = [
+    "Batch",
+    "Body",
+    "Config",
+    "Contacts",
+    "Hits",
+    "InternalError",
+    "Joint",
+    "NotTheSame",
+    "Parameter",
+    "Rows",
+    "Scene",
+    "SceneInfo",
+    "Snapshots",
+    "World",
+    "WorldError",
+    "scenes",
+    "survey",
+    "wxyz",
+]

@@ -1,0 +1,848 @@
+"""Many worlds at once."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _check, _drystone
+from ._scene import Config, Scene
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Result = TypeVar("Result")
+
+# Name, and the numbers of a body or joint.
+VIEWS = {"position": 3, "rotation": 4, "linear_velocity": 3, "angular_velocity": 3}
+INPUTS = {"force": 3, "torque": 3, "gravity": 3, "ctrl": 1}
+ON_REQUEST = {
+    "friction": 1,
+    "restitution": 1,
+    "joint_position": 6,
+    "joint_speed": 6,
+    "joint_impulse": 3,
+    "joint_torque_impulse": 3,
+}
+COLUMNS = {**VIEWS, **INPUTS, **ON_REQUEST}
+MEASURES = (
+    "overlap_max",
+    "overlap_mean",
+    "overlap_95",
+    "joint_gap",
+    "kinetic_energy",
+    "potential_energy",
+    "momentum_x",
+    "momentum_y",
+    "momentum_z",
+    "angular_momentum_x",
+    "angular_momentum_y",
+    "angular_momentum_z",
+    "fastest",
+    "need",
+    "energy_taken",
+    "contacts",
+    "asleep",
+    "finite",
+)
+LISTEN = ("contacts", "impulses", "hits")
+EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
+
+
+class WorldError(RuntimeError):
+    """Some worlds failed; they are as before the step that failed, and all others are through.
+
+    `worlds` has their numbers and `messages` a line for each. After `rollout`, `records` has what was recorded: NaN where a world
+    did not come.
+    """
+
+    def __init__(self, worlds: NDArray[np.int64], messages: list[str]) -> None:
+        self.worlds = worlds
+        self.messages = messages
+        self.records: dict[str, NDArray[Any]] = {}
+        more = f" (and {len(worlds) - 1} more)" if len(worlds) > 1 else ""
+        super().__init__(f"world {worlds[0]}: {messages[0]}{more}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return WorldError, (self.worlds, self.messages), {"records": self.records}
+
+
+def wxyz(rotation: ArrayLike) -> NDArray[Any]:
+    """Rotations x y z w in the order w x y z.
+
+    >>> import drystone as ds
+    >>> ds.wxyz([0, 0, 0, 1]).tolist()
+    [1, 0, 0, 0]
+    """
+    return np.roll(np.asarray(rotation), 1, axis=-1)
+
+
+class Snapshots:
+    """States of some worlds, in memory. Pickled they are bytes.
+
+    >>> import drystone as ds, pickle
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+    >>> states = pickle.loads(pickle.dumps(batch.snapshot()))
+    >>> len(states), bool((states.hash == batch.hash()).all())
+    (2, True)
+    """
+
+    __slots__ = ("_states",)
+
+    def __init__(self, _states: list[_drystone.State]) -> None:
+        self._states = _states
+
+    @classmethod
+    def from_bytes(cls, states: Sequence[bytes]) -> Self:
+        """States that `Batch.save` or `to_bytes` made.
+
+        ValueError: bytes that are none of a world, of another version, damaged or cut short.
+        """
+        if isinstance(states, (bytes, bytearray)):
+            raise ValueError("states is bytes: must be a list of bytes, one a world")
+        return cls([_drystone.State.load(bytes(one)) for one in states])
+
+    def to_bytes(self) -> list[bytes]:
+        """The states as bytes, the same on every machine."""
+        return [state.save() for state in self._states]
+
+    @property
+    def hash(self) -> NDArray[np.uint64]:
+        """The hash of each state."""
+        return np.array([state.hash for state in self._states], np.uint64)
+
+    @property
+    def steps(self) -> NDArray[np.uint64]:
+        """The steps of each state since the start."""
+        return np.array([state.steps for state in self._states], np.uint64)
+
+    @property
+    def time(self) -> Doubles:
+        """The time of each state since the start (s)."""
+        return np.array([state.time for state in self._states], np.float64)
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    def __getitem__(self, index: int | slice) -> Snapshots:
+        return Snapshots(self._states[index] if isinstance(index, slice) else [self._states[index]])
+
+    def __iter__(self) -> Iterator[Snapshots]:
+        return (Snapshots([state]) for state in self._states)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Snapshots.from_bytes, (self.to_bytes(),)
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contacts of some worlds. Those of one world stand together, ascending by the pair of bodies, and so do the points of a contact.
+
+    `world_start` [w + 1], `bodies` [N, 2], `normal` [N, 3] from the first to the second, `impulse` [N, 3] on the second (N s, of the
+    whole step), `point_start` [N + 1], `point` [P, 3] (m), `separation` [P] (m), `point_impulse` [P] (N s). Impulses are zero
+    unless the batch listens to "impulses".
+    """
+
+    world_start: NDArray[np.uint32]
+    bodies: NDArray[np.uint32]
+    normal: Floats
+    impulse: Floats
+    point_start: NDArray[np.uint32]
+    point: Floats
+    separation: Floats
+    point_impulse: Floats
+
+    def of(self, k: int) -> Contacts:
+        """Those of the k-th world that was asked for.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
+        >>> batch.step()
+        >>> batch.contacts().of(1).bodies.tolist()
+        [[0, 1], [1, 2]]
+        """
+        if not 0 <= k < len(self.world_start) - 1:
+            raise ValueError(f"k = {k}: must be 0 to {len(self.world_start) - 2}")
+        first, end = (int(n) for n in self.world_start[k : k + 2])
+        points = slice(*(int(n) for n in self.point_start[[first, end]]))
+        begin = self.point_start[first]
+        return Contacts(
+            np.array([0, end - first], np.uint32),
+            self.bodies[first:end],
+            self.normal[first:end],
+            self.impulse[first:end],
+            self.point_start[first : end + 1] - begin,
+            self.point[points],
+            self.separation[points],
+            self.point_impulse[points],
+        )
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What rays hit first: `body` [w, R] (-1 for nothing), `distance` [w, R] (m; inf), `normal` [w, R, 3] (NaN)."""
+
+    body: NDArray[np.int64]
+    distance: Floats
+    normal: Floats
+
+
+class Batch:
+    """W worlds of up to B bodies, J joints and U actuators, each by itself.
+
+    `scene` and `config` are one for all or one a world; `num_threads` 0 takes all processors. `listen` names what steps tell:
+    "contacts" and "hits" for `events`, "impulses" for `contacts`.
+
+    The bits of a world depend on its scene, settings and inputs alone: not on W, its neighbors, the order of calls to others, threads or
+    machine. Worlds that a call does not name are not touched. After a fork a batch raises RuntimeError: its threads are gone.
+
+    `position` [W, B, 3], `rotation` [W, B, 4] (x y z w), `linear_velocity` and `angular_velocity` [W, B, 3] are views of what the last call left:
+    read-only, valid as long as anyone holds them; copy them to keep them. Rows that a world has no body for are NaN.
+
+    `force` and `torque` [W, B, 3], `ctrl` [W, U] and `gravity` [W, 3] are inputs: write to them. Each call that steps reads them when it begins; they
+    last until they change. A reset sets them as the scene has them.
+
+    ValueError: an argument that cannot be used.
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 4, config=ds.Config("fast"), num_threads=1)
+    >>> batch.force[2, 3] = (900, 0, 0)
+    >>> batch.step(10)
+    >>> [bool(h == batch.hash()[0]) for h in batch.hash()]
+    [True, True, False, True]
+    >>> batch.reset([2])
+    >>> int(batch.steps[2]), float(batch.force[2, 3, 0])
+    (0, 0.0)
+    """
+
+    def __init__(
+        self,
+        scene: Scene | Sequence[Scene],
+        num_worlds: int | None = None,
+        *,
+        config: Config | Sequence[Config] | None = None,
+        num_threads: int = 0,
+        listen: Collection[str] = (),
+        hits_above: float = 0.5,
+    ) -> None:
+        scenes = _one_or_many("scene", scene, Scene)
+        configs = _one_or_many("config", Config() if config is None else config, Config)
+        counts = {len(of) for of in (scenes, configs) if len(of) > 1}
+        if num_worlds is not None:
+            counts.add(_check.whole("num_worlds", num_worlds, 1))
+        if len(counts) > 1:
+            given = f"{len(scenes)} scenes, {len(configs)} configs and num_worlds = {num_worlds}"
+            raise ValueError(f"{given}: must be one, or as many as worlds")
+        count = counts.pop() if counts else 1
+        is_one = len(scenes) == len(configs) == 1
+        threads = _check.whole("num_threads", num_threads)
+        of_scenes, of_configs = ([one._scene for one in scenes], [one._config for one in configs])
+        if not is_one:
+            of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
+            of_configs = of_configs * (count if len(of_configs) == 1 else 1)
+        self._begin(_drystone.Batch.of_scenes(of_scenes, of_configs, count, threads), listen, hits_above)
+
+    @classmethod
+    def load(
+        cls,
+        states: Sequence[bytes] | Snapshots,
+        *,
+        num_threads: int = 0,
+        listen: Collection[str] | None = None,
+        hits_above: float = 0.5,
+    ) -> Self:
+        """A world for each state of `save` or `snapshot`: a reset goes back to that state.
+
+        ValueError: no state; bytes that are none of a world, of another version, damaged or cut short.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+        >>> batch.step(5)
+        >>> again = ds.Batch.load(batch.save())
+        >>> batch.step(5); again.step(5)
+        >>> bool((batch.hash() == again.hash()).all()), again.steps.tolist()
+        (True, [10, 10])
+        """
+        own = cls.__new__(cls)
+        snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
+        made = _drystone.Batch.of_states(snapshots._states, _check.whole("num_threads", num_threads))
+        own._begin(made, listen, hits_above)
+        return own
+
+    def _begin(self, batch: _drystone.Batch, listen: Collection[str] | None, hits_above: float) -> None:
+        self._batch = batch
+        self._process = os.getpid()
+        self._lock = threading.RLock()
+        self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
+        if listen is not None:
+            words = [_check.one_of("listen", word, LISTEN) for word in ([listen] if isinstance(listen, str) else listen)]
+            above = _check.number("hits_above", hits_above) if "hits" in words else None
+            batch.listen("contacts" in words, "impulses" in words, above)
+        self._arrays = {name: np.full(self._shape(name), np.nan, np.float32) for name in (*VIEWS, *INPUTS)}
+        self._views = {name: _read_only(self._arrays[name]) for name in VIEWS}
+        self._inputs = [(name, self._arrays[name]) for name in INPUTS]
+        self._outputs = [(name, self._arrays[name]) for name in VIEWS]
+        self._clocks = (np.zeros(self._worlds, np.uint64), np.zeros(self._worlds, np.float64))
+        self._clock_views = tuple(_read_only(clock) for clock in self._clocks)
+        self._take(np.arange(self._worlds), inputs=True)
+
+    def _shape(self, name: str) -> tuple[int, ...]:
+        """The shape of a column of all worlds."""
+        if name == "gravity":
+            return (self._worlds, 3)
+        if name == "ctrl":
+            return (self._worlds, self._drives)
+        rows = self._joints if name.startswith("joint") else self._bodies
+        width = COLUMNS[name]
+        return (self._worlds, rows) if width == 1 else (self._worlds, rows, width)
+
+    def _take(self, worlds: NDArray[np.int64], inputs: bool = False) -> None:
+        """Take over what worlds have."""
+        self._batch.read(worlds, self._outputs + (self._inputs if inputs else []))
+        self._batch.clocks(*self._clocks)
+
+    def _alone(self, work: Callable[[], Result]) -> Result:
+        """Do something that no other thread does at the same time."""
+        if os.getpid() != self._process:
+            raise RuntimeError("this batch was made before a fork, and its threads are gone: make it in the child, or start it by spawn")
+        with self._lock:
+            return work()
+
+    @property
+    def num_worlds(self) -> int:
+        """W."""
+        return self._worlds
+
+    @property
+    def num_bodies(self) -> int:
+        """B, the most that a world has."""
+        return self._bodies
+
+    @property
+    def num_joints(self) -> int:
+        """J, the most that a world has."""
+        return self._joints
+
+    @property
+    def num_actuators(self) -> int:
+        """U, the most driven axes that a world has."""
+        return self._drives
+
+    @property
+    def num_threads(self) -> int:
+        """Threads that step worlds."""
+        return self._batch.threads
+
+    @property
+    def position(self) -> Floats:
+        """[W, B, 3] m."""
+        return self._views["position"]
+
+    @property
+    def rotation(self) -> Floats:
+        """[W, B, 4] x y z w."""
+        return self._views["rotation"]
+
+    @property
+    def linear_velocity(self) -> Floats:
+        """[W, B, 3] m/s, of centers of mass."""
+        return self._views["linear_velocity"]
+
+    @property
+    def angular_velocity(self) -> Floats:
+        """[W, B, 3] rad/s."""
+        return self._views["angular_velocity"]
+
+    @property
+    def steps(self) -> NDArray[np.uint64]:
+        """[W] steps since the start."""
+        return self._clock_views[0]
+
+    @property
+    def time(self) -> Doubles:
+        """[W] s since the start."""
+        return self._clock_views[1]
+
+    @property
+    def force(self) -> Floats:
+        """[W, B, 3] N through centers of mass; an input."""
+        return self._arrays["force"]
+
+    @force.setter
+    def force(self, value: ArrayLike) -> None:
+        self._set_input("force", value)
+
+    @property
+    def torque(self) -> Floats:
+        """[W, B, 3] N m; an input."""
+        return self._arrays["torque"]
+
+    @torque.setter
+    def torque(self, value: ArrayLike) -> None:
+        self._set_input("torque", value)
+
+    @property
+    def ctrl(self) -> Floats:
+        """[W, U] speed of each motor (m/s, rad/s), target of each spring (m, rad); an input."""
+        return self._arrays["ctrl"]
+
+    @ctrl.setter
+    def ctrl(self, value: ArrayLike) -> None:
+        self._set_input("ctrl", value)
+
+    @property
+    def gravity(self) -> Floats:
+        """[W, 3] m/s²; an input."""
+        return self._arrays["gravity"]
+
+    @gravity.setter
+    def gravity(self, value: ArrayLike) -> None:
+        self._set_input("gravity", value)
+
+    def _set_input(self, name: str, value: ArrayLike) -> None:
+        array = self._arrays[name]
+        array[...] = _check.numbers(name, value, array.shape)
+
+    @property
+    def exists(self) -> NDArray[np.bool_]:
+        """[W, B] whether a world has the body; a new array."""
+        return self._body_flags()[0]
+
+    @property
+    def asleep(self) -> NDArray[np.bool_]:
+        """[W, B] whether a body sleeps; a new array."""
+        return self._body_flags()[1]
+
+    @property
+    def substeps(self) -> NDArray[np.uint32]:
+        """[W, B] substeps that a body takes in a step, 0 where there is none; a new array."""
+        return self._body_flags()[2]
+
+    def _body_flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.uint32]]:
+        shape = (self._worlds, self._bodies)
+        arrays = (np.zeros(shape, bool), np.zeros(shape, bool), np.zeros(shape, np.uint32))
+        self._alone(lambda: self._batch.bodies(*arrays))
+        return arrays
+
+    @property
+    def friction(self) -> Floats:
+        """[W, B] coefficients; a new array. `set_material` changes them."""
+        return self._column("friction")
+
+    @property
+    def restitution(self) -> Floats:
+        """[W, B] coefficients; a new array. `set_material` changes them."""
+        return self._column("restitution")
+
+    @property
+    def joint_position(self) -> Floats:
+        """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array."""
+        return self._column("joint_position")
+
+    @property
+    def joint_speed(self) -> Floats:
+        """[W, J, 6] their speeds (m/s, rad/s); a new array."""
+        return self._column("joint_speed")
+
+    @property
+    def joint_impulse(self) -> Floats:
+        """[W, J, 3] impulse on the second body in the last substep (N s); a new array."""
+        return self._column("joint_impulse")
+
+    @property
+    def joint_torque_impulse(self) -> Floats:
+        """[W, J, 3] angular impulse on the second body in the last substep (N m s); a new array."""
+        return self._column("joint_torque_impulse")
+
+    def _column(self, name: str) -> Floats:
+        array = np.full(self._shape(name), np.nan, np.float32)
+        self._alone(lambda: self._batch.read(np.arange(self._worlds), [(name, array)]))
+        return array
+
+    def step(self, n: int = 1, *, worlds: ArrayLike | None = None, dt: float | None = None) -> None:
+        """Move worlds by n steps of `dt` seconds (that of the scene if None). `worlds`: a mask [W], or numbers ascending; None for all.
+
+        WorldError: some worlds failed, after all others are through. KeyboardInterrupt ends the call with every world between two steps.
+
+        >>> import drystone as ds, numpy as np
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 3)
+        >>> batch.step(3, worlds=np.array([True, False, True]))
+        >>> batch.steps.tolist()
+        [3, 0, 3]
+        """
+        self._run(n, 1, worlds, dt, None, {})
+
+    def rollout(
+        self,
+        n: int,
+        ctrl: ArrayLike | None = None,
+        *,
+        every: int = 1,
+        record: Collection[str] = ("position",),
+        worlds: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> dict[str, NDArray[Any]]:
+        """Move w worlds by n steps in one call, and record every so many steps: arrays [w, n // every, ...].
+
+        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...), measures
+        (`measure`) and "hash". WorldError has what was recorded.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+        >>> out = batch.rollout(30, every=10, record=("position", "kinetic_energy", "hash"))
+        >>> out["position"].shape, out["hash"].shape, bool(out["hash"][0, 2] == batch.hash()[0])
+        ((2, 3, 4, 3), (2, 3), True)
+        """
+        n, every = _check.whole("n", n), _check.whole("every", every, 1)
+        chosen = _check.worlds(worlds, self._worlds)
+        numbers = None if ctrl is None else self._controls(ctrl, len(chosen), n)
+        names = [record] if isinstance(record, str) else list(record)
+        records = {name: self._record(name, len(chosen), n // every) for name in names}
+        self._run(n, every, chosen, dt, numbers, records)
+        return records
+
+    def _controls(self, ctrl: ArrayLike, worlds: int, steps: int) -> Floats:
+        array = np.asarray(ctrl)
+        fits = array.ndim == 3 and array.shape[0] in (1, worlds) and array.shape[1] in (1, steps)
+        if not fits or array.shape[2] != self._drives:
+            raise ValueError(f"ctrl has shape {array.shape}: must be ({worlds} or 1, {steps} or 1, {self._drives})")
+        numbers = _check.numbers("ctrl", array, array.shape)
+        return np.ascontiguousarray(np.broadcast_to(numbers, (worlds, *array.shape[1:])))
+
+    def _record(self, name: str, worlds: int, rows: int) -> NDArray[Any]:
+        _check.one_of("record", name, [*COLUMNS, *MEASURES, "hash"])
+        if name == "hash":
+            return np.zeros((worlds, rows), np.uint64)
+        if name in MEASURES:
+            return np.full((worlds, rows), np.nan)
+        return np.full((worlds, rows, *self._shape(name)[1:]), np.nan, np.float32)
+
+    def _run(
+        self,
+        n: int,
+        every: int,
+        worlds: ArrayLike | None,
+        dt: float | None,
+        ctrl: Floats | None,
+        records: dict[str, NDArray[Any]],
+    ) -> None:
+        n = _check.whole("n", n)
+        chosen = _check.worlds(worlds, self._worlds)
+        length = None if dt is None else _step_length(dt)
+        failed = self._alone(lambda: self._run_alone(n, every, chosen, length, ctrl, records))
+        if failed:
+            error = WorldError(np.array([world for world, _ in failed]), [line for _, line in failed])
+            error.records = records
+            raise error
+
+    def _run_alone(
+        self,
+        n: int,
+        every: int,
+        chosen: NDArray[np.int64],
+        dt: float | None,
+        ctrl: Floats | None,
+        records: dict[str, NDArray[Any]],
+    ) -> list[tuple[int, str]]:
+        failed: list[tuple[int, str]] | None = None
+        try:
+            failed = self._batch.run(n, every, chosen, dt, self._inputs, self._outputs, ctrl, list(records.items()))
+        finally:
+            # Worlds that did not come to the end tell where they are.
+            late = chosen if failed is None else np.array([world for world, _ in failed], np.int64)
+            if len(late):
+                self._batch.read(late, self._outputs)
+            self._batch.clocks(*self._clocks)
+            if ctrl is not None:
+                self._batch.read(chosen, [("ctrl", self._arrays["ctrl"])])
+        return failed
+
+    def apply_impulse(
+        self,
+        impulse: ArrayLike,
+        *,
+        bodies: ArrayLike | None = None,
+        at: ArrayLike | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Push at once: `impulse` [w, b, 3] (N s) on some bodies of some worlds, through centers of mass or `at` points [w, b, 3] (m).
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
+        >>> batch.apply_impulse([[[1000, 0, 0]]], bodies=[2], worlds=[1])
+        >>> batch.linear_velocity[:, 2, 0].tolist()
+        [0.0, 1.0]
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        columns = _check.worlds(bodies, self._bodies, "bodies")
+        shape = (len(chosen), len(columns), 3)
+        all_impulses = np.zeros((len(chosen), self._bodies, 3), np.float32)
+        all_points = np.full_like(all_impulses, np.nan)
+        all_impulses[:, columns] = _check.numbers("impulse", impulse, shape)
+        if at is not None:
+            all_points[:, columns] = _check.numbers("at", at, shape)
+        self._alone(lambda: self._batch.apply_impulse(chosen, all_impulses, all_points))
+        self._alone(lambda: self._take(chosen))
+
+    def set_state(
+        self,
+        *,
+        worlds: ArrayLike | None = None,
+        bodies: ArrayLike | None = None,
+        position: ArrayLike | None = None,
+        rotation: ArrayLike | None = None,
+        linear_velocity: ArrayLike | None = None,
+        angular_velocity: ArrayLike | None = None,
+    ) -> None:
+        """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
+
+        Contacts keep their impulses where they still touch: to begin anew use `reset` or `restore`.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
+        >>> batch.set_state(worlds=[0], bodies=[2], position=[[[0, 3, 0]]])
+        >>> batch.position[:, 2, 1].tolist()
+        [3.0, 1.5]
+        """
+        values = {
+            "position": position,
+            "rotation": rotation,
+            "linear_velocity": linear_velocity,
+            "angular_velocity": angular_velocity,
+        }
+        self._write(values, worlds, bodies)
+
+    def set_material(
+        self,
+        *,
+        worlds: ArrayLike | None = None,
+        bodies: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
+    ) -> None:
+        """Set coefficients [w, b] of some bodies of some worlds. A reset sets them as the scene has them.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
+        >>> batch.set_material(friction=[[0.9] * 3, [0.1] * 3])
+        >>> batch.friction[:, 1].round(2).tolist()
+        [0.8999999761581421, 0.10000000149011612]
+        """
+        self._write({"friction": friction, "restitution": restitution}, worlds, bodies)
+
+    def _write(self, values: dict[str, ArrayLike | None], worlds: ArrayLike | None, bodies: ArrayLike | None) -> None:
+        chosen = _check.worlds(worlds, self._worlds)
+        columns = _check.worlds(bodies, self._bodies, "bodies")
+        checked: dict[str, Floats] = {}
+        for name, value in values.items():
+            if value is not None:
+                width = COLUMNS[name]
+                shape = (len(chosen), len(columns)) if width == 1 else (len(chosen), len(columns), width)
+                checked[name] = _check.numbers(name, value, shape).reshape(len(chosen), len(columns), width)
+        for name, numbers in checked.items():
+            whole = self._column(name)[chosen].reshape(len(chosen), self._bodies, COLUMNS[name])
+            whole[:, columns] = numbers
+            self._alone(partial(self._batch.write, chosen, name, whole))
+        self._alone(lambda: self._take(chosen))
+
+    def reset(self, worlds: ArrayLike | None = None) -> None:
+        """Let worlds begin again: they have the bits of worlds that never ran.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("pile", n=8), 2)
+        >>> start = batch.hash()
+        >>> batch.step(37)
+        >>> batch.reset([1])
+        >>> (batch.hash() == start).tolist()
+        [False, True]
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+
+        def reset() -> None:
+            self._batch.reset(chosen)
+            self._take(chosen, inputs=True)
+
+        self._alone(reset)
+
+    def snapshot(self, worlds: ArrayLike | None = None) -> Snapshots:
+        """The states of worlds, in memory.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("pile", n=8), 3)
+        >>> batch.step(9, worlds=[0])
+        >>> batch.restore(batch.snapshot([0]))
+        >>> bool((batch.hash() == batch.hash()[0]).all())
+        True
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        return Snapshots(self._alone(lambda: self._batch.states(chosen)))
+
+    def restore(
+        self, snapshots: Snapshots, worlds: ArrayLike | None = None, *, source: ArrayLike | None = None
+    ) -> None:
+        """Let worlds go on from states: one for each of them, one for all, or that which `source` [w] says for each.
+
+        ValueError: not so many states; a state with more bodies than the batch has rows.
+        """
+        if not isinstance(snapshots, Snapshots):
+            raise ValueError(f"snapshots is {type(snapshots).__name__}: must be Snapshots; Snapshots.from_bytes makes them of bytes")
+        chosen = _check.worlds(worlds, self._worlds)
+        states = [snapshots._states[k] for k in self._sources(snapshots, len(chosen), source)]
+        most = [self._bodies, self._joints, self._drives]
+        for k, state in enumerate(states):
+            if any(has > room for has, room in zip(state.sizes, most, strict=True)):
+                words = "{} bodies, {} joints, {} drives".format
+                raise ValueError(f"snapshots[{k}] has {words(*state.sizes)}: must be at most {words(*most)}")
+
+        def restore() -> None:
+            self._batch.restore(chosen, states)
+            self._take(chosen, inputs=True)
+
+        self._alone(restore)
+
+    @staticmethod
+    def _sources(snapshots: Snapshots, worlds: int, source: ArrayLike | None) -> list[int]:
+        if source is not None:
+            array = np.asarray(source)
+            if array.shape != (worlds,) or array.dtype.kind not in "iu":
+                raise ValueError(f"source has shape {array.shape} and dtype {array.dtype}: must be ({worlds},) whole numbers")
+            if worlds and (array.min() < 0 or array.max() >= len(snapshots)):
+                raise ValueError(f"source has {array.min()} to {array.max()}: must be 0 to {len(snapshots) - 1}")
+            return [int(k) for k in array]
+        if len(snapshots) not in (1, worlds):
+            raise ValueError(f"snapshots has {len(snapshots)} states: must be 1 or {worlds}")
+        return [0] * worlds if len(snapshots) == 1 else list(range(worlds))
+
+    def save(self, worlds: ArrayLike | None = None) -> list[bytes]:
+        """The states of worlds as bytes, the same on every machine: about 6 kB for a tower of ten boxes.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+        >>> len({len(state) for state in batch.save()})
+        1
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        return self._alone(lambda: self._batch.save(chosen))
+
+    def hash(self, worlds: ArrayLike | None = None) -> NDArray[np.uint64]:
+        """[w] hash of poses and velocities: that which `drystone run` prints for the world alone.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+        >>> f"{batch.hash()[1]:016x}" == f"{batch.hash([0])[0]:016x}"
+        True
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        return self._alone(lambda: self._batch.hash(chosen))
+
+    def measure(self, *names: str, worlds: ArrayLike | None = None) -> dict[str, Doubles]:
+        """Measures of worlds, each [w]; all of them without names.
+
+        overlap_max, overlap_mean and overlap_95 (m, of contacts computed anew), joint_gap (m), kinetic_energy and potential_energy (J), momentum_x,
+        y, z (N s), angular_momentum_x, y, z about the origin (N m s), fastest (m/s), need (of the hardest contact), energy_taken in the last step
+        (J), contacts, asleep, finite.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+        >>> batch.step(10)
+        >>> batch.measure("contacts", "finite")
+        {'contacts': array([3., 3.]), 'finite': array([1., 1.])}
+        """
+        wanted = [_check.one_of("name", name, MEASURES) for name in names or MEASURES]
+        chosen = _check.worlds(worlds, self._worlds)
+        table = self._alone(lambda: self._batch.measure(chosen, wanted))
+        return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(wanted)}
+
+    def contacts(self, worlds: ArrayLike | None = None) -> Contacts:
+        """The contacts of the last step, near ones included: see `Contacts`.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2, listen=["impulses"])
+        >>> batch.step(60)
+        >>> contacts = batch.contacts()
+        >>> contacts.world_start.tolist(), bool(contacts.impulse[0, 1] > contacts.impulse[1, 1])
+        ([0, 2, 4], True)
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        return Contacts(*self._alone(lambda: self._batch.contacts(chosen)))
+
+    def events(self, worlds: ArrayLike | None = None) -> NDArray[np.void]:
+        """What happened in the last step: world, kind (began, ended, hit, entered, left, passed, broke), bodies a and b (-1 for none), and a value:
+        speed of a hit (m/s), time of a passage (s), force on a joint that broke (N). Needs `listen` for began, ended and hit.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 1, listen=["contacts"])
+        >>> batch.step()
+        >>> batch.events()["kind"].tolist()
+        ['began', 'began']
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        return np.array(self._alone(lambda: self._batch.events(chosen)), EVENT)
+
+    def ray(
+        self, origin: ArrayLike, direction: ArrayLike, max_distance: float = 1e6, *, worlds: ArrayLike | None = None
+    ) -> Hits:
+        """What R rays hit first in each of w worlds: `origin` and `direction` are [R, 3], or [w, R, 3] (m).
+
+        >>> import drystone as ds
+        >>> hits = ds.Batch(ds.Scene.find("tower", n=2), 2).ray([[0, 9, 0]], [[0, -1, 0]])
+        >>> hits.body.tolist(), hits.distance.tolist()
+        ([[2], [2]], [[7.0], [7.0]])
+        """
+        chosen = _check.worlds(worlds, self._worlds)
+        rays = [self._rays(name, value, len(chosen)) for name, value in (("origin", origin), ("direction", direction))]
+        if rays[0].shape != rays[1].shape:
+            raise ValueError(f"origin has shape {rays[0].shape} and direction {rays[1].shape}: must be the same")
+        most, shape = _check.number("max_distance", max_distance), rays[0].shape
+        body = np.full(shape[:2], -1, np.int64)
+        distance, normal = np.full(shape[:2], np.inf, np.float32), np.full(shape, np.nan, np.float32)
+        self._alone(lambda: self._batch.ray(chosen, rays[0], rays[1], most, body, distance, normal))
+        return Hits(body, distance, normal)
+
+    @staticmethod
+    def _rays(name: str, value: ArrayLike, worlds: int) -> Floats:
+        if np.ndim(value) == 2:
+            rays = _check.numbers(name, value, (-1, 3))
+            return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape)))
+        return _check.numbers(name, value, (worlds, -1, 3))
+
+    def __len__(self) -> int:
+        return self._worlds
+
+    def __repr__(self) -> str:
+        return f"<Batch of {self._worlds} worlds, up to {self._bodies} bodies each, on {self.num_threads} threads>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError("a Batch is not pickled: send batch.save(), and load it by Batch.load")
+
+
+def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
+    """One value, or a sequence of them, as a list."""
+    values = [value] if isinstance(value, kind) else value
+    if isinstance(values, str) or not isinstance(values, Sequence):
+        raise ValueError(f"{name} is {type(value).__name__}: must be {kind.__name__} or a list of {kind.__name__}")
+    for k, one in enumerate(values):
+        if not isinstance(one, kind):
+            raise ValueError(f"{name}[{k}] is {type(one).__name__}: must be {kind.__name__}")
+    if not values:
+        raise ValueError(f"{name} is empty: must have at least one {kind.__name__}")
+    return list(values)
+
+
+def _step_length(dt: Any) -> float:
+    length = _check.number("dt", dt)
+    if not 1e-9 <= length <= 1:
+        raise ValueError(f"dt = {length}: must be 1e-9 to 1 s")
+    return length
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    view = array.view()
+    view.flags.writeable = False
+    return view

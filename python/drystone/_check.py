@@ -1,0 +1,99 @@
+"""Arguments, refused by one line that names the argument, what was given and what was wanted."""
+
+from __future__ import annotations
+
+import difflib
+import operator
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def whole(name: str, value: Any, least: int = 0) -> int:
+    """A whole number that is not below `least`."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} = {value!r}: must be a whole number") from None
+    if number < least:
+        raise ValueError(f"{name} = {number}: must be {least} or more")
+    return number
+
+
+def number(name: str, value: Any) -> float:
+    """A finite number."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r}: must be a number") from None
+    if not np.isfinite(result):
+        raise ValueError(f"{name} = {result}: must be finite")
+    return result
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Finite numbers in an array of single precision that is not the caller's; a length of -1 may be any."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} has rows of several lengths: must have shape {wanted(shape)}") from None
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{name} has dtype {array.dtype}: must be numbers")
+    fits = array.ndim == len(shape) and all(w in (-1, n) for w, n in zip(shape, array.shape, strict=True))
+    if not fits:
+        raise ValueError(f"{name} has shape {array.shape}: must be {wanted(shape)}")
+    with np.errstate(over="ignore"):
+        single = np.array(array, np.float32, order="C")
+    bad = np.argwhere(~np.isfinite(single))
+    if len(bad):
+        place = tuple(int(i) for i in bad[0])
+        at = "" if not place else str(list(place))
+        raise ValueError(f"{name}{at} = {array[place]}: must be finite")
+    return single
+
+
+def wanted(shape: tuple[int, ...]) -> str:
+    """A shape in words."""
+    words = ["any" if n == -1 else str(n) for n in shape]
+    return f"({', '.join(words)}{',' if len(words) == 1 else ''})"
+
+
+def worlds(value: Any, count: int, name: str = "worlds") -> NDArray[np.int64]:
+    """Worlds by a mask, by ascending numbers or by one number."""
+    if value is None:
+        return np.arange(count)
+    array = np.asarray(value)
+    if array.size == 0 and array.dtype.kind == "f":
+        array = array.astype(np.int64)
+    if array.dtype == bool:
+        if array.shape != (count,):
+            raise ValueError(f"{name} is a mask of shape {array.shape}: must be ({count},)")
+        return np.flatnonzero(array)
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} has dtype {array.dtype}: must be a mask of bools or whole numbers")
+    array = np.atleast_1d(array).astype(np.int64)
+    if array.ndim != 1:
+        raise ValueError(f"{name} has shape {array.shape}: must have one axis")
+    outside = array[(array < 0) | (array >= count)]
+    if len(outside):
+        raise ValueError(f"{name} has {outside[0]}: must be 0 to {count - 1}")
+    if np.any(np.diff(array) <= 0):
+        raise ValueError(f"{name} = {array.tolist()}: must ascend")
+    return array
+
+
+def one_of(name: str, value: str, known: Iterable[str]) -> str:
+    """One of some words."""
+    known = list(known)
+    if value not in known:
+        raise ValueError(f"{name} = {value!r}: {hint(str(value), known)}")
+    return value
+
+
+def hint(word: str, known: Iterable[str]) -> str:
+    """What may have been meant."""
+    known = list(known)
+    near = difflib.get_close_matches(word, known, 1)
+    return f"did you mean {near[0]!r}?" if near else f"must be one of {', '.join(known)}"

@@ -1,0 +1,511 @@
+"""Surveys: one function of many arguments, here, in processes or on a cluster, with the same rows."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import json
+import os
+import platform
+import signal
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent import futures
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Protocol, TextIO, overload
+
+import numpy as np
+
+from . import _check, _drystone
+
+Run = Callable[[dict[str, Any]], Mapping[str, Any]]
+Row = dict[str, Any]
+ENGINES = ("auto", "here", "processes", "ray")
+
+# A task of a survey takes about so many seconds: of a shorter one the overhead counts, and of a longer one more is lost with a worker.
+TASK_SECONDS = 1.0
+MOST_RUNS_A_TASK = 4096
+# And so much longer for each task that runs at the same time, because the driver takes 2 ms a task (docs/cluster.md).
+SECONDS_A_TASK = 0.005
+# Tasks for each worker at the same time: one that runs and one that waits.
+TASKS_A_WORKER = 2
+# How often a run may end its worker.
+MOST_DEATHS = 3
+# How often a check looks for a worker that did not do the run before.
+MOST_SEARCHES = 5
+
+
+class NotTheSame(RuntimeError):
+    """A run that was computed twice gave two results: `run` has its argument, `results` both, `machines` who computed them."""
+
+    def __init__(self, run: Any, results: tuple[Any, Any], machines: tuple[str, str]) -> None:
+        self.run, self.results, self.machines = run, results, machines
+        super().__init__(f"run {json.dumps(run)} gave {results[0]} on {machines[0]} and {results[1]} on {machines[1]}")
+
+
+@dataclass(frozen=True)
+class Rows(Sequence[Row]):
+    """The rows of a survey in the order of its runs. A row has `key`, what was asked and what came of it, or `error`.
+
+    `who` says for each row which machine and process computed it and how many seconds it took; rows of a file from before have none.
+    """
+
+    rows: tuple[Row, ...]
+    who: tuple[Row, ...] = field(repr=False, default=())
+
+    @overload
+    def __getitem__(self, index: int) -> Row: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Row, ...]: ...
+    def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
+        return self.rows[index]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def columns(self) -> dict[str, np.ndarray[Any, Any]]:
+        """An array for each name that any row has; None where a row has no value.
+
+        >>> import drystone as ds
+        >>> ds.Rows(({"key": "a", "n": 1}, {"key": "b", "n": 2})).columns()["n"].tolist()
+        [1, 2]
+        """
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        return {name: np.array([row.get(name) for row in self.rows]) for name in names}
+
+
+def survey(
+    run: Run,
+    runs: Iterable[Mapping[str, Any]],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    engine: str = "auto",
+    workers: int | None = None,
+    chunk: int | None = None,
+    twice: float = 0.01,
+    on_error: str = "row",
+    progress: bool | None = None,
+) -> Rows:
+    """Compute `run` of every argument of `runs`; the rows have the order of `runs` and the same bits whatever the engine.
+
+    `run` is a function of a module whose result (numbers, strings, small arrays) depends on its argument alone.
+    `out` is a file of JSON lines, one when a row is there, put in order at the end; the same call again takes its rows over,
+    and drops a line that was cut off. `engine`: "here" is this process, "processes" a pool, "ray" a cluster (drystone[ray]); "auto" is "ray"
+    where Ray is initialized, and else "processes". `chunk`: runs a task; None aims at a second a task. `twice`: the share of runs that is
+    computed again by another worker; where results differ, NotTheSame names the run and both machines. `on_error`: "row" makes a row
+    with `error` of an exception, "raise" raises it. Ctrl-C keeps the rows that are there.
+
+    ValueError: an argument that cannot be used. RuntimeError: a run ended its worker three times.
+
+    >>> import drystone as ds
+    >>> from drystone.studies import stands
+    >>> rows = ds.survey(stands, [{"scene": "tower", "n": n, "steps": 30} for n in (2, 3)], engine="here")
+    >>> [row["n"] for row in rows], [row["stands"] for row in rows]
+    ([2, 3], [1.0, 1.0])
+    """
+    _check.one_of("engine", engine, ENGINES)
+    _check.one_of("on_error", on_error, ("row", "raise"))
+    share = _check.number("twice", twice)
+    if not 0 <= share <= 1:
+        raise ValueError(f"twice = {twice}: must be 0 to 1")
+    if not callable(run):
+        raise ValueError(f"run is {type(run).__name__}: must be a function of one argument")
+    size = None if chunk is None else _check.whole("chunk", chunk, 1)
+    asked = [_plain_run(k, one) for k, one in enumerate(runs)]
+    keys = _keys(run, asked)
+    with _Store(None if out is None else Path(out), keys) as store:
+        state = _Survey(run, asked, keys, store, share, on_error, size, _Progress(len(keys), progress))
+        state.go_through(_engine(engine, workers))
+    return store.rows(keys)
+
+
+def _plain_run(k: int, one: Any) -> dict[str, Any]:
+    try:
+        plain: dict[str, Any] = json.loads(json.dumps(dict(one)))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"runs[{k}] = {one!r}: must be a dict of numbers, strings and lists ({error})") from None
+    return plain
+
+
+def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
+    """A key for each run: a hash of its argument, of the function and of the program. Equal runs have equal keys but for their count."""
+    try:
+        source = inspect.getsource(run)
+    except (OSError, TypeError):
+        source = repr(run)
+    program = hashlib.sha256(Path(str(_drystone.__file__)).read_bytes()).hexdigest()
+    seen: dict[str, int] = {}
+    keys = []
+    for one in asked:
+        text = json.dumps([one, source, program], sort_keys=True)
+        count = seen[text] = seen.get(text, -1) + 1
+        keys.append(hashlib.sha256(f"{text}{count or ''}".encode()).hexdigest()[:20])
+    return keys
+
+
+def _machine() -> str:
+    return f"{platform.node()}:{os.getpid()}"
+
+
+def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | None, on_error: str) -> list[Row] | None:
+    """Rows of some runs with who computed them; None where this process is the one that must not."""
+    if not_by == _machine():
+        return None
+    rows = []
+    for key, one in part:
+        begin = time.perf_counter()
+        try:
+            result = _plain(dict(run(dict(one))))
+        except Exception as error:
+            if on_error == "raise":
+                raise
+            result = {"error": f"{type(error).__name__}: {error}"}
+        rows.append({"key": key, "result": result, "machine": _machine(), "seconds": time.perf_counter() - begin})
+    return rows
+
+
+def _plain(value: Any) -> Any:
+    """A result as JSON has it, every number to the last bit."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(f"a result has {type(value).__name__}: must have numbers, strings and small arrays")
+
+
+def _same(a: Any, b: Any) -> bool:
+    # NaN is not itself, but its text is.
+    return json.dumps(a, sort_keys=True) == json.dumps(b, sort_keys=True)
+
+
+class _Store:
+    """The rows that are there, and their file."""
+
+    def __init__(self, path: Path | None, keys: list[str]) -> None:
+        self.path, self.have, self.who = path, dict[str, str](), dict[str, Row]()
+        self.file: TextIO | None = None
+        if path is not None and path.exists():
+            wanted = set(keys)
+            for line in path.read_text().split("\n"):
+                key = _key_of(line)
+                if key in wanted:
+                    self.have[str(key)] = line
+
+    def __enter__(self) -> _Store:
+        if self.path is not None:
+            # What was cut off, and rows of other surveys, go before new rows come.
+            self._write(list(self.have.values()))
+            self.file = self.path.open("a")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.file is not None:
+            self.file.close()
+
+    def add(self, key: str, one: dict[str, Any], row: Row) -> None:
+        line = json.dumps({"key": key, **one, **row["result"]})
+        self.have[key] = line
+        self.who[key] = {"machine": row["machine"], "seconds": row["seconds"]}
+        if self.file is not None:
+            self.file.write(line + "\n")
+            self.file.flush()
+
+    def rows(self, keys: list[str]) -> Rows:
+        if self.path is not None:
+            self._write([self.have[key] for key in keys])
+        rows = tuple(json.loads(self.have[key]) for key in keys)
+        return Rows(rows, tuple(self.who.get(key, {}) for key in keys))
+
+    def _write(self, lines: list[str]) -> None:
+        assert self.path is not None
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        beside = self.path.with_name(self.path.name + ".new")
+        beside.write_text("".join(line + "\n" for line in lines))
+        beside.replace(self.path)
+
+
+def _key_of(line: str) -> str | None:
+    try:
+        row = json.loads(line)
+    except ValueError:
+        return None
+    return row.get("key") if isinstance(row, dict) else None
+
+
+class _Progress:
+    """A line on a terminal: rows that are there, and the time that is left."""
+
+    def __init__(self, all_rows: int, wanted: bool | None) -> None:
+        self.all, self.begin, self.first, self.last = all_rows, time.monotonic(), -1, 0.0
+        self.is_on = sys.stderr.isatty() if wanted is None else wanted
+
+    def tell(self, done: int) -> None:
+        now = time.monotonic()
+        self.first = done if self.first < 0 else self.first
+        if not self.is_on or (now - self.last < 0.2 and done < self.all):
+            return
+        self.last = now
+        made = done - self.first
+        left = f"{(now - self.begin) / made * (self.all - done):.0f} s left" if made else ""
+        end = "\n" if done == self.all else ""
+        print(f"\r{done} of {self.all} runs  {left:20}", end=end, file=sys.stderr, flush=True)
+
+
+Task = tuple[list[int], str | None, int]
+
+
+@dataclass
+class _Survey:
+    """What is still to be done."""
+
+    run: Run
+    asked: list[dict[str, Any]]
+    keys: list[str]
+    store: _Store
+    twice: float
+    on_error: str
+    chunk: int | None
+    progress: _Progress
+
+    def go_through(self, engine: _Engine) -> None:
+        todo = deque(k for k, key in enumerate(self.keys) if key not in self.store.have)
+        checks: deque[Task] = deque()
+        running: dict[int, Task] = {}
+        mean = 0.0
+        self.progress.tell(len(self.store.have))
+        with engine:
+            while todo or checks or running:
+                while len(running) < engine.room and (todo or checks):
+                    task = checks.popleft() if checks else self._next(todo, mean, engine.room)
+                    running[engine.submit(self._work(task), task[1])] = task
+                number, rows = engine.next()
+                numbers, not_by, searches = running.pop(number)
+                if rows is None:
+                    # The worker that computed these before took them again.
+                    other = not_by if searches < MOST_SEARCHES else None
+                    checks.append((numbers, other, searches + 1))
+                    continue
+                if searches:
+                    self._compare(numbers, rows)
+                    continue
+                for k, row in zip(numbers, rows, strict=True):
+                    self.store.add(self.keys[k], self.asked[k], row)
+                    mean = row["seconds"] if mean == 0 else 0.9 * mean + 0.1 * row["seconds"]
+                    if int(self.keys[k][:8], 16) < self.twice * 2**32:
+                        checks.append(([k], row["machine"] if engine.has_others else None, 1))
+                self.progress.tell(len(self.store.have))
+
+    def _next(self, todo: deque[int], mean: float, room: int) -> Task:
+        wanted = max(TASK_SECONDS, SECONDS_A_TASK * room)
+        size = self.chunk or min(MOST_RUNS_A_TASK, max(1, round(wanted / mean)) if mean else 1)
+        if self.chunk is None:
+            # At the end each worker has something left to do.
+            size = max(1, min(size, len(todo) // max(1, room)))
+        return [todo.popleft() for _ in range(min(size, len(todo)))], None, 0
+
+    def _work(self, task: Task) -> Callable[[], list[Row] | None]:
+        numbers, not_by, _ = task
+        return partial(_compute, self.run, [(self.keys[k], self.asked[k]) for k in numbers], not_by, self.on_error)
+
+    def _compare(self, numbers: list[int], rows: list[Row]) -> None:
+        for k, row in zip(numbers, rows, strict=True):
+            kept = json.loads(self.store.have[self.keys[k]])
+            first = {name: kept[name] for name in kept if name != "key" and name not in self.asked[k]}
+            again = {name: value for name, value in row["result"].items() if name not in self.asked[k]}
+            if not _same(first, again):
+                machines = (str(self.store.who[self.keys[k]]["machine"]), str(row["machine"]))
+                raise NotTheSame(self.asked[k], (first, again), machines)
+
+
+class _Engine(Protocol):
+    """Does tasks; a task whose worker dies is done again."""
+
+    @property
+    def room(self) -> int:
+        """Tasks at the same time."""
+
+    @property
+    def has_others(self) -> bool:
+        """Whether another worker than that of a task can do it."""
+
+    def __enter__(self) -> _Engine: ...
+    def __exit__(self, *_: object) -> None: ...
+    def submit(self, work: Callable[[], list[Row] | None], not_by: str | None) -> int: ...
+    def next(self) -> tuple[int, list[Row] | None]: ...
+
+
+def _engine(name: str, workers: int | None) -> _Engine:
+    count = None if workers is None else _check.whole("workers", workers, 1)
+    if name == "auto":
+        ray = sys.modules.get("ray")
+        name = "ray" if ray is not None and ray.is_initialized() else "processes"
+    if name == "here":
+        return _Here()
+    return _Ray() if name == "ray" else _Processes(count or os.cpu_count() or 1)
+
+
+class _Here:
+    """This process."""
+
+    room, has_others = 1, False
+
+    def __init__(self) -> None:
+        self.waiting: deque[tuple[int, Callable[[], list[Row] | None]]] = deque()
+        self.count = 0
+
+    def __enter__(self) -> _Here:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def submit(self, work: Callable[[], list[Row] | None], not_by: str | None) -> int:
+        self.count += 1
+        self.waiting.append((self.count, work))
+        return self.count
+
+    def next(self) -> tuple[int, list[Row] | None]:
+        number, work = self.waiting.popleft()
+        return number, work()
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@dataclass
+class _Worker:
+    """A process, and its tasks in their order."""
+
+    pool: futures.ProcessPoolExecutor
+    tasks: dict[int, futures.Future[list[Row] | None]] = field(default_factory=dict)
+    machine: str | None = None
+
+
+class _Processes:
+    """Processes of this machine, each with a queue of its own: where one dies, the first task of its queue is to blame."""
+
+    def __init__(self, workers: int) -> None:
+        self.room, self.has_others = TASKS_A_WORKER * workers, workers > 1
+        self.count, self.workers = workers, list[_Worker]()
+        self.work: dict[int, Callable[[], list[Row] | None]] = {}
+        self.deaths: dict[int, int] = {}
+        self.numbers = 0
+
+    def __enter__(self) -> _Processes:
+        self.workers = [_Worker(self._new_pool()) for _ in range(self.count)]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for worker in self.workers:
+            worker.pool.shutdown(wait=not worker.tasks, cancel_futures=True)
+
+    @staticmethod
+    def _new_pool() -> futures.ProcessPoolExecutor:
+        return futures.ProcessPoolExecutor(1, get_context("spawn"), initializer=_ignore_interrupts)
+
+    def submit(self, work: Callable[[], list[Row] | None], not_by: str | None) -> int:
+        self.numbers += 1
+        self.work[self.numbers] = work
+        others = [worker for worker in self.workers if not_by is None or worker.machine != not_by]
+        self._start(self.numbers, min(others or self.workers, key=lambda worker: len(worker.tasks)))
+        return self.numbers
+
+    def _start(self, number: int, worker: _Worker) -> None:
+        try:
+            worker.tasks[number] = worker.pool.submit(self.work[number])
+        except BrokenProcessPool:
+            self._replace(worker)
+            worker.tasks[number] = worker.pool.submit(self.work[number])
+
+    def next(self) -> tuple[int, list[Row] | None]:
+        while True:
+            all_tasks = {future: (n, w) for w in self.workers for n, future in w.tasks.items()}
+            done, _ = futures.wait(all_tasks, return_when=futures.FIRST_COMPLETED)
+            number, worker = all_tasks[done.pop()]
+            try:
+                rows = worker.tasks[number].result()
+            except BrokenProcessPool:
+                self._replace(worker)
+                continue
+            del worker.tasks[number], self.work[number]
+            if rows:
+                worker.machine = str(rows[0]["machine"])
+            return number, rows
+
+    def _replace(self, worker: _Worker) -> None:
+        """A new process in place of one that died, with its tasks."""
+        tasks = sorted(worker.tasks)
+        for first in tasks[:1]:
+            self.deaths[first] = self.deaths.get(first, 0) + 1
+            if self.deaths[first] >= MOST_DEATHS:
+                raise RuntimeError(f"a run ended its worker {MOST_DEATHS} times: {self.work[first]}")
+        worker.pool.shutdown(wait=False, cancel_futures=True)
+        worker.pool, worker.machine = self._new_pool(), None
+        worker.tasks = {number: worker.pool.submit(self.work[number]) for number in tasks}
+
+
+class _Ray:
+    """A cluster by Ray, which does tasks of dead workers and nodes again."""
+
+    def __init__(self) -> None:
+        try:
+            self.ray: Any = importlib.import_module("ray")
+        except ImportError:
+            raise ValueError("engine = 'ray': Ray is not installed; pip install 'drystone[ray]'") from None
+        self.running: dict[Any, int] = {}
+        self.count = 0
+        # Nodes come and go, and to ask for them takes as long as a task.
+        self.processors, self.asked = 1, -1.0
+
+    def __enter__(self) -> _Ray:
+        if not self.ray.is_initialized():
+            self.ray.init(log_to_driver=False)
+        self.task = self.ray.remote(max_retries=-1, num_cpus=1)(_call)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for reference in self.running:
+            self.ray.cancel(reference, force=True)
+
+    @property
+    def room(self) -> int:
+        if time.monotonic() > self.asked + 1:
+            self.processors = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+            self.asked = time.monotonic()
+        return TASKS_A_WORKER * self.processors
+
+    @property
+    def has_others(self) -> bool:
+        return self.room > TASKS_A_WORKER
+
+    def submit(self, work: Callable[[], list[Row] | None], not_by: str | None) -> int:
+        self.count += 1
+        self.running[self.task.remote(work)] = self.count
+        return self.count
+
+    def next(self) -> tuple[int, list[Row] | None]:
+        [done], _ = self.ray.wait(list(self.running), num_returns=1)
+        number = self.running.pop(done)
+        try:
+            rows: list[Row] | None = self.ray.get(done)
+        except self.ray.exceptions.RayTaskError as error:
+            raise error.as_instanceof_cause() from None
+        return number, rows
+
+
+def _call(work: Callable[[], list[Row] | None]) -> list[Row] | None:
+    return work()
+

@@ -1,0 +1,327 @@
+"""Environments for training: batches as `VectorEnv` of Gymnasium (drystone[gym])."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from ._batch import Batch, Snapshots, WorldError
+from ._build import Body, Joint, World
+from ._scene import Config, Scene
+
+Floats = NDArray[np.float32]
+Observe = Callable[[Batch], NDArray[Any]]
+Reward = Callable[[Batch, NDArray[Any]], NDArray[Any]]
+Terminated = Callable[[Batch], NDArray[np.bool_]]
+Act = Callable[[Batch, NDArray[Any]], None]
+Start = Callable[[np.random.Generator, Batch, int], None]
+
+
+class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
+    """A batch as environments that run beside each other.
+
+    `observe(batch)` gives [W, ...], `reward(batch, actions)` [W], `terminated(batch)` bool [W]; `act(batch, actions)` writes inputs;
+    `start(rng, batch, world)` changes a world after its reset. `memory` has the arrays that these functions keep from step to step,
+    for `state`. An action lasts `frame_skip` steps; an episode is cut after `max_steps` actions.
+
+    All three autoreset modes. World k has the seed s + k, or that of a list; its n-th episode depends on that seed and n alone,
+    whatever other worlds do. A world that fails is terminated, infos["error"] says why, and the next reset makes it whole.
+
+    >>> from drystone.gym import cart_pole
+    >>> envs = cart_pole(4)
+    >>> observations, _ = envs.reset(seed=1)
+    >>> observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
+    >>> observations.shape, rewards.tolist()
+    ((4, 4), [1.0, 1.0, 1.0, 1.0])
+    """
+
+    def __init__(
+        self,
+        batch: Batch,
+        *,
+        action_space: spaces.Space[Any],
+        observe: Observe,
+        reward: Reward,
+        act: Act,
+        terminated: Terminated | None = None,
+        start: Start | None = None,
+        observation_space: spaces.Space[Any] | None = None,
+        memory: dict[str, NDArray[Any]] | None = None,
+        max_steps: int | None = None,
+        frame_skip: int = 1,
+        autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        self.batch = batch
+        self.num_envs = batch.num_worlds
+        self.metadata = {"render_modes": [], "autoreset_mode": AutoresetMode(autoreset_mode)}
+        self._observe, self._reward, self._act = observe, reward, act
+        self._terminated, self._start, self._memory = terminated, start, memory or {}
+        self._max_steps, self._frame_skip = max_steps, frame_skip
+        shape = np.asarray(observe(batch)).shape
+        if shape[:1] != (batch.num_worlds,):
+            raise ValueError(f"observe gives shape {shape}: must begin with {batch.num_worlds}, the number of worlds")
+        own = observation_space or spaces.Box(-np.inf, np.inf, shape[1:], np.float32)
+        self.single_observation_space, self.single_action_space = own, action_space
+        self.observation_space = batch_space(own, self.num_envs)
+        self.action_space = batch_space(action_space, self.num_envs)
+        self._seeds = [int(seed) for seed in np.random.SeedSequence().generate_state(self.num_envs)]
+        self._episodes = np.full(self.num_envs, -1)
+        self._elapsed = np.zeros(self.num_envs, np.int64)
+        self._is_over = np.zeros(self.num_envs, bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin new episodes: of all worlds, or of those of `options["reset_mask"]`. A seed begins with episode 0.
+
+        ValueError: not so many seeds; a mask that is no bool array [W] with a True.
+        """
+        mask = self._mask(options)
+        seeds: Sequence[int | None]
+        if seed is None or isinstance(seed, (int, np.integer)):
+            seeds = [None if seed is None else int(seed) + k for k in range(self.num_envs)]
+        else:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed has {len(seeds)} numbers: must have {self.num_envs}")
+        for world in np.flatnonzero(mask):
+            own = seeds[int(world)]
+            if own is not None:
+                self._seeds[world], self._episodes[world] = int(own), -1
+        self._begin(mask)
+        return self._observations(), {}
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[Floats, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Act in all worlds. In the mode NEXT_STEP a world whose episode ended begins a new one instead.
+
+        ValueError: actions of another shape. RuntimeError: in the mode DISABLED, a world whose episode ended was not reset.
+        """
+        actions = np.asarray(actions)
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"actions has shape {actions.shape}: must be {self.action_space.shape}")
+        mode = self.metadata["autoreset_mode"]
+        begins = self._is_over.copy()
+        if begins.any() and mode is not AutoresetMode.NEXT_STEP:
+            raise RuntimeError(f"the episode of world {np.flatnonzero(begins)[0]} is over: reset it by its mask")
+        if begins.any():
+            self._begin(begins)
+        infos: dict[str, Any] = {}
+        failed = self._go(actions, ~begins, infos)
+        observations = self._observations()
+        rewards = np.array(self._reward(self.batch, actions), np.float64)
+        terminated = failed if self._terminated is None else failed | np.asarray(self._terminated(self.batch), bool)
+        truncated = np.zeros(self.num_envs, bool)
+        if self._max_steps is not None:
+            truncated = (self._elapsed >= self._max_steps) & ~terminated
+        rewards[begins | failed] = 0
+        terminated, truncated = terminated & ~begins, truncated & ~begins
+        self._is_over = terminated | truncated
+        if mode is AutoresetMode.SAME_STEP and self._is_over.any():
+            observations = self._begin_at_once(observations, infos)
+        return observations, rewards, terminated, truncated, infos
+
+    def state(self) -> bytes:
+        """All of the environments, to go on to the same bits: worlds, inputs, episodes, seeds, memory."""
+        inputs = {name: getattr(self.batch, name).copy() for name in ("force", "torque", "ctrl", "gravity")}
+        clocks = (list(self._seeds), self._episodes.copy(), self._elapsed.copy(), self._is_over.copy())
+        return pickle.dumps((self.batch.save(), inputs, clocks, self._memory))
+
+    def set_state(self, state: bytes) -> None:
+        """Go on from a state of `state`, which may be of another process. It is a pickle: load only what you made.
+
+        ValueError: it has another number of worlds.
+        """
+        worlds, inputs, clocks, memory = pickle.loads(state)
+        if len(worlds) != self.num_envs:
+            raise ValueError(f"state has {len(worlds)} worlds: must have {self.num_envs}")
+        self.batch.restore(Snapshots.from_bytes(worlds))
+        for name, value in inputs.items():
+            setattr(self.batch, name, value)
+        for name, value in memory.items():
+            self._memory[name][...] = value
+        seeds, episodes, elapsed, is_over = clocks
+        self._seeds, self._episodes = list(seeds), episodes.copy()
+        self._elapsed, self._is_over = elapsed.copy(), is_over.copy()
+
+    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(f"reset_mask = {mask!r}: must be an array of {self.num_envs} bools with a True")
+        return mask
+
+    def _begin(self, mask: NDArray[np.bool_]) -> None:
+        self.batch.reset(mask)
+        self._episodes[mask] += 1
+        self._elapsed[mask] = 0
+        self._is_over[mask] = False
+        if self._start is not None:
+            for world in np.flatnonzero(mask):
+                rng = np.random.default_rng([self._seeds[world], int(self._episodes[world])])
+                self._start(rng, self.batch, int(world))
+
+    def _go(self, actions: NDArray[Any], mask: NDArray[np.bool_], infos: dict[str, Any]) -> NDArray[np.bool_]:
+        failed = np.zeros(self.num_envs, bool)
+        if not mask.any():
+            return failed
+        self._act(self.batch, actions)
+        try:
+            self.batch.step(self._frame_skip, worlds=mask)
+        except WorldError as error:
+            failed[error.worlds] = True
+            lines = np.full(self.num_envs, None, object)
+            lines[error.worlds] = error.messages
+            infos.update({"error": lines, "_error": failed.copy()})
+        self._elapsed[mask] += 1
+        return failed
+
+    def _begin_at_once(self, observations: Floats, infos: dict[str, Any]) -> Floats:
+        mask = self._is_over.copy()
+        finals, of_finals = np.full(self.num_envs, None, object), np.full(self.num_envs, None, object)
+        for world in np.flatnonzero(mask):
+            finals[world] = observations[world].copy()
+            of_finals[world] = {name: value[world] for name, value in infos.items() if not name.startswith("_")}
+        infos.update({"final_obs": finals, "_final_obs": mask, "final_info": of_finals, "_final_info": mask.copy()})
+        self._begin(mask)
+        return self._observations()
+
+    def _observations(self) -> Floats:
+        return np.array(self._observe(self.batch), np.float32)
+
+
+class Env(gymnasium.Env[Floats, NDArray[Any]]):
+    """One environment by itself, over a `VectorEnv` of one world."""
+
+    def __init__(self, make: Callable[..., VectorEnv], **options: Any) -> None:
+        self.envs = make(1, autoreset_mode=AutoresetMode.DISABLED, **options)
+        self.observation_space = self.envs.single_observation_space
+        self.action_space = self.envs.single_action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode."""
+        super().reset(seed=seed)
+        observations, infos = self.envs.reset(seed=seed)
+        return observations[0], infos
+
+    def step(self, action: NDArray[Any]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Act."""
+        observations, rewards, terminated, truncated, infos = self.envs.step(np.asarray(action)[None])
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), infos
+
+
+HALF_POLE, MOST_ANGLE, MOST_WAY, PUSH = 0.5, 0.21, 2.4, 10.0
+
+
+def _cart_and_pole() -> Scene:
+    world = World()
+    cart = world.add(Body.dynamic("cart").cuboid(0.25, 0.1, 0.15).mass(1).groups(1, 0).at(0, 0, 0))
+    pole = world.add(Body.dynamic("pole").cuboid(0.03, HALF_POLE, 0.03).mass(0.1).groups(1, 0).at(0, HALF_POLE, 0))
+    world.join(Joint(cart).slider((1, 0, 0)).at(0, 0, 0))
+    world.join(Joint(pole, cart).hinge((0, 0, 1)).at(0, 0, 0))
+    return Scene.from_world(world, dt=1 / 50, name="cart and pole")
+
+
+def cart_pole(
+    num_envs: int,
+    *,
+    max_steps: int = 500,
+    num_threads: int = 0,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+) -> VectorEnv:
+    """Push a cart (1 kg, up to 10 N) so that the pole on it (0.1 kg, 1 m) stands: one point a step of 1/50 s.
+
+    Observations: place and speed of the cart (m, m/s), angle and angular velocity of the pole (rad, rad/s). An episode ends at 2.4 m or 0.21 rad.
+    """
+    batch = Batch(_cart_and_pole(), num_envs, config=Config(sleep=False), num_threads=num_threads)
+
+    def observe(batch: Batch) -> NDArray[Any]:
+        angle = 2 * np.arctan2(batch.rotation[:, 1, 2], batch.rotation[:, 1, 3])
+        angle = (angle + np.pi) % (2 * np.pi) - np.pi
+        speeds = batch.linear_velocity[:, 0, 0], batch.angular_velocity[:, 1, 2]
+        return np.stack([batch.position[:, 0, 0], speeds[0], angle, speeds[1]], axis=1)
+
+    def terminated(batch: Batch) -> NDArray[np.bool_]:
+        way, _, angle, _ = observe(batch).T
+        fell: NDArray[np.bool_] = (np.abs(way) > MOST_WAY) | (np.abs(angle) > MOST_ANGLE)
+        return fell
+
+    def act(batch: Batch, actions: NDArray[Any]) -> None:
+        batch.force[:, 0, 0] = PUSH * np.clip(actions[:, 0], -1, 1)
+
+    def start(rng: np.random.Generator, batch: Batch, world: int) -> None:
+        x, speed, angle, turning = rng.uniform(-0.05, 0.05, 4)
+        batch.set_state(
+            worlds=[world],
+            bodies=[0, 1],
+            position=[[[x, 0, 0], [x - HALF_POLE * np.sin(angle), HALF_POLE * np.cos(angle), 0]]],
+            rotation=[[[0, 0, 0, 1], [0, 0, np.sin(angle / 2), np.cos(angle / 2)]]],
+            linear_velocity=[[[speed, 0, 0], [speed - HALF_POLE * turning, 0, 0]]],
+            angular_velocity=[[[0, 0, 0], [0, 0, turning]]],
+        )
+
+    return VectorEnv(
+        batch,
+        action_space=spaces.Box(-1, 1, (1,), np.float32),
+        observe=observe,
+        reward=lambda batch, actions: np.ones(batch.num_worlds),
+        act=act,
+        terminated=terminated,
+        start=start,
+        max_steps=max_steps,
+        autoreset_mode=autoreset_mode,
+    )
+
+
+def drawbridge(
+    num_envs: int,
+    *,
+    max_steps: int = 300,
+    num_threads: int = 0,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+) -> VectorEnv:
+    """Hold a deck with a crate on it at an angle that each episode draws, by the speeds of two winches (m/s, up to 0.5).
+
+    Observations: angle and angular velocity of the deck, the wanted angle (rad, rad/s), place of the crate and its velocity (m, m/s). The reward is
+    minus the distance of both angles. An episode ends when the crate falls off the deck.
+    """
+    batch = Batch(Scene.find("drawbridge"), num_envs, config=Config(sleep=False), num_threads=num_threads)
+    wanted = np.zeros(num_envs, np.float32)
+
+    def angle_of(batch: Batch) -> NDArray[Any]:
+        return 2 * np.arctan2(batch.rotation[:, 1, 2], batch.rotation[:, 1, 3])
+
+    def observe(batch: Batch) -> NDArray[Any]:
+        angles = np.stack([angle_of(batch), batch.angular_velocity[:, 1, 2], wanted], axis=1)
+        return np.concatenate([angles, batch.position[:, 2], batch.linear_velocity[:, 2]], axis=1)
+
+    def act(batch: Batch, actions: NDArray[Any]) -> None:
+        batch.ctrl[...] = 0.5 * np.clip(actions, -1, 1)
+
+    def start(rng: np.random.Generator, batch: Batch, world: int) -> None:
+        wanted[world] = rng.uniform(0.1, 0.5)
+
+    return VectorEnv(
+        batch,
+        action_space=spaces.Box(-1, 1, (2,), np.float32),
+        observe=observe,
+        reward=lambda batch, actions: -np.abs(angle_of(batch) - wanted),
+        act=act,
+        terminated=lambda batch: batch.position[:, 2, 1] < -1,
+        memory={"wanted": wanted},
+        start=start,
+        max_steps=max_steps,
+        autoreset_mode=autoreset_mode,
+    )

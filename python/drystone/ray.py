@@ -1,0 +1,177 @@
+"""Worlds on many machines: actors of Ray that own batches (drystone[ray])."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _check
+from ._batch import Batch, Snapshots
+from ._scene import Config, Scene
+
+# How often the same call may end its actor.
+MOST_DEATHS = 10
+
+
+class _Worlds:
+    """The worlds of an actor."""
+
+    def __init__(self, scene: Scene, config: Config, worlds: int, states: list[bytes] | None) -> None:
+        processors = int(_ray().get_runtime_context().get_assigned_resources().get("CPU", 1)) or 1
+        self.batch = Batch(scene, worlds, config=config, num_threads=processors)
+        if states is not None:
+            self.batch.restore(Snapshots.from_bytes(states))
+
+    def do(self, name: str, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
+        """A call of the batch, by its name."""
+        return getattr(self.batch, name)(*arguments, **options)
+
+
+@dataclass
+class _Share:
+    """Worlds of a fleet, their actor, and what makes the actor anew."""
+
+    first: int
+    count: int
+    actor: Any = None
+    kept: list[bytes] | None = None
+    # Calls that changed worlds since these bytes.
+    since: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = field(default_factory=list)
+
+
+class Fleet:
+    """Worlds 0 to num_worlds - 1 of a scene, spread over actors of `worlds_per_actor` worlds.
+
+    An actor that dies, with its process or its machine, is made again from bytes that are kept here every `keep_every` rollouts and from
+    the calls since: all hashes are as if it had never died. Ray must be initialized.
+
+    ValueError: an argument that cannot be used. RuntimeError: a call ended its actor ten times.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int,
+        *,
+        worlds_per_actor: int = 1024,
+        cpus_per_actor: float = 1,
+        keep_every: int = 10,
+        config: Config | None = None,
+    ) -> None:
+        self.num_worlds = _check.whole("num_worlds", num_worlds, 1)
+        each = _check.whole("worlds_per_actor", worlds_per_actor, 1)
+        self._keep_every = _check.whole("keep_every", keep_every, 1)
+        self._ray = _ray()
+        if not self._ray.is_initialized():
+            raise ValueError("Ray is not initialized: call ray.init first")
+        self._actor = self._ray.remote(max_restarts=0, num_cpus=cpus_per_actor)(_Worlds)
+        self._scene, self._config = scene, config or Config()
+        self._shares = [_Share(k, min(each, num_worlds - k)) for k in range(0, num_worlds, each)]
+        self.rebuilt = 0
+        for share in self._shares:
+            self._begin(share)
+
+    def rollout(
+        self, n: int, ctrl: ArrayLike | None = None, *, every: int = 1, record: Collection[str] = ("position",)
+    ) -> dict[str, NDArray[Any]]:
+        """`Batch.rollout` of all worlds: `ctrl` is [num_worlds or 1, n or 1, U], and arrays begin with num_worlds."""
+        numbers = None if ctrl is None else np.asarray(ctrl, np.float32)
+        if numbers is not None and (numbers.ndim != 3 or numbers.shape[0] not in (1, self.num_worlds)):
+            raise ValueError(f"ctrl has shape {numbers.shape}: must be ({self.num_worlds} or 1, {n} or 1, U)")
+
+        def arguments(share: _Share) -> tuple[tuple[Any, ...], dict[str, Any]]:
+            own = numbers
+            if numbers is not None and len(numbers) > 1:
+                own = numbers[share.first : share.first + share.count]
+            return (n, own), {"every": every, "record": record}
+
+        parts = self._all("rollout", arguments, changes=True)
+        self._keep()
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def reset(self, worlds: ArrayLike | None = None) -> None:
+        """`Batch.reset` of some worlds, or of all."""
+        chosen = _check.worlds(worlds, self.num_worlds)
+        self._all("reset", lambda share: ((self._own(share, chosen),), {}), changes=True)
+
+    def hash(self) -> NDArray[np.uint64]:
+        """The hash of each world."""
+        return np.concatenate(self._all("hash", lambda share: ((), {})))
+
+    def save(self) -> list[bytes]:
+        """The state of each world as bytes."""
+        return [state for part in self._all("save", lambda share: ((), {})) for state in part]
+
+    def measure(self, *names: str) -> dict[str, NDArray[np.float64]]:
+        """`Batch.measure` of all worlds."""
+        parts = self._all("measure", lambda share: (names, {}))
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def close(self) -> None:
+        """End the actors."""
+        for share in self._shares:
+            self._ray.kill(share.actor)
+
+    @staticmethod
+    def _own(share: _Share, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+        own = chosen[(chosen >= share.first) & (chosen < share.first + share.count)]
+        return own - share.first
+
+    def _begin(self, share: _Share) -> None:
+        share.actor = self._actor.remote(self._scene, self._config, share.count, share.kept)
+
+    def _all(
+        self,
+        name: str,
+        arguments: Callable[[_Share], tuple[tuple[Any, ...], dict[str, Any]]],
+        changes: bool = False,
+    ) -> list[Any]:
+        """A call of all actors, at the same time; what each gives."""
+        calls = [(name, *arguments(share)) for share in self._shares]
+        running = [share.actor.do.remote(*call) for share, call in zip(self._shares, calls, strict=True)]
+        results, first_error = [], None
+        for of in zip(self._shares, calls, running, strict=True):
+            try:
+                results.append(self._get(*of))
+            except Exception as error:
+                first_error = first_error or error
+        if changes:
+            # A call that failed in some worlds moved others.
+            for share, call in zip(self._shares, calls, strict=True):
+                share.since.append(call)
+        if first_error is not None:
+            raise first_error
+        return results
+
+    def _get(self, share: _Share, call: tuple[str, tuple[Any, ...], dict[str, Any]], running: Any) -> Any:
+        for _ in range(MOST_DEATHS):
+            try:
+                return self._ray.get(running)
+            except self._ray.exceptions.RayActorError:
+                self.rebuilt += 1
+                self._begin(share)
+                # In the order of the calls, which is that of the actor.
+                for before in share.since:
+                    share.actor.do.remote(*before)
+                running = share.actor.do.remote(*call)
+            except self._ray.exceptions.RayTaskError as error:
+                raise error.as_instanceof_cause() from None
+        raise RuntimeError(f"{call[0]} ended the actor of worlds {share.first} and on {MOST_DEATHS} times")
+
+    def _keep(self) -> None:
+        """Keep bytes of all worlds where enough calls came since."""
+        if all(len(share.since) >= self._keep_every for share in self._shares):
+            for share, kept in zip(self._shares, self._all("save", lambda share: ((), {})), strict=True):
+                share.kept, share.since = kept, []
+
+
+def _ray() -> Any:
+    try:
+        return importlib.import_module("ray")
+    except ImportError:
+        raise ValueError("Ray is not installed: pip install 'drystone[ray]'") from None

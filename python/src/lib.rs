@@ -1,0 +1,48 @@
+//! The part of the Python package that is written in Rust. `python/drystone` checks arguments and has the documentation; here arrays arrive with
+//! the right shapes and types.
+
+#![deny(unsafe_code)]
+
+mod batch;
+mod columns;
+mod scene;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A mistake of drystone.");
+
+/// An error of the library as one of Python.
+pub fn raised(error: drystone::Error) -> PyErr {
+    use drystone::Error;
+    let line = error.to_string();
+    match error {
+        Error::Input(_) => PyValueError::new_err(line),
+        Error::File { .. } => PyOSError::new_err(line),
+        Error::Panicked(_) => InternalError::new_err(line),
+        _ => PyRuntimeError::new_err(line),
+    }
+}
+
+/// Runs the command `drystone`; the first word is the name of the program. Returns its exit code.
+#[pyfunction]
+fn command(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    let code = py.detach(|| drystone_cli::commands::main_of(&words));
+    // An exit code tells its number by comparison alone.
+    (0..=u8::MAX).find(|&number| ExitCode::from(number) == code).unwrap_or(1)
+}
+
+#[pymodule(gil_used = false)]
+mod _drystone {
+    #[pymodule_export]
+    use super::InternalError;
+    #[pymodule_export]
+    use super::batch::{Batch, State};
+    #[pymodule_export]
+    use super::command;
+    #[pymodule_export]
+    use super::scene::{Config, Scene, catalogue, schema};
+}

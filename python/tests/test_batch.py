@@ -1,0 +1,323 @@
+"""Batches: bits, states, arrays, errors, threads, forks, signals."""
+
+import gc
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import drystone as ds
+
+SCENES = [("tower", {"n": 5}), ("pile", {"n": 27}), ("bridge", {"planks": 6, "boxes": 2}), ("drawbridge", {})]
+
+
+def moving(batch: ds.Batch) -> int:
+    """A body that can be pushed."""
+    return int(np.flatnonzero(batch.exists[0])[-1])
+
+
+def drive(batch: ds.Batch, steps: int, worlds: list[int] | None = None) -> None:
+    """Push the last body of each world by a force of its own."""
+    for world in range(batch.num_worlds) if worlds is None else worlds:
+        batch.force[world, moving(batch)] = (100 * (world + 1), 50, 0)
+    batch.step(steps, worlds=worlds)
+
+
+@pytest.mark.parametrize(("name", "parameters"), SCENES)
+def test_bits_do_not_depend_on_neighbours_threads_or_calls(name: str, parameters: dict) -> None:
+    scene = ds.Scene.find(name, **parameters)
+    alone = ds.Batch(scene, 1, num_threads=1)
+    drive(alone, 60)
+    for worlds, threads in [(1, 2), (5, 1), (5, 2), (8, 3)]:
+        batch = ds.Batch(scene, worlds, num_threads=threads)
+        drive(batch, 25)
+        batch.step(35)
+        assert batch.hash()[0] == alone.hash()[0], (worlds, threads)
+        assert len(set(batch.hash().tolist())) == worlds
+        assert np.array_equal(batch.position[0], alone.position[0], equal_nan=True)
+
+
+def test_the_hash_is_that_of_the_command() -> None:
+    command = [sys.executable, "-c", "from drystone._command import main; main()", "run", "pile", "-p", "n=27"]
+    out = subprocess.run([*command, "--steps", "50"], capture_output=True, text=True, check=True).stdout
+    printed = next(line.split()[1] for line in out.splitlines() if line.split()[:1] == ["hash"])
+    batch = ds.Batch(ds.Scene.find("pile", n=27), 3)
+    batch.step(50)
+    assert {f"{h:016x}" for h in batch.hash()} == {printed}
+    wrong = subprocess.run([*command, "--steps", "-1"], capture_output=True, text=True)
+    assert wrong.returncode == 2 and "--steps" in wrong.stderr
+
+
+@pytest.mark.parametrize(("name", "parameters"), SCENES)
+def test_reset_restore_save_and_load_are_exact(name: str, parameters: dict) -> None:
+    scene = ds.Scene.find(name, **parameters)
+    batch, fresh = ds.Batch(scene, 4), ds.Batch(scene, 4)
+    start = batch.hash()
+    drive(batch, 37)
+    before = batch.hash()
+    batch.reset(np.array([False, True, False, True]))
+    assert (batch.hash()[[1, 3]] == start[[1, 3]]).all() and (batch.hash()[[0, 2]] == before[[0, 2]]).all()
+    assert batch.steps.tolist() == [37, 0, 37, 0] and batch.time[1] == 0
+    drive(batch, 60, [1])
+    drive(fresh, 60, [1])
+    assert batch.hash()[1] == fresh.hash()[1] and batch.hash()[0] == before[0]
+    # One state into others, and as bytes into another batch.
+    states = pickle.loads(pickle.dumps(batch.snapshot([1, 2])))
+    batch.restore(states, [0, 3], source=[1, 0])
+    assert batch.hash().tolist() == [states.hash[1], states.hash[0], states.hash[1], states.hash[0]]
+    assert batch.steps.tolist() == [37, 60, 37, 60] and states.steps.tolist() == [60, 37]
+    loaded = ds.Batch.load(batch.save([1]))
+    batch.step(30), loaded.step(30)
+    assert (batch.hash()[[1, 3]] == loaded.hash()[0]).all()
+    loaded.reset()
+    assert loaded.hash()[0] == states.hash[0] and loaded.steps[0] == 60
+
+
+def test_views_outlive_the_batch_and_cannot_be_written() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=27), 3)
+    position, again = batch.position, batch.position
+    assert position is again and position.flags.c_contiguous and position.dtype == np.float32
+    copy = position.copy()
+    batch.step(30)
+    assert not np.array_equal(position, copy, equal_nan=True), "a view shows what the last call left"
+    with pytest.raises(ValueError):
+        position[0, 0, 0] = 1
+    last = position.copy()
+    del batch
+    gc.collect()
+    filler = [np.ones_like(last) for _ in range(50)]
+    assert np.array_equal(position, last, equal_nan=True) and len(filler) == 50
+
+
+def test_worlds_of_several_sizes_and_settings() -> None:
+    scenes = [ds.Scene.find("tower", n=n) for n in (2, 5, 3)]
+    batch = ds.Batch(scenes, config=[ds.Config("fast"), ds.Config("accurate"), ds.Config(sleep=False)])
+    batch.step(20)
+    assert batch.exists.sum(axis=1).tolist() == [3, 6, 4]
+    assert np.isnan(batch.position[0, 3:]).all() and np.isfinite(batch.position[1]).all()
+    assert [int(batch.substeps[k, 1]) for k in range(3)] == [4, 32, 8] and batch.substeps[0, 5] == 0
+    alone = ds.Batch(scenes[2], config=ds.Config(sleep=False))
+    alone.step(20)
+    assert batch.hash()[2] == alone.hash()[0]
+
+
+def test_a_rollout_records_what_steps_give() -> None:
+    scene = ds.Scene.find("drawbridge")
+    ctrl = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 24, 2)).astype(np.float32)
+    names = ("position", "joint_position", "kinetic_energy", "ctrl", "hash", "friction")
+    out = ds.Batch(scene, 3, num_threads=2).rollout(24, ctrl, every=6, record=names)
+    batch = ds.Batch(scene, 3, num_threads=1)
+    for step in range(24):
+        batch.ctrl = ctrl[:, step]
+        batch.step()
+        if step % 6 == 5:
+            row = step // 6
+            assert np.array_equal(out["hash"][:, row], batch.hash())
+            assert np.array_equal(out["position"][:, row], batch.position, equal_nan=True)
+            assert np.array_equal(out["joint_position"][:, row], batch.joint_position, equal_nan=True)
+            assert np.array_equal(out["kinetic_energy"][:, row], batch.measure("kinetic_energy")["kinetic_energy"])
+            assert np.array_equal(out["ctrl"][:, row], ctrl[:, step])
+    assert len(set(out["hash"][:, -1].tolist())) == 3
+    assert out["friction"].shape == (3, 4, batch.num_bodies)
+
+
+def test_a_world_that_fails_stops_alone_as_it_was() -> None:
+    batch = ds.Batch(ds.Scene.find("tower", n=3), 4, num_threads=2)
+    batch.step(10)
+    before = batch.hash()
+    batch.force[2, 1] = (np.nan, 0, 0)
+    with pytest.raises(ds.WorldError, match=r'^world 2: body 1 .*force') as caught:
+        batch.step(20)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.worlds.tolist() == [2] and again.messages == caught.value.messages and str(again) == str(caught.value)
+    assert batch.steps.tolist() == [30, 30, 10, 30] and batch.hash()[2] == before[2]
+    batch.force[2, 1] = 0
+    batch.step(20, worlds=[2])
+    assert batch.hash()[2] == batch.hash()[0]
+    # Within a rollout: numbers before the failing step are there, and none after it.
+    ctrl = np.zeros((2, 1, 2))
+    bridge = ds.Batch(ds.Scene.find("drawbridge"), 2)
+    bridge.gravity[1] = (0, -1e30, 0)
+    with pytest.raises(ds.WorldError, match="world 1: .*gravity") as caught:
+        bridge.rollout(4, ctrl)
+    record = caught.value.records["position"]
+    assert np.isfinite(record[0]).all() and np.isnan(record[1]).all()
+
+
+BATCH = ds.Batch(ds.Scene.find("drawbridge"), 8)
+B, U = BATCH.num_bodies, BATCH.num_actuators
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (lambda: BATCH.apply_impulse(np.zeros((8, 2))), f"impulse has shape (8, 2): must be (8, {B}, 3)"),
+        (lambda: BATCH.apply_impulse(np.full((8, B, 3), np.nan)), "impulse[0, 0, 0] = nan: must be finite"),
+        (lambda: BATCH.apply_impulse(np.full((8, B, 3), 1e300)), "impulse[0, 0, 0] = 1e+300: must be finite"),
+        (lambda: BATCH.apply_impulse([["a"]]), "impulse has dtype <U1: must be numbers"),
+        (lambda: BATCH.apply_impulse([[1], [1, 2]]), f"impulse has rows of several lengths: must have shape (8, {B}, 3)"),
+        (lambda: BATCH.step(-1), "n = -1: must be 0 or more"),
+        (lambda: BATCH.step(1.5), "n = 1.5: must be a whole number"),
+        (lambda: BATCH.step(dt=2), "dt = 2.0: must be 1e-9 to 1 s"),
+        (lambda: BATCH.step(worlds=np.ones(5, bool)), "worlds is a mask of shape (5,): must be (8,)"),
+        (lambda: BATCH.step(worlds=[3, 8]), "worlds has 8: must be 0 to 7"),
+        (lambda: BATCH.step(worlds=[3, 1]), "worlds = [3, 1]: must ascend"),
+        (lambda: BATCH.step(worlds=[0.5]), "worlds has dtype float64: must be a mask of bools or whole numbers"),
+        (lambda: BATCH.rollout(4, np.zeros((8, 3, U))), f"ctrl has shape (8, 3, {U}): must be (8 or 1, 4 or 1, {U})"),
+        (lambda: BATCH.rollout(4, record=["positon"]), "record = 'positon': did you mean 'position'?"),
+        (lambda: BATCH.rollout(4, every=0), "every = 0: must be 1 or more"),
+        (lambda: BATCH.measure("overlap"), "name = 'overlap': did you mean 'overlap_95'?"),
+        (lambda: BATCH.set_state(position=np.zeros((8, 1, 3))), f"position has shape (8, 1, 3): must be (8, {B}, 3)"),
+        (lambda: BATCH.restore(BATCH.snapshot([0, 1])), "snapshots has 2 states: must be 1 or 8"),
+        (lambda: BATCH.restore(b"", [0]), "snapshots is bytes: must be Snapshots; Snapshots.from_bytes makes them of bytes"),
+        (lambda: BATCH.ray([[0, 0]], [[0, 0]]), "origin has shape (1, 2): must be (any, 3)"),
+        (lambda: ds.Batch.load([b"drystone"]), "a saved world of a batch cannot be loaded: cut short"),
+        (lambda: ds.Batch.load([BATCH.save()[0][:-1]]), None),
+        (lambda: ds.Batch("tower"), "scene is str: must be Scene or a list of Scene"),
+        (lambda: ds.Batch([]), "scene is empty: must have at least one Scene"),
+        (lambda: ds.Batch(ds.Scene.find("tower"), 0), "num_worlds = 0: must be 1 or more"),
+        (lambda: ds.Batch(ds.Scene.find("tower"), 2, listen=["contact"]), "listen = 'contact': did you mean 'contacts'?"),
+        (lambda: ds.Scene.find("tower", m=3), None),
+        (lambda: ds.Scene.find("tower", n=0), None),
+        (lambda: ds.Scene.find("tower", n="many"), "n = 'many': must be a number"),
+        (lambda: ds.Scene.from_dict({"version": 1, "bodies": [{"kind": "stone"}]}), None),
+        (lambda: ds.Config("quick"), None),
+        (lambda: ds.Config(substeps=0), "substeps = 0: must be 1 to 4096"),
+        (lambda: setattr(BATCH, "ctrl", np.zeros((8, U + 1))), f"ctrl has shape (8, {U + 1}): must be (8, {U})"),
+    ],
+)
+def test_wrong_arguments_are_named_and_change_nothing(call, line: str | None) -> None:
+    before = BATCH.hash()
+    with pytest.raises(ValueError) as caught:
+        call()
+    text = str(caught.value)
+    assert text == line if line else ("\n" not in text and ":" in text), text
+    assert (BATCH.hash() == before).all() and (BATCH.steps == 0).all()
+
+
+def test_a_state_of_more_bodies_does_not_fit() -> None:
+    small, large = (ds.Batch(ds.Scene.find("tower", n=n)) for n in (2, 5))
+    with pytest.raises(ValueError, match=r"snapshots\[0\] has 6 bodies, 0 joints, 0 drives: must be at most 3 bodies"):
+        small.restore(large.snapshot())
+    large.restore(small.snapshot())
+    large.step(10), small.step(10)
+    assert large.hash()[0] == small.hash()[0] and large.exists.sum() == 3
+
+
+def test_threads_wait_for_each_other_and_leave_python_running() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=60), 8, config=ds.Config(sleep=False), num_threads=1)
+    ticks, over = 0, threading.Event()
+
+    def count() -> None:
+        nonlocal ticks
+        while not over.is_set():
+            ticks += 1
+            time.sleep(0.001)
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    callers = [threading.Thread(target=batch.step, args=(25,)) for _ in range(2)]
+    begin = time.perf_counter()
+    [caller.start() for caller in callers]
+    [caller.join() for caller in callers]
+    seconds = time.perf_counter() - begin
+    over.set()
+    counter.join()
+    assert batch.steps.tolist() == [50] * 8
+    assert ticks > 20 * seconds, f"{ticks} ticks in {seconds} s"
+
+
+def _in_child(batch: ds.Batch, queue) -> None:
+    try:
+        batch.step()
+        queue.put("stepped")
+    except RuntimeError as error:
+        other = ds.Batch(ds.Scene.find("pile", n=60), 2, num_threads=2)
+        other.step(3)
+        queue.put((str(error), int(other.hash()[0]), float(other.measure("overlap_max")["overlap_max"][0])))
+
+
+def test_after_a_fork_a_batch_says_so_and_a_new_one_works() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=60), 2, num_threads=2)
+    batch.step(3)
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=_in_child, args=(batch, queue))
+    child.start()
+    message, hash_, overlap = queue.get(timeout=60)
+    child.join(30)
+    assert "before a fork" in message
+    assert hash_ == int(batch.hash()[0]) and overlap == batch.measure("overlap_max")["overlap_max"][0]
+
+
+def test_ctrl_c_ends_a_rollout_between_two_steps() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=27), 3, config=ds.Config(sleep=False), num_threads=2)
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        batch.step(10**9)
+    assert time.perf_counter() - begin < 5
+    steps = batch.steps.copy()
+    assert (steps > 0).any() and np.isfinite(batch.position).all()
+    same = ds.Batch(ds.Scene.find("pile", n=27), 3, config=ds.Config(sleep=False))
+    for world, count in enumerate(steps):
+        same.step(int(count), worlds=[world])
+    assert (same.hash() == batch.hash()).all() and np.array_equal(same.position, batch.position)
+
+
+def test_contacts_events_rays_and_materials() -> None:
+    batch = ds.Batch(ds.Scene.find("tower", n=3), 2, listen=["contacts", "impulses", "hits"], hits_above=0.1)
+    batch.step()
+    assert batch.events()["kind"].tolist() == ["began"] * 6 and batch.events([1])["world"].tolist() == [1] * 3
+    batch.step(119)
+    contacts = batch.contacts()
+    assert contacts.world_start.tolist() == [0, 3, 6] and contacts.bodies[:3].tolist() == [[0, 1], [1, 2], [2, 3]]
+    weight = 1000 * 9.81 / 60
+    assert np.allclose(contacts.of(1).impulse[:, 1], [3 * weight, 2 * weight, weight], rtol=0.02)
+    assert np.isclose(contacts.point_impulse.sum(), 12 * weight, rtol=0.02)
+    hits = batch.ray([[0, 9, 0], [5, 9, 0]], [[0, -1, 0], [0, 1, 0]])
+    assert hits.body.tolist() == [[3, -1]] * 2 and np.isinf(hits.distance[0, 1]) and np.isnan(hits.normal[0, 1]).all()
+    assert np.allclose(hits.normal[0, 0], [0, 1, 0])
+    # A tower without friction slides where one with friction stays.
+    batch.set_material(friction=[[0.5] * 4, [0.0] * 4])
+    batch.gravity[:] = (2, -9.81, 0)
+    batch.step(30)
+    moved = batch.position[:, 3, 0]
+    assert abs(moved[0]) < 0.01 and moved[1] > 0.1
+    batch.reset()
+    assert np.allclose(batch.friction, 0.5) and np.allclose(batch.gravity, (0, -9.81, 0))
+
+
+def test_scenes_and_settings_are_pickled_and_read_back() -> None:
+    scene = ds.Scene.find("tower", n=3, top_ratio=5)
+    for again in (pickle.loads(pickle.dumps(scene)), ds.Scene.from_dict(scene.to_dict())):
+        one, two = ds.Batch(scene), ds.Batch(again)
+        one.step(30), two.step(30)
+        assert one.hash() == two.hash()
+    config = ds.Config("fast", sleep=False, relax=2)
+    assert pickle.loads(pickle.dumps(config)).to_dict() == config.to_dict()
+    assert (config["substeps"], config["relax"], config["sleep_after"]) == (4, 2, 0)
+    with pytest.raises(TypeError, match="save"):
+        pickle.dumps(ds.Batch(scene))
+
+
+def test_a_pendulum_built_by_hand_keeps_its_energy() -> None:
+    world = ds.World()
+    world.add(ds.Body.dynamic("bob").ball(0.1).at(1, 0, 0))
+    world.join(ds.Joint("bob").hinge((0, 0, 1)).at(0, 0, 0))
+    batch = ds.Batch(ds.Scene.from_world(world, dt=1 / 240), config=ds.Config("accurate", sleep=False))
+    energy = []
+    for _ in range(60):
+        batch.step(4)
+        energy.append(sum(batch.measure("kinetic_energy", "potential_energy").values())[0])
+    mass = 1000 * 4 / 3 * np.pi * 0.1**3
+    assert batch.joint_position.shape == (1, 1, 6) and batch.position[0, 0, 1] < 0
+    assert np.ptp(energy) < 1e-3 * mass * 9.81

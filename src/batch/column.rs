@@ -1,0 +1,253 @@
+//! Numbers of all bodies, joints or drives of a world in a row.
+
+use glam::{Quat, Vec3};
+
+use super::Member;
+use crate::error::{Result, ensure, input};
+use crate::names::named;
+use crate::world::{Axis, Drive, Joint, Linear, World};
+
+/// Numbers of a world that stand beside each other: a row for each body, joint, drive or world. See [`Member::read`].
+///
+/// ```
+/// use drystone::batch::{Batch, Column};
+/// use drystone::{Scene, SolverConfig};
+///
+/// let mut batch = Batch::of(&Scene::find("tower", &["n=2".into()])?, &SolverConfig::default(), 1)?;
+/// let world = batch.world_mut(0);
+/// let mut position = [0.0; 9];
+/// world.read(Column::Position, &mut position);
+/// assert_eq!(position[3..], [0.0, 0.5, 0.0, 0.0, 1.5, 0.0]);
+/// // Forces last until they change.
+/// world.write(Column::Force, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])?;
+/// assert_eq!(world.simulation().world.bodies[2].force.x, 50.0);
+/// assert!(world.write(Column::JointSpeed, &[]).is_err(), "what follows from others cannot be written");
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Column {
+    /// Place of each body (m).
+    Position,
+    /// Turn of each body, x y z w.
+    Rotation,
+    /// Velocity of each center of mass (m/s).
+    LinearVelocity,
+    /// Angular velocity of each body (rad/s).
+    AngularVelocity,
+    /// Lasting force on each body (N).
+    Force,
+    /// Lasting torque on each body (N m).
+    Torque,
+    /// Coefficient of friction of each body.
+    Friction,
+    /// Coefficient of restitution of each body.
+    Restitution,
+    /// Gravity of the world (m/s²).
+    Gravity,
+    /// Speed of each motor and target of each spring: those of [`drives`].
+    Control,
+    /// Three lengths (m) and three angles (rad) of each joint.
+    JointPosition,
+    /// Their speeds (m/s, rad/s).
+    JointSpeed,
+    /// Impulse of each joint on its body b in the last substep (N s).
+    JointImpulse,
+    /// Angular impulse of each joint on its body b in the last substep (N m s).
+    JointTorqueImpulse,
+}
+
+named!(Column {
+    Position = "position",
+    Rotation = "rotation",
+    LinearVelocity = "linear_velocity",
+    AngularVelocity = "angular_velocity",
+    Force = "force",
+    Torque = "torque",
+    Friction = "friction",
+    Restitution = "restitution",
+    Gravity = "gravity",
+    Control = "ctrl",
+    JointPosition = "joint_position",
+    JointSpeed = "joint_speed",
+    JointImpulse = "joint_impulse",
+    JointTorqueImpulse = "joint_torque_impulse",
+});
+
+impl Column {
+    /// Numbers in a row.
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Control | Self::Friction | Self::Restitution => 1,
+            Self::Rotation => 4,
+            Self::JointPosition | Self::JointSpeed => 6,
+            _ => 3,
+        }
+    }
+
+    /// Rows that a world has.
+    pub fn rows(self, world: &World) -> usize {
+        match self {
+            Self::Gravity => 1,
+            Self::Control => drives(world).count(),
+            Self::JointPosition | Self::JointSpeed | Self::JointImpulse | Self::JointTorqueImpulse => {
+                world.joints.len()
+            }
+            _ => world.bodies.len(),
+        }
+    }
+}
+
+/// A drive of a joint: the joint, and which of its axes, those to shift along (or the distance) before those to turn about.
+///
+/// ```
+/// use drystone::batch::{Column, DriveOf, drives};
+///
+/// let scene = drystone::Scene::find("drawbridge", &[])?;
+/// let all: Vec<DriveOf> = drives(&scene.world).collect();
+/// assert_eq!((all[0].name.as_str(), all[1].name.as_str()), ("joint 1: deck - tower", "joint 2: deck - tower"));
+/// assert_eq!((Column::Control.rows(&scene.world), Column::Control.width()), (2, 1));
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveOf {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Index of the axis.
+    pub axis: usize,
+    /// The joint, its bodies by their names, and the axis where the joint has several drives.
+    pub name: String,
+}
+
+/// The driven axes of a world, in the order of its joints.
+pub fn drives(world: &World) -> impl Iterator<Item = DriveOf> + '_ {
+    world.joints.iter().enumerate().flat_map(move |(index, joint)| {
+        let own: Vec<usize> = driven(joint).collect();
+        let is_one = own.len() == 1;
+        own.into_iter().map(move |axis| {
+            let bodies = name_of(world, joint);
+            let name =
+                format!("joint {index}: {bodies}") + &if is_one { String::new() } else { format!(", axis {axis}") };
+            DriveOf { joint: index, axis, name }
+        })
+    })
+}
+
+fn driven(joint: &Joint) -> impl Iterator<Item = usize> + '_ {
+    let axes = joint.linear_axes().iter().chain(&joint.angular).enumerate();
+    axes.filter(|(_, axis)| axis.drive != Drive::None).map(|(k, _)| k)
+}
+
+fn name_of(world: &World, joint: &Joint) -> String {
+    let name = |body: usize| match world.bodies.get(body) {
+        Some(body) if !body.name.is_empty() => body.name.clone(),
+        _ => format!("body {body}"),
+    };
+    let (a, b) = joint.indices();
+    format!("{} - {}", name(a), b.map_or_else(|| "world".into(), name))
+}
+
+fn axes_mut(joint: &mut Joint) -> impl Iterator<Item = &mut Axis> {
+    let linear = match &mut joint.linear {
+        Linear::Axes(axes) => axes.as_mut_slice(),
+        Linear::Distance(distance) => std::slice::from_mut(distance),
+    };
+    linear.iter_mut().chain(&mut joint.angular)
+}
+
+/// The number of a drive that a controller sets.
+fn aim(drive: &mut Drive) -> Option<&mut f32> {
+    match drive {
+        Drive::None => None,
+        Drive::Motor { speed, .. } => Some(speed),
+        Drive::Spring { target, .. } => Some(target),
+    }
+}
+
+impl Member {
+    /// Writes a column into `out`, row by row. What is left of it, and rows of bodies that are gone, becomes NaN.
+    pub fn read(&self, column: Column, out: &mut [f32]) {
+        out.fill(f32::NAN);
+        let world = &self.simulation().world;
+        let rows = out.chunks_exact_mut(column.width());
+        let bodies = || world.bodies.iter().enumerate().map(|(i, body)| (!world.bodies.is_vacant(i)).then_some(body));
+        match column {
+            Column::Position => put(rows, bodies().map(|b| b.map(|b| b.position.to_array()))),
+            Column::Rotation => put(rows, bodies().map(|b| b.map(|b| b.rotation.to_array()))),
+            Column::LinearVelocity => put(rows, bodies().map(|b| b.map(|b| b.linear_velocity.to_array()))),
+            Column::AngularVelocity => put(rows, bodies().map(|b| b.map(|b| b.angular_velocity.to_array()))),
+            Column::Force => put(rows, bodies().map(|b| b.map(|b| b.force.to_array()))),
+            Column::Torque => put(rows, bodies().map(|b| b.map(|b| b.torque.to_array()))),
+            Column::Friction => put(rows, bodies().map(|b| b.map(|b| [b.material.friction]))),
+            Column::Restitution => put(rows, bodies().map(|b| b.map(|b| [b.material.restitution]))),
+            Column::Gravity => put(rows, [Some(world.gravity_of(0).to_array())]),
+            Column::Control => put(rows, world.joints.iter().flat_map(aims).map(|aim| Some([aim]))),
+            Column::JointPosition => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).position))),
+            Column::JointSpeed => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).speed))),
+            Column::JointImpulse => put(rows, self.simulation().joint_impulses().iter().map(|v| Some(v.to_array()))),
+            Column::JointTorqueImpulse => {
+                put(rows, self.simulation().joint_angular_impulses().iter().map(|v| Some(v.to_array())));
+            }
+        }
+    }
+
+    /// Takes a column over: poses, velocities, forces, torques, materials, gravity or drives. Rows of bodies that are gone are passed over. Contacts
+    /// that still touch keep their impulses, and so do joints.
+    ///
+    /// # Errors
+    /// The column follows from others, or there are fewer numbers than it has. What the numbers say is checked by the next step.
+    pub fn write(&mut self, column: Column, values: &[f32]) -> Result<()> {
+        write(&mut self.simulation_mut().world, column, values)
+    }
+}
+
+/// [`Member::write`], for a world.
+///
+/// # Errors
+/// As there.
+pub fn write(world: &mut World, column: Column, values: &[f32]) -> Result<()> {
+    let needed = column.rows(world) * column.width();
+    ensure(values.len() >= needed, || format!("{column} has {} numbers: must be {needed}", values.len()))?;
+    let vector = |row: &[f32]| Vec3::new(row[0], row[1], row[2]);
+    let rows = values.chunks_exact(column.width());
+    if let Column::Gravity = column {
+        world.gravity = vector(values);
+        world.own_gravity.clear();
+        return Ok(());
+    }
+    if let Column::Control = column {
+        let aims = world.joints.iter_mut().flat_map(axes_mut).filter_map(|axis| aim(&mut axis.drive));
+        aims.zip(values).for_each(|(aim, value)| *aim = *value);
+        return Ok(());
+    }
+    let is_there: Vec<bool> = (0..world.bodies.len()).map(|i| !world.bodies.is_vacant(i)).collect();
+    let bodies = world.bodies.iter_mut().zip(rows).zip(is_there).filter(|all| all.1).map(|all| all.0);
+    match column {
+        Column::Position => bodies.for_each(|(body, row)| body.position = vector(row)),
+        Column::Rotation => bodies.for_each(|(body, row)| body.rotation = Quat::from_slice(row)),
+        Column::LinearVelocity => bodies.for_each(|(body, row)| body.linear_velocity = vector(row)),
+        Column::AngularVelocity => bodies.for_each(|(body, row)| body.angular_velocity = vector(row)),
+        Column::Force => bodies.for_each(|(body, row)| body.force = vector(row)),
+        Column::Torque => bodies.for_each(|(body, row)| body.torque = vector(row)),
+        Column::Friction => bodies.for_each(|(body, row)| body.material.friction = row[0]),
+        Column::Restitution => bodies.for_each(|(body, row)| body.material.restitution = row[0]),
+        _ => return Err(input!("{column} follows from the state: it cannot be written")),
+    }
+    Ok(())
+}
+
+fn aims(joint: &Joint) -> impl Iterator<Item = f32> + '_ {
+    let axes = joint.linear_axes().iter().chain(&joint.angular);
+    axes.filter_map(|axis| aim(&mut axis.drive.clone()).map(|aim| *aim))
+}
+
+fn put<'a, const N: usize>(
+    rows: impl Iterator<Item = &'a mut [f32]>,
+    values: impl IntoIterator<Item = Option<[f32; N]>>,
+) {
+    for (row, value) in rows.zip(values) {
+        if let Some(value) = value {
+            row.copy_from_slice(&value);
+        }
+    }
+}

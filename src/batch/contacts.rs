@@ -1,0 +1,120 @@
+//! Contacts and events of many worlds in columns.
+
+use super::Member;
+use crate::simulation::{Contact, Event, Hit};
+
+/// Contacts of some worlds: those of one world stand together, in the order of the worlds that were asked for, and so do the points of one
+/// contact. Within a world they ascend by the pair of bodies, which is the same order on every machine.
+///
+/// ```
+/// use drystone::batch::{Batch, Contacts};
+/// use drystone::{Listen, Scene, SolverConfig};
+///
+/// let mut batch = Batch::of(&Scene::find("tower", &["n=2".into()])?, &SolverConfig::default(), 2)?;
+/// for world in batch.worlds_mut() {
+///     world.simulation_mut().listen(Listen { impulses: true, ..Listen::default() })?;
+/// }
+/// batch.step(30, &[0, 1])?;
+/// let Contacts { world_start, bodies, impulse, point_start, .. } = batch.contacts(&[0, 1])?;
+/// assert_eq!((world_start, &bodies[..2], point_start.len()), (vec![0, 2, 4], &[[0, 1], [1, 2]][..], 5));
+/// assert!(impulse[0][1] > impulse[1][1], "the lower one bears more");
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contacts {
+    /// Where the contacts of each world begin, and where those of the last end.
+    pub world_start: Vec<u32>,
+    /// Bodies a and b of each contact.
+    pub bodies: Vec<[u32; 2]>,
+    /// Unit normal from a to b.
+    pub normal: Vec<[f32; 3]>,
+    /// Impulse on b of the whole step (N s); zero unless the simulation listens.
+    pub impulse: Vec<[f32; 3]>,
+    /// Where the points of each contact begin, and where those of the last end.
+    pub point_start: Vec<u32>,
+    /// Place of each point, midway between the surfaces (m).
+    pub point: Vec<[f32; 3]>,
+    /// Distance of the surfaces along the normal when the step began (m).
+    pub separation: Vec<f32>,
+    /// Normal impulse on b of the whole step (N s); zero unless the simulation listens.
+    pub point_impulse: Vec<f32>,
+}
+
+impl Contacts {
+    pub(super) fn of<'a>(members: impl Iterator<Item = &'a Member>) -> Self {
+        let mut all = Self { world_start: vec![0], point_start: vec![0], ..Self::default() };
+        for member in members {
+            let mut own: Vec<Contact> = member.simulation().contacts().collect();
+            own.sort_by_cached_key(order);
+            own.iter().for_each(|contact| all.push(contact));
+            all.world_start.push(all.bodies.len() as u32);
+        }
+        all
+    }
+
+    fn push(&mut self, contact: &Contact) {
+        let Contact { a, b, normal, impulse, .. } = contact;
+        self.bodies.push([a.body.index() as u32, b.body.index() as u32]);
+        self.normal.push(normal.to_array());
+        self.impulse.push(impulse.to_array());
+        for point in contact.points() {
+            self.point.push(point.position.to_array());
+            self.separation.push(point.separation);
+            self.point_impulse.push(point.impulse);
+        }
+        self.point_start.push(self.point.len() as u32);
+    }
+}
+
+/// Bodies, then colliders, then places: parts of two shapes may have several contacts.
+fn order(contact: &Contact) -> impl Ord + use<> {
+    let (a, b) = (contact.a, contact.b);
+    let pair = [a.body.index().min(b.body.index()), a.body.index().max(b.body.index()), a.collider, b.collider];
+    let places: Vec<u32> = contact.points().iter().flat_map(|p| p.position.to_array()).map(f32::to_bits).collect();
+    (pair, places)
+}
+
+/// Something that happened in a step: an [`Event`] with the indices of its bodies.
+///
+/// ```
+/// use drystone::batch::{Batch, EventRow};
+/// use drystone::{Listen, Scene, SolverConfig};
+///
+/// let mut batch = Batch::of(&Scene::find("tower", &["n=1".into()])?, &SolverConfig::default(), 2)?;
+/// for world in batch.worlds_mut() {
+///     world.simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
+/// }
+/// batch.step(1, &[0, 1])?;
+/// let began = |world| EventRow { world, kind: "began", a: Some(0), b: Some(1), value: 0.0 };
+/// assert_eq!(batch.events(&[0, 1])?, [began(0), began(1)]);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EventRow {
+    /// The world.
+    pub world: u32,
+    /// began, ended, hit, entered, left, passed or broke.
+    pub kind: &'static str,
+    /// The body with the lesser index, or that of the sensor; none for a joint.
+    pub a: Option<u32>,
+    /// The other one.
+    pub b: Option<u32>,
+    /// Speed of a hit (m/s), time of a passage within the step (s), or force on a joint that broke (N); else 0.
+    pub value: f32,
+}
+
+pub(super) fn events(world: usize, member: &Member) -> impl Iterator<Item = EventRow> + '_ {
+    member.simulation().events().iter().map(move |event| {
+        let (kind, bodies, value) = match event {
+            Event::Began { a, b } => ("began", Some((a, b)), 0.0),
+            Event::Ended { a, b } => ("ended", Some((a, b)), 0.0),
+            Event::Hit(Hit { a, b, speed, .. }) => ("hit", Some((a, b)), *speed),
+            Event::Entered { sensor, visitor } => ("entered", Some((sensor, visitor)), 0.0),
+            Event::Left { sensor, visitor } => ("left", Some((sensor, visitor)), 0.0),
+            Event::Passed { sensor, visitor, time } => ("passed", Some((sensor, visitor)), *time),
+            Event::Broke { force, .. } => ("broke", None, *force),
+        };
+        let [a, b] = bodies.map_or([None; 2], |(a, b)| [a, b].map(|side| Some(side.body.index() as u32)));
+        EventRow { world: world as u32, kind, a, b, value }
+    })
+}

@@ -1,0 +1,127 @@
+//! Errors and sums of a world, beside its state.
+
+use glam::DVec3;
+
+use super::Member;
+use crate::metrics::{self, Penetration};
+use crate::names::named;
+
+/// A number that says how well a world is solved, or what it has: [`Member::measure`].
+///
+/// ```
+/// use drystone::batch::{Batch, Measure};
+/// use drystone::{Scene, SolverConfig};
+///
+/// let mut batch = Batch::of(&Scene::find("tower", &[])?, &SolverConfig::default(), 1)?;
+/// batch.step(60, &[0])?;
+/// let [overlap, contacts] = batch.world(0).measure([Measure::OverlapMax, Measure::Contacts]);
+/// assert!(overlap < 1e-3 && contacts == 10.0, "{overlap} m, {contacts}");
+/// let mut values = [0.0; 2];
+/// batch.world(0).measure_into(&[Measure::Finite, Measure::JointGap], &mut values);
+/// assert_eq!(values, [1.0, 0.0]);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Measure {
+    /// Deepest overlap of the world as it is, from contacts computed anew (m).
+    OverlapMax,
+    /// Mean over all contacts of the deepest point of each (m).
+    OverlapMean,
+    /// Depth that 95 % of the contacts do not exceed (m).
+    Overlap95,
+    /// Largest distance between the anchors of a joint that holds them (m).
+    JointGap,
+    /// Kinetic energy (J).
+    KineticEnergy,
+    /// Potential energy in gravity (J).
+    PotentialEnergy,
+    /// Momentum along x (N s).
+    MomentumX,
+    /// Momentum along y (N s).
+    MomentumY,
+    /// Momentum along z (N s).
+    MomentumZ,
+    /// Angular momentum about the origin along x (N m s).
+    AngularMomentumX,
+    /// Angular momentum about the origin along y (N m s).
+    AngularMomentumY,
+    /// Angular momentum about the origin along z (N m s).
+    AngularMomentumZ,
+    /// Speed of the fastest dynamic body (m/s).
+    Fastest,
+    /// How deep the hardest contact of the last step would sag with the substeps of the settings, over what they promise; 0 without a load.
+    Need,
+    /// Energy that the last step took out because constraints had made it (J).
+    EnergyTaken,
+    /// Contacts of the last step, near ones included.
+    Contacts,
+    /// Dynamic bodies that sleep.
+    Asleep,
+    /// 1 if all numbers are finite, else 0.
+    Finite,
+}
+
+named!(Measure {
+    OverlapMax = "overlap_max",
+    OverlapMean = "overlap_mean",
+    Overlap95 = "overlap_95",
+    JointGap = "joint_gap",
+    KineticEnergy = "kinetic_energy",
+    PotentialEnergy = "potential_energy",
+    MomentumX = "momentum_x",
+    MomentumY = "momentum_y",
+    MomentumZ = "momentum_z",
+    AngularMomentumX = "angular_momentum_x",
+    AngularMomentumY = "angular_momentum_y",
+    AngularMomentumZ = "angular_momentum_z",
+    Fastest = "fastest",
+    Need = "need",
+    EnergyTaken = "energy_taken",
+    Contacts = "contacts",
+    Asleep = "asleep",
+    Finite = "finite",
+});
+
+impl Member {
+    /// Measures of the world. The three of overlap are computed once for all.
+    pub fn measure<const N: usize>(&self, measures: [Measure; N]) -> [f64; N] {
+        let mut values = [0.0; N];
+        self.measure_into(&measures, &mut values);
+        values
+    }
+
+    /// The same, into a slice.
+    pub fn measure_into(&self, measures: &[Measure], values: &mut [f64]) {
+        let mut known: Option<Penetration> = None;
+        for (measure, value) in measures.iter().zip(values) {
+            *value = self.one(*measure, || *known.get_or_insert_with(|| self.simulation().penetration()));
+        }
+    }
+
+    fn one(&self, measure: Measure, mut overlap: impl FnMut() -> Penetration) -> f64 {
+        let world = &self.simulation().world;
+        let momentum = |k: usize| DVec3::to_array(&world.linear_momentum())[k];
+        let turning = |k: usize| DVec3::to_array(&world.angular_momentum())[k];
+        match measure {
+            Measure::OverlapMax => overlap().max,
+            Measure::OverlapMean => overlap().mean,
+            Measure::Overlap95 => overlap().p95,
+            Measure::JointGap => f64::from(world.joint_gap()),
+            Measure::KineticEnergy => world.kinetic_energy(),
+            Measure::PotentialEnergy => world.potential_energy(),
+            Measure::MomentumX => momentum(0),
+            Measure::MomentumY => momentum(1),
+            Measure::MomentumZ => momentum(2),
+            Measure::AngularMomentumX => turning(0),
+            Measure::AngularMomentumY => turning(1),
+            Measure::AngularMomentumZ => turning(2),
+            Measure::Fastest => metrics::fastest(world).0,
+            Measure::Need => self.stats().hardest.map_or(0.0, |hardest| f64::from(hardest.need)),
+            Measure::EnergyTaken => self.stats().energy_taken,
+            Measure::Contacts => self.simulation().contacts().count() as f64,
+            Measure::Asleep => (0..world.bodies.len()).filter(|&i| self.simulation().is_asleep(i)).count() as f64,
+            Measure::Finite => f64::from(u8::from(world.first_non_finite().is_none())),
+        }
+    }
+}

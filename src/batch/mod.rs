@@ -1,0 +1,389 @@
+//! Many worlds at once, each with its scene, settings, start, time, steps, errors and hash.
+//!
+//! The bits of a world depend on its scene, settings and inputs alone: not on the number of worlds, its neighbors, the order of calls to others, the
+//! number of threads or the machine. Worlds that a call does not name stay as they are, to the last bit. A world that fails stops alone, as it was
+//! before the step that failed; the others finish.
+//!
+//! ```
+//! use drystone::batch::Batch;
+//! use drystone::{Listen, Scene, SolverConfig};
+//!
+//! let scene = Scene::find("tower", &["n=3".into()])?;
+//! let mut batch = Batch::of(&scene, &SolverConfig::default(), 4)?;
+//! assert!(batch.step(10, &[0, 2])?.is_empty(), "none fails");
+//! assert_eq!((batch.world(0).steps(), batch.world(1).steps()), (10, 0));
+//! // A state goes into other worlds, and a reset back to the start.
+//! let state = batch.world(2).state();
+//! batch.restore(1, &state)?;
+//! batch.reset(&[2])?;
+//! batch.step(5, &[0, 1])?;
+//! assert_eq!(batch.world(0).hash(), batch.world(1).hash());
+//! assert_eq!(batch.world(2).hash(), batch.world(3).hash());
+//! // Single worlds may be changed and listened to, and begin from states.
+//! let mut again = Batch::of_states([state])?.on_threads(1)?;
+//! again.world_mut(0).simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
+//! again.worlds_mut()[0].simulation_mut().world.gravity.x = 0.1;
+//! again.step(1, &[0])?;
+//! assert_eq!((again.threads(), again.events(&[0])?.len(), again.contacts(&[0])?.bodies.len()), (1, 3, 3));
+//! # Ok::<(), drystone::Error>(())
+//! ```
+
+mod column;
+mod contacts;
+mod group;
+mod measure;
+mod member;
+mod state;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Sender};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::config::SolverConfig;
+use crate::error::{Result, ensure, input};
+use crate::scenes::Scene;
+use crate::world::World;
+
+pub use column::{Column, DriveOf, drives, write};
+pub use contacts::{Contacts, EventRow};
+use group::Group;
+pub use measure::Measure;
+pub use member::Member;
+use member::Way;
+pub use state::State;
+
+/// How often [`Run::stop`] is asked.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+
+/// Many worlds: see the [module](self).
+pub struct Batch {
+    members: Vec<Member>,
+    /// Pools of one thread each, because a world that divides no work over threads steps faster; or one pool where there are fewer worlds than
+    /// threads.
+    pools: Vec<ThreadPool>,
+    threads: usize,
+    /// Memory for worlds that go side by side.
+    groups: Mutex<Vec<Group>>,
+}
+
+/// How far [`Batch::run`] goes.
+///
+/// ```
+/// use drystone::batch::Run;
+///
+/// let run = Run { steps: 60, ..Run::default() };
+/// assert!(run.dt.is_none() && run.stop.is_none());
+/// ```
+#[derive(Clone, Copy, Default)]
+pub struct Run<'a> {
+    /// Steps of each world.
+    pub steps: u64,
+    /// Length of a step (s) in place of that of each scene.
+    pub dt: Option<f32>,
+    /// Asked every 50 ms on the thread of the caller: where it is true, each world ends between two of its steps.
+    pub stop: Option<&'a dyn Fn() -> bool>,
+}
+
+impl Batch {
+    /// Worlds of scenes and settings.
+    ///
+    /// ```
+    /// use drystone::batch::Batch;
+    /// use drystone::{Scene, SolverConfig, preset::Preset};
+    ///
+    /// let scene = Scene::find("tower", &["n=3".into()])?;
+    /// let batch = Batch::new([(&scene, &Preset::Fast.config()), (&scene, &Preset::Accurate.config())])?;
+    /// assert_eq!((batch.len(), batch.world(1).simulation().config().substeps), (2, 32));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// No world; a scene or settings that [`Simulation::new`](crate::Simulation::new) refuses; a scene whose bodies come or leave by themselves.
+    pub fn new<'a>(worlds: impl IntoIterator<Item = (&'a Scene, &'a SolverConfig)>) -> Result<Self> {
+        let member = |(k, (scene, config))| Member::new(scene, config).map_err(|error| of_world(k, error));
+        Self::of_members(worlds.into_iter().enumerate().map(member).collect::<Result<_>>()?)
+    }
+
+    /// `count` worlds of one scene.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of(scene: &Scene, config: &SolverConfig, count: usize) -> Result<Self> {
+        let first = Member::new(scene, config)?;
+        let start = first.start().clone();
+        let others = (1..count).map(|_| Member::of(start.clone()));
+        Self::of_members(std::iter::once(first).take(count).chain(others).collect())
+    }
+
+    /// A world that begins at each state: a reset goes back to it.
+    ///
+    /// # Errors
+    /// No state.
+    pub fn of_states(states: impl IntoIterator<Item = State>) -> Result<Self> {
+        Self::of_members(states.into_iter().map(|state| Member::of(Arc::new(state))).collect())
+    }
+
+    fn of_members(members: Vec<Member>) -> Result<Self> {
+        ensure(!members.is_empty(), || "a batch of 0 worlds: must be at least one".to_owned())?;
+        Self { members, pools: Vec::new(), threads: 0, groups: Mutex::default() }.on_threads(0)
+    }
+
+    /// The same worlds on so many threads, 0 for as many as the pool of the caller has. No result depends on it.
+    ///
+    /// # Errors
+    /// The system gives no more threads.
+    pub fn on_threads(mut self, threads: usize) -> Result<Self> {
+        self.threads = if threads == 0 { rayon::current_num_threads() } else { threads };
+        let is_enough = self.members.len() >= self.threads;
+        let (pools, each) = if is_enough { (self.threads, 1) } else { (1, self.threads) };
+        let pool = |_| ThreadPoolBuilder::new().num_threads(each).build();
+        let made: std::result::Result<_, _> = (0..pools).map(pool).collect();
+        self.pools = made.map_err(|error| input!("threads = {threads}: {error}"))?;
+        Ok(self)
+    }
+
+    /// The number of worlds.
+    pub fn len(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Whether there is no world; never.
+    pub fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// The number of threads that step worlds.
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// A world.
+    ///
+    /// # Panics
+    /// There is no such world.
+    pub fn world(&self, world: usize) -> &Member {
+        &self.members[world]
+    }
+
+    /// A world, to change between two steps whatever a [`Simulation`](crate::Simulation) lets a caller change.
+    ///
+    /// # Panics
+    /// There is no such world.
+    pub fn world_mut(&mut self, world: usize) -> &mut Member {
+        &mut self.members[world]
+    }
+
+    /// All worlds in their order.
+    pub fn worlds(&self) -> &[Member] {
+        &self.members
+    }
+
+    /// All worlds in their order, to change.
+    pub fn worlds_mut(&mut self) -> &mut [Member] {
+        &mut self.members
+    }
+
+    /// Moves some worlds by `steps` steps; returns those that failed, ascending: [`Member::error`] says why.
+    ///
+    /// # Errors
+    /// The worlds are not ascending, or there is none of a number. No world moved then.
+    pub fn step(&mut self, steps: u64, worlds: &[usize]) -> Result<Vec<usize>> {
+        let tasks = worlds.iter().map(|&world| (world, ())).collect();
+        self.run(Run { steps, ..Run::default() }, tasks, |_, _, _| Ok(()), |_, _, _| {})
+    }
+
+    /// Moves some worlds, each with a value of its own: before each step `before` may change the world, and after it `after` may look at it.
+    /// Both are told the step, from 0 on. Returns the worlds that failed, ascending.
+    ///
+    /// Up to sixteen worlds go side by side on one thread, and wait for no other world. Where a step fails, `before` is called again for the steps
+    /// that go before it, and has to do the same again.
+    ///
+    /// ```
+    /// use drystone::batch::{Batch, Run};
+    /// use drystone::{Scene, SolverConfig, glam::Vec3};
+    ///
+    /// let scene = Scene::find("sphere-plane", &[])?;
+    /// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?;
+    /// // Each ball is pushed by a force of its own, and the ways of both are kept.
+    /// let tasks = vec![(0, (0.0, Vec::new())), (1, (500.0, Vec::new()))];
+    /// let mut ways = [0.0, 0.0];
+    /// let failed = batch.run(
+    ///     Run { steps: 30, ..Run::default() },
+    ///     tasks,
+    ///     |(push, _), _, world| Ok(world.bodies[1].force = Vec3::X * *push),
+    ///     |(_, way), _, member| way.push(member.simulation().world.bodies[1].position.x),
+    /// )?;
+    /// ways.iter_mut().zip(batch.worlds()).for_each(|(x, member)| *x = member.simulation().world.bodies[1].position.x);
+    /// assert!(failed.is_empty() && ways[0] == 0.0 && ways[1] > 0.01, "{ways:?}");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run<T: Send>(
+        &mut self,
+        run: Run,
+        mut tasks: Vec<(usize, T)>,
+        before: impl Fn(&T, u64, &mut World) -> Result<()> + Sync,
+        after: impl Fn(&mut T, u64, &Member) + Sync,
+    ) -> Result<Vec<usize>> {
+        let is_over = AtomicBool::new(false);
+        let way = Way { steps: run.steps, dt: run.dt, is_over: &is_over };
+        let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
+        let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
+        self.check(chosen.iter().copied())?;
+        // As many worlds beside each other as fill the lanes, and at least one for each thread.
+        let each = chosen.len().div_ceil(self.threads).clamp(1, group::WORLDS);
+        let Self { members, pools, groups, .. } = self;
+        let mut jobs = named(members, &mut tasks);
+        let work = |jobs: &mut [(&mut T, &mut Member)]| {
+            let mut group = lock(groups).pop().unwrap_or_default();
+            group::run(jobs, way, &before, &after, &mut group);
+            lock(groups).push(group);
+        };
+        spread(pools, jobs.chunks_mut(each).collect(), &work, &meanwhile);
+        Ok(chosen.into_iter().filter(|&world| self.members[world].error().is_some()).collect())
+    }
+
+    /// Does something with some worlds between two steps, each with a value of its own, on the threads of the batch.
+    ///
+    /// ```
+    /// use drystone::batch::{Batch, Measure};
+    /// use drystone::{Scene, SolverConfig};
+    ///
+    /// let mut batch = Batch::of(&Scene::find("pile", &["n=8".into()])?, &SolverConfig::default(), 3)?;
+    /// let mut overlaps = [0.0; 3];
+    /// let tasks = overlaps.iter_mut().enumerate().collect();
+    /// batch.each(tasks, |overlap, member| **overlap = member.measure([Measure::OverlapMax])[0])?;
+    /// assert!(overlaps.iter().all(|overlap| *overlap == overlaps[0]));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn each<T: Send>(
+        &mut self,
+        mut tasks: Vec<(usize, T)>,
+        work: impl Fn(&mut T, &mut Member) + Sync,
+    ) -> Result<()> {
+        self.check(tasks.iter().map(|task| task.0))?;
+        let jobs = named(&mut self.members, &mut tasks);
+        spread(&self.pools, jobs, &|(own, member): (&mut T, &mut Member)| work(own, member), &|| {});
+        Ok(())
+    }
+
+    /// Lets worlds begin again: each has the bits of one that never ran.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn reset(&mut self, worlds: &[usize]) -> Result<()> {
+        self.check(worlds.iter().copied())?;
+        worlds.iter().for_each(|&world| self.members[world].reset());
+        Ok(())
+    }
+
+    /// Lets a world go on from a state, of any world: it has the bits of the world that went on from there.
+    ///
+    /// # Errors
+    /// There is no such world.
+    pub fn restore(&mut self, world: usize, state: &State) -> Result<()> {
+        self.check([world])?;
+        self.members[world].restore(state);
+        Ok(())
+    }
+
+    /// What happened in the last step of some worlds, in the order of the worlds and, within each, of [`Simulation::events`](crate::Simulation::events).
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn events(&self, worlds: &[usize]) -> Result<Vec<EventRow>> {
+        self.check(worlds.iter().copied())?;
+        Ok(worlds.iter().flat_map(|&world| contacts::events(world, &self.members[world])).collect())
+    }
+
+    /// The contacts of some worlds as the last step left them: ascending by the worlds, then by the pairs of bodies.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn contacts(&self, worlds: &[usize]) -> Result<Contacts> {
+        self.check(worlds.iter().copied())?;
+        Ok(Contacts::of(worlds.iter().map(|&world| &self.members[world])))
+    }
+
+    /// Refuses worlds that are not there or not ascending.
+    fn check(&self, worlds: impl IntoIterator<Item = usize>) -> Result<()> {
+        let (count, mut last) = (self.members.len(), None);
+        for world in worlds {
+            ensure(world < count, || format!("world {world}: there are {count}"))?;
+            ensure(last.is_none_or(|last| last < world), || format!("world {world}: worlds must be ascending"))?;
+            last = Some(world);
+        }
+        Ok(())
+    }
+}
+
+/// Does jobs on pools, the first job first, while this thread asks `meanwhile` now and then until all are done.
+fn spread<J: Send>(pools: &[ThreadPool], jobs: Vec<J>, work: &(impl Fn(J) + Sync), meanwhile: &dyn Fn()) {
+    let (is_running, all_done) = mpsc::channel::<()>();
+    let wait = || {
+        while all_done.recv_timeout(BETWEEN_LOOKS) == Err(mpsc::RecvTimeoutError::Timeout) {
+            meanwhile();
+        }
+    };
+    if let [one] = pools {
+        return one.in_place_scope(|scope| {
+            scope.spawn(move |_| {
+                jobs.into_par_iter().with_max_len(1).for_each(work);
+                drop(is_running);
+            });
+            wait();
+        });
+    }
+    let jobs = Mutex::new(jobs.into_iter());
+    let next = || lock(&jobs).next();
+    let drain = || {
+        while let Some(job) = next() {
+            work(job);
+        }
+    };
+    on_each(pools, is_running, &drain, &wait);
+}
+
+/// Runs `drain` on every pool, and `wait` beside them. The last end of `is_running` goes with the last pool.
+fn on_each(pools: &[ThreadPool], is_running: Sender<()>, drain: &(dyn Fn() + Sync), wait: &dyn Fn()) {
+    let [first, others @ ..] = pools else {
+        drop(is_running);
+        return wait();
+    };
+    first.in_place_scope(|scope| {
+        let own = is_running.clone();
+        scope.spawn(move |_| {
+            drain();
+            drop(own);
+        });
+        on_each(others, is_running, drain, wait);
+    });
+}
+
+/// The worlds that tasks name, each with its task.
+fn named<'a, T>(members: &'a mut [Member], tasks: &'a mut [(usize, T)]) -> Vec<(&'a mut T, &'a mut Member)> {
+    let mut tasks = tasks.iter_mut().peekable();
+    let of_task = |(k, member)| tasks.next_if(|task| task.0 == k).map(|task| (&mut task.1, member));
+    members.iter_mut().enumerate().filter_map(of_task).collect()
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An error of a world.
+fn of_world(world: usize, error: crate::Error) -> crate::Error {
+    match error {
+        crate::Error::Input(line) => input!("world {world}: {line}"),
+        other => other,
+    }
+}
