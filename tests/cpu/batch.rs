@@ -184,7 +184,8 @@ fn a_state_goes_on_to_the_same_bits_in_another_world_and_as_bytes() {
 fn a_world_that_fails_stops_alone_as_it_was_before_the_step() {
     let scene = scene("pile", &["n=27"]);
     let config = SolverConfig::default();
-    let faults: [(&str, fn(&mut World)); 3] = [
+    type Fault = fn(&mut World);
+    let faults: [(&str, Fault); 3] = [
         ("force", |world| world.bodies[3].force.x = f32::NAN),
         ("cannot go on", |world| {
             world.bodies[3].linear_velocity.y = 9.0;
