@@ -113,7 +113,7 @@ impl Narrow<'_> {
                 events.push(Event { place: place as u32, changes, update });
             }
         }
-        cuboid_contacts(set, self.moving, self.cuboids, cuboid_pairs, cuboids, |number, write| {
+        cuboid_contacts(set, self.moving, self.cuboids, cuboid_pairs, cuboids, &mut |number, write| {
             let event = &mut events[number as usize];
             let pair = &mut pairs[event.place as usize];
             let prediction = tracks[event.place as usize].predicted;

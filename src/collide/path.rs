@@ -129,7 +129,7 @@ impl Narrow<'_> {
         let update = if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
             let one = [CuboidPair { bodies: [0, 1], cuboids: places, prediction, number: 0 }];
             let mut update = None;
-            cuboid_contacts(InstructionSet::default(), &then, self.cuboids, &one, cuboids, |_, write| {
+            cuboid_contacts(InstructionSet::default(), &then, self.cuboids, &one, cuboids, &mut |_, write| {
                 update = Some(pair.take_over(sides, prediction, write, Some(&self.neighbors), scratch));
             });
             update.unwrap_or_else(|| pair.part())

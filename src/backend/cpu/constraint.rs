@@ -119,7 +119,7 @@ pub(super) fn sweep_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     match kernel {
-        Kernel::WarmStart(rules) => warm_start(rules, pair, contact, rows),
+        Kernel::WarmStart(rules) if !as_one => warm_start(rules, pair, contact, rows),
         Kernel::SolveContacts(rules) => solve_contact(Rules { as_one, ..rules }, params, pair, contact, rows),
         Kernel::ApplyRestitution(rules) if as_one => restitute_contact(rules, params, pair, contact, rows),
         _ => unreachable!("a kernel over other rows"),

@@ -62,7 +62,7 @@ pub(super) fn cuboid_contacts(
     cuboids: &[CuboidPlace],
     pairs: &[CuboidPair],
     CuboidScratch { near, clipped }: &mut CuboidScratch,
-    mut with: impl FnMut(u32, &dyn Fn(&mut ParryManifold)),
+    with: &mut dyn FnMut(u32, &dyn Fn(&mut ParryManifold)),
 ) {
     near.clear();
     let separation = Separation { bodies, cuboids, pairs, near: Mutex::new(near) };

@@ -74,7 +74,7 @@ fn compare(set: InstructionSet, count: u32, nearly_parallel: bool, smaller: f32)
             pairs.push(CuboidPair { bodies: ids, cuboids: ids, prediction, number });
         }
         let mut found: Vec<Option<ParryManifold>> = vec![None; 1000];
-        cuboid_contacts(set, &bodies, &cuboids, &pairs, &mut scratch, |number, write| {
+        cuboid_contacts(set, &bodies, &cuboids, &pairs, &mut scratch, &mut |number, write| {
             let mut one = ParryManifold::new();
             write(&mut one);
             found[number as usize] = Some(one);

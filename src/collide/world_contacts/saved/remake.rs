@@ -99,7 +99,7 @@ impl WorldContacts {
             }
         }
         let set = InstructionSet::default();
-        cuboid_contacts(set, &states, &self.cuboids, &cuboids, &mut CuboidScratch::default(), |number, write| {
+        cuboid_contacts(set, &states, &self.cuboids, &cuboids, &mut CuboidScratch::default(), &mut |number, write| {
             let number = number as usize;
             let (pair, track) = self.pairs.with_track(chunk[number] as usize);
             begin(pair, &mut again);
