@@ -54,6 +54,9 @@ struct Near {
     rest: [u32; 7],
 }
 
+/// Writes the contact of a pair.
+type WriteContact<'a> = dyn Fn(&mut ParryManifold) + 'a;
+
 /// Calls `with` on the number and the contact of each of `pairs`, in the order of the pairs; pairs that are further apart than
 /// their predictions have none.
 pub(super) fn cuboid_contacts(
@@ -62,7 +65,7 @@ pub(super) fn cuboid_contacts(
     cuboids: &[CuboidPlace],
     pairs: &[CuboidPair],
     CuboidScratch { near, clipped }: &mut CuboidScratch,
-    with: &mut dyn FnMut(u32, &dyn Fn(&mut ParryManifold)),
+    with: &mut dyn FnMut(u32, &WriteContact),
 ) {
     near.clear();
     let separation = Separation { bodies, cuboids, pairs, near: Mutex::new(near) };
