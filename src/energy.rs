@@ -282,7 +282,8 @@ impl Energy {
         for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
             let [springs, reserve] =
                 self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
-            kept.springs = (springs * self.entries[i].springs) as f32;
+            // What an exploded step leaves in springs may be no number.
+            kept.springs = if springs > 0.0 { (springs * self.entries[i].springs) as f32 } else { 0.0 };
             kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
         }
         taken
