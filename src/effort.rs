@@ -35,11 +35,11 @@ pub struct Interface {
     pub need: f32,
     /// The force under which it sags as deep as promised with the substeps of the settings (N).
     pub force: f32,
-    /// What a joint needs; none of a contact.
+    /// The needs of a joint; none of a contact.
     pub joint: Option<JointNeed>,
 }
 
-/// What a joint needs beside its load, which no other joint of its bodies takes from it.
+/// The needs of a joint beside its load. No other joint of its bodies takes load from it.
 #[derive(Clone, Copy, Debug)]
 pub struct JointNeed {
     /// The most force of its drives (N).

@@ -162,7 +162,7 @@ impl Entry {
 struct Account {
     all: Entry,
     mass: f64,
-    /// What its bodies have in common, where nothing holds them.
+    /// The common motion of its bodies, where nothing holds them.
     common: Common,
     /// What the springs of its contacts gave back, and the energy of what they push out (J).
     released: f64,
@@ -170,7 +170,7 @@ struct Account {
     /// Whether anything but its bodies holds it.
     is_held: bool,
     is_refused: bool,
-    /// What its bodies keep of what their springs hold, and for their mass (J/kg).
+    /// The share of the energy of their springs that its bodies keep, and their reserve by mass (J/kg).
     shares: [f64; 2],
 }
 
@@ -282,7 +282,7 @@ impl Energy {
         for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
             let [springs, reserve] =
                 self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
-            // What an exploded step leaves in springs may be no number.
+            // An exploded step may leave springs at NaN.
             kept.springs = if springs > 0.0 { (springs * self.entries[i].springs) as f32 } else { 0.0 };
             kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
         }
@@ -503,7 +503,7 @@ fn ends(joint: &JointRow) -> [u32; 2] {
     [joint.body_a, joint.body_b]
 }
 
-/// What a body has, with the work of gravity and forces.
+/// The account of a body, with the work of gravity and forces.
 fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) -> Entry {
     let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
     if mass.inv_mass <= 0.0 {
@@ -541,7 +541,7 @@ fn way(row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
     Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep)
 }
 
-/// What a body adds to the common motion of its island.
+/// The part of a body in the common motion of its island.
 fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common {
     let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());

@@ -28,7 +28,7 @@ pub(super) struct Group {
     key: Option<MadeFor>,
 }
 
-/// What a plan was made for.
+/// The key, rules and settings that a plan was made for.
 type MadeFor = (PlanKey, Alike, SolverConfig);
 
 /// Where a world is in a step.

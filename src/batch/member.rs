@@ -101,7 +101,7 @@ impl Member {
         self.time
     }
 
-    /// What a reset goes back to.
+    /// The state that a reset goes back to.
     pub fn start(&self) -> &Arc<State> {
         &self.start
     }
@@ -111,7 +111,7 @@ impl Member {
         self.error.as_deref()
     }
 
-    /// What the last step of this world told; of no step before the first one, and after a reset or a restore.
+    /// The figures of the last step of this world; those of no step before the first one, and after a reset or a restore.
     pub fn stats(&self) -> &StepStats {
         &self.stats
     }

@@ -296,7 +296,7 @@ impl Batch {
         Ok(())
     }
 
-    /// What happened in the last step of some worlds, in the order of the worlds and, within each, of [`Simulation::events`](crate::Simulation::events).
+    /// The events of the last step of some worlds, in the order of the worlds and, within each, of [`Simulation::events`](crate::Simulation::events).
     ///
     /// # Errors
     /// As [`Self::step`].

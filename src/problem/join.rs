@@ -11,7 +11,7 @@ use super::{
 };
 use crate::config::{Method, SolverConfig};
 
-/// What the rules of a plan follow from, besides the settings, in all blocks.
+/// The facts of all blocks that the rules of a plan follow from, besides the settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Alike {
     friction: bool,
@@ -53,7 +53,7 @@ impl Alike {
     }
 }
 
-/// What the rules of one block follow from.
+/// The facts that the rules of one block follow from.
 #[derive(Clone, Copy, PartialEq)]
 struct BlockKind {
     substeps: u32,

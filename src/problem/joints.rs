@@ -35,7 +35,7 @@ pub struct JointRows {
     /// The gravity that the bodies of joints felt then.
     gravity: Vec<Vec3>,
     swept_gap: f32,
-    /// What each joint needs that is left to sweeps.
+    /// The needs of the joints that are left to sweeps.
     left: Vec<LeftToSweeps>,
     /// What turns opens joints by, over the promised gap: this times ω² (s²).
     gap_of_turns: f32,
@@ -60,7 +60,7 @@ crate::saved::state!(JointRows {
 /// How much further a joint of a net that swings may open in the next step.
 const GROWTH: f32 = 2.5;
 
-/// What a joint needs that is left to sweeps; nothing of one that is not.
+/// The need of a joint that is left to sweeps; none of another one.
 #[derive(Clone, Copy, Debug)]
 struct LeftToSweeps {
     /// The gap that it would have with the substeps of the settings, over the promised one.
