@@ -30,6 +30,8 @@ pub trait Lane:
 {
     /// The result of a comparison of two lanes.
     type Mask: Copy;
+    /// Numbers that are kept of a column of three: with one more, a column of single numbers fills a register.
+    const COLUMN: usize = 3;
     /// The same constant in every lane.
     fn constant(x: f64) -> Self;
     /// Whether `self > other`; false for NaN.
@@ -38,6 +40,8 @@ pub trait Lane:
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// The same truth in every lane.
     fn mask(value: bool) -> Self::Mask;
+    /// Whether it holds in any lane.
+    fn any(mask: Self::Mask) -> bool;
     /// `if_true` where the mask holds; arguments in WGSL's order.
     fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
     /// The larger of two; `b` if they are equal or either is NaN.
@@ -100,6 +104,10 @@ macro_rules! scalar_lane {
             value
         }
         #[inline(always)]
+        fn any(mask: bool) -> bool {
+            mask
+        }
+        #[inline(always)]
         fn select(if_false: Self, if_true: Self, mask: bool) -> Self {
             if mask { if_true } else { if_false }
         }
@@ -108,6 +116,7 @@ macro_rules! scalar_lane {
 
 impl Lane for f32 {
     type Mask = bool;
+    const COLUMN: usize = 4;
     scalar_lane!(f32);
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
@@ -122,6 +131,7 @@ impl Lane for f32 {
 
 impl Lane for f64 {
     type Mask = bool;
+    const COLUMN: usize = 4;
     scalar_lane!(f64);
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
@@ -332,6 +342,22 @@ pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {
     let cosine = polynomial(s, [1.0, -0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3_628_800.0]);
     let sinc = polynomial(s, [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0]);
     Quat { axis: vec3(u.x * sinc, u.y * sinc, u.z * sinc), w: cosine }
+}
+
+/// The least turn in one substep (rad): 2^-42, below which a product of three turns is no normal number. What joints leave of a motion at rest falls
+/// below that, and an Intel processor takes a hundred cycles for each product that is no normal number.
+const LEAST_TURN: f64 = 2.273_736_754_432_320_6e-13;
+
+/// The turn, or zero below [`LEAST_TURN`]; NaN stays.
+#[inline(always)]
+fn turn_or_none<L: Lane>(x: L) -> L {
+    L::select(x, L::constant(0.0), L::constant(LEAST_TURN).gt(larger(x, -x)))
+}
+
+/// A turn by the vector r (rad) without what is below [`LEAST_TURN`].
+#[inline(always)]
+pub fn turn_of<L: Lane>(r: Vec3<L>) -> Vec3<L> {
+    vec3(turn_or_none(r.x), turn_or_none(r.y), turn_or_none(r.z))
 }
 
 /// A nearly unit quaternion, closer to unit length by one Newton step.

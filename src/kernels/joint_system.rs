@@ -7,17 +7,16 @@
 //! sweeps again: its row goes, and the system is factored without it. Arms and axes turn with their bodies, and the blocks of S with them: S is factored anew where bodies moved. The
 //! order of elimination, the blocks that it fills and the products that each block is made of are lists of the problem (`JointSystems`).
 
-use std::ops::Range;
-
 use super::Rules;
 use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, select3};
 use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
-use super::rows::{Axis, Joint, Mass, Pair, StepParams, Sym3};
+use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
-use crate::problem::{ImpulseNumber, JointSystems, StepProblem};
+use crate::problem::JointSystems;
 
-/// A block of a matrix, by its columns. A fourth number, which nothing reads, makes a column a register.
+/// A block of a matrix, by its columns. A fourth number, which nothing reads, makes a column of single numbers a register; only they work on it
+/// ([`Lane::COLUMN`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Block<L>([[L; 4]; 3]);
 
@@ -25,8 +24,8 @@ impl<L: Lane> Block<L> {
     /// The block with these columns.
     #[inline(always)]
     pub fn of(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>) -> Self {
-        let column = |c: Vec3<L>| [c.x, c.y, c.z, L::default()];
-        Self([column(x), column(y), column(z)])
+        let zero = L::default();
+        Self([[x.x, x.y, x.z, zero], [y.x, y.y, y.z, zero], [z.x, z.y, z.z, zero]])
     }
 
     /// The block with these rows.
@@ -45,7 +44,7 @@ impl<L: Lane> Block<L> {
     fn combined(&self, factors: [L; 3]) -> [L; 4] {
         let ([x, y, z], [a, b, c]) = (&self.0, factors);
         let mut sum = [L::default(); 4];
-        for i in 0..4 {
+        for i in 0..L::COLUMN {
             sum[i] = x[i] * a + y[i] * b + z[i] * c;
         }
         sum
@@ -104,7 +103,7 @@ impl<L: Lane> Block<L> {
     pub fn plus(&self, other: &Self) -> Self {
         let mut sum = *self;
         for (column, other) in sum.0.iter_mut().zip(&other.0) {
-            for i in 0..4 {
+            for i in 0..L::COLUMN {
                 column[i] = column[i] + other[i];
             }
         }
@@ -116,7 +115,7 @@ impl<L: Lane> Block<L> {
     pub fn over(&self, pivot: &Self) -> Self {
         let ([x, y, z], [l_x, l_y, _]) = (&self.0, &pivot.0);
         let mut over = *self;
-        for i in 0..4 {
+        for i in 0..L::COLUMN {
             over.0[1][i] = y[i] - x[i] * l_x[1];
             over.0[2][i] = z[i] - x[i] * l_x[2] - over.0[1][i] * l_y[2];
         }
@@ -149,7 +148,11 @@ impl<L: Lane> Block<L> {
     #[inline(always)]
     pub fn scaled(&self, factor: L) -> Self {
         let mut scaled = *self;
-        scaled.0.iter_mut().flatten().for_each(|x| *x = *x * factor);
+        for column in &mut scaled.0 {
+            for i in 0..L::COLUMN {
+                column[i] = column[i] * factor;
+            }
+        }
         scaled
     }
 
@@ -158,7 +161,7 @@ impl<L: Lane> Block<L> {
     pub fn less(&self, other: &Self) -> Self {
         let mut rest = *self;
         for (column, other) in rest.0.iter_mut().zip(&other.0) {
-            for i in 0..4 {
+            for i in 0..L::COLUMN {
                 column[i] = column[i] - other[i];
             }
         }
@@ -170,6 +173,13 @@ impl<L: Lane> Block<L> {
 /// less. This is 2^-20. A smaller pivot makes corrections too small, never too large.
 const LEAST_PIVOT: f64 = 9.536_743_164_062_5e-7;
 
+/// One over a pivot, which counts as at least `least`; 0 of a row that had a zero in S.
+#[inline(always)]
+fn inverse_pivot<L: Lane>(pivot: L, own: L, least: L) -> L {
+    let zero = L::constant(0.0);
+    L::select(zero, reciprocal(larger(pivot, least)), own.gt(zero))
+}
+
 /// A pivot whose rows had this diagonal in S as l d lᵀ: below the diagonal l, on it 1/d, which is zero in a row that is not there and had a zero
 /// in S. Solutions by the inverse would lose as many digits as a pivot is stiffer in one direction than in another: a lever across its
 /// hinge 1e5 times.
@@ -178,13 +188,12 @@ pub fn factored_pivot<L: Lane>(pivot: &Block<L>, own: Vec3<L>) -> Block<L> {
     let zero = L::constant(0.0);
     let [x, y, z] = [pivot.column(0), pivot.column(1), pivot.column(2)];
     let least = (own.x + own.y + own.z) * L::constant(LEAST_PIVOT);
-    let inverse = |d: L, own: L| L::select(zero, reciprocal(larger(d, least)), own.gt(zero));
-    let d_x = inverse(x.x, own.x);
+    let d_x = inverse_pivot(x.x, own.x, least);
     let (l_xy, l_xz) = (x.y * d_x, x.z * d_x);
-    let d_y = inverse(y.y - l_xy * x.y, own.y);
+    let d_y = inverse_pivot(y.y - l_xy * x.y, own.y, least);
     let below = y.z - l_xy * x.z;
     let l_yz = below * d_y;
-    let d_z = inverse(z.z - l_xz * x.z - l_yz * below, own.z);
+    let d_z = inverse_pivot(z.z - l_xz * x.z - l_yz * below, own.z, least);
     Block::of(vec3(d_x, l_xy, l_xz), vec3(zero, d_y, l_yz), vec3(zero, zero, d_z))
 }
 
@@ -205,8 +214,12 @@ pub fn turned_inertia<L: Lane>(begin: Sym3<L>, q: Quat<L>) -> Sym3<L> {
 pub fn anchor_motions<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [AxisMotion<L>; 3] {
     let (zero, less) = (L::constant(0.0), L::constant(-1.0));
     let [r_a, r_b] = current_anchors(pair, joint);
-    let motion = |along| AxisMotion { along, about_a: cross3(r_a, along), about_b: cross3(r_b, along), moved: zero };
-    [motion(vec3(less, zero, zero)), motion(vec3(zero, less, zero)), motion(vec3(zero, zero, less))]
+    let mut motions = [vec3(less, zero, zero), vec3(zero, less, zero), vec3(zero, zero, less)]
+        .map(|along| AxisMotion { along, ..AxisMotion::default() });
+    for motion in &mut motions {
+        (motion.about_a, motion.about_b) = (cross3(r_a, motion.along), cross3(r_b, motion.along));
+    }
+    motions
 }
 
 /// The softness of a node whose system is not factored since it began.
@@ -233,27 +246,35 @@ impl<L: Lane> JointNode<L> {
     /// The node of three rows; one that is not there is zero.
     #[inline(always)]
     pub fn of(pair: &Pair<L>, [x, y, z]: &[AxisMotion<L>; 3]) -> Self {
-        let [a, b] = [&pair.mass_a, &pair.mass_b];
-        let turn = |mass: &Mass<L>, about| mass.inv_inertia.times(about);
+        let (a, b) = (pair.mass_a.inv_inertia, pair.mass_b.inv_inertia);
         Self {
             along: Block::of_rows(x.along, y.along, z.along),
             about: [Block::of_rows(x.about_a, y.about_a, z.about_a), Block::of_rows(x.about_b, y.about_b, z.about_b)],
             turns: [
-                Block::of(turn(a, x.about_a), turn(a, y.about_a), turn(a, z.about_a)),
-                Block::of(turn(b, x.about_b), turn(b, y.about_b), turn(b, z.about_b)),
+                Block::of(a.times(x.about_a), a.times(y.about_a), a.times(z.about_a)),
+                Block::of(b.times(x.about_b), b.times(y.about_b), b.times(z.about_b)),
             ],
-            inv_masses: [a.inv_mass, b.inv_mass],
+            inv_masses: [pair.mass_a.inv_mass, pair.mass_b.inv_mass],
             softness: L::constant(NOT_FACTORED),
             right: Vec3::default(),
         }
     }
 
-    /// Takes a row out.
+    /// Takes a row out, where the mask holds.
     #[inline(always)]
-    fn remove(&mut self, i: usize) {
+    fn remove(&mut self, i: usize, mask: L::Mask) {
         let zero = L::default();
-        self.along.0.iter_mut().chain(self.about.iter_mut().flat_map(|block| &mut block.0)).for_each(|c| c[i] = zero);
-        self.turns.iter_mut().for_each(|turns| turns.0[i] = [zero; 4]);
+        let [about_a, about_b] = &mut self.about;
+        for block in [&mut self.along, about_a, about_b] {
+            for column in &mut block.0 {
+                column[i] = L::select(column[i], zero, mask);
+            }
+        }
+        for turns in &mut self.turns {
+            for number in &mut turns.0[i] {
+                *number = L::select(*number, zero, mask);
+            }
+        }
     }
 
     /// The block of S in its column and the row of another node, which may be the same. `shared` has bit 2 i + j where side i of this
@@ -276,24 +297,17 @@ impl<L: Lane> JointNode<L> {
 /// Both sides of a joint, as those of `shared`.
 const OWN_SIDES: u32 = 0b1001;
 
-/// The factors of one system. Double of the buffers `joint_nodes` and `joint_blocks`.
-pub struct SystemFactors<'a, S> {
+/// The factors of one system, or of several of one form side by side. Double of the buffers `joint_nodes` and `joint_blocks`.
+pub struct SystemFactors<'a, L> {
     /// Its joints.
-    pub nodes: &'a mut [JointNode<S>],
+    pub nodes: &'a mut [JointNode<L>],
     /// The blocks of L; of a pivot, its own factors.
-    pub lower: &'a mut [Block<S>],
+    pub lower: &'a mut [Block<L>],
     /// The blocks of L D.
-    pub upper: &'a mut [Block<S>],
+    pub upper: &'a mut [Block<L>],
 }
 
-/// The places of the nodes and of the blocks of a system.
-pub fn places(systems: &JointSystems, system: usize) -> [Range<usize>; 2] {
-    let nodes = systems.nodes_of(system);
-    let blocks = systems.blocks_of(nodes.start).start..systems.blocks_of(nodes.end - 1).end;
-    [nodes, blocks]
-}
-
-/// The factors of all systems of a step.
+/// The factors of all systems of a step, one beside another.
 #[derive(Clone, Debug, Default)]
 pub struct JointFactors<S> {
     nodes: Vec<JointNode<S>>,
@@ -317,7 +331,7 @@ impl<S: Scalar> JointFactors<S> {
 
     /// Those of one system.
     pub fn of(&mut self, systems: &JointSystems, system: usize) -> SystemFactors<'_, S> {
-        let [nodes, blocks] = places(systems, system);
+        let (nodes, blocks) = (systems.nodes_of(system), systems.blocks_of_system(system));
         SystemFactors {
             nodes: &mut self.nodes[nodes],
             lower: &mut self.lower[blocks.clone()],
@@ -326,39 +340,51 @@ impl<S: Scalar> JointFactors<S> {
     }
 }
 
-/// Lets one system begin where its bodies are: writes the rows of its nodes, which the next solution factors. `load` gives a joint with its bodies,
-/// `axis` one of its axes. Kernel `begin_systems`.
+/// The joints of a system, or of several of one form side by side. Nodes have their numbers within the system, and up to three rows.
+pub trait SystemRows<L: Lane> {
+    /// The joint of a node, with its bodies.
+    fn joint(&self, node: usize) -> (Joint<L>, Pair<L>);
+    /// An axis of the joint of a node.
+    fn axis(&self, node: usize, k: usize) -> Axis<L>;
+    /// The softness of the system.
+    fn softness(&self) -> L;
+    /// The impulse of a row so far.
+    fn impulse(&self, node: usize, row: usize) -> L;
+    /// The velocity that a row lacks.
+    fn lacking(&self, node: usize, row: usize) -> L;
+    /// Keeps a correction, and adds it to the impulse.
+    fn change(&mut self, node: usize, row: usize, change: L);
+}
+
+/// Lets a system begin where its bodies are: writes the rows of its nodes, which the next solution factors. `system` is one of its form. Kernel
+/// `begin_systems`.
 #[inline(always)]
-pub fn begin_system<S: Scalar>(
+pub fn begin_system<L: Lane>(
     systems: &JointSystems,
     system: usize,
-    load: impl Fn(usize) -> (Joint<S>, Pair<S>),
-    axis: impl Fn(usize, usize) -> Axis<S>,
-    factors: SystemFactors<S>,
+    rows: &impl SystemRows<L>,
+    factors: SystemFactors<L>,
 ) {
-    let [own, _] = places(systems, system);
-    for (node, row) in factors.nodes.iter_mut().zip(&systems.nodes[own]) {
-        let joint = row.joint as usize;
-        let (loaded, pair) = load(joint);
+    for (i, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate() {
+        let (joint, pair) = rows.joint(i);
         let mut motions = [AxisMotion::default(); 3];
         if row.is_of_anchors() {
-            motions = anchor_motions(&pair, &loaded);
+            motions = anchor_motions(&pair, &joint);
         } else {
-            for (i, k) in row.axes() {
-                motions[i] = axis_motion(&pair, &loaded, &axis(joint, k));
+            for (at, k) in row.axes() {
+                motions[at] = axis_motion(&pair, &joint, &rows.axis(i, k));
             }
         }
-        *node = JointNode::of(&pair, &motions);
+        factors.nodes[i] = JointNode::of(&pair, &motions);
     }
 }
 
-/// Factors one system whose nodes are known.
+/// Factors a system whose nodes are known.
 #[inline(always)]
-fn factor_blocks<S: Scalar>(systems: &JointSystems, system: usize, factors: &mut SystemFactors<S>) {
+fn factor_blocks<L: Lane>(systems: &JointSystems, system: usize, relative_softness: L, factors: &mut SystemFactors<L>) {
     let SystemFactors { nodes, lower, upper } = factors;
-    let [own, blocks] = places(systems, system);
-    let (first_node, first_block) = (own.start, blocks.start);
-    for node in own {
+    let (first_node, first_block) = (systems.nodes_of(system).start, systems.blocks_of_system(system).start);
+    for node in systems.nodes_of(system) {
         let column = systems.blocks_of(node);
         let pivot = column.start - first_block;
         for at in column {
@@ -368,7 +394,7 @@ fn factor_blocks<S: Scalar>(systems: &JointSystems, system: usize, factors: &mut
             let mut block = nodes[node - first_node].coupling(&nodes[row.node as usize - first_node], shared);
             let own = block.diagonal();
             if at == pivot {
-                let softness = (own.x + own.y + own.z) * S::from(systems.softness[system]);
+                let softness = (own.x + own.y + own.z) * relative_softness;
                 nodes[node - first_node].softness = softness;
                 block.soften(softness);
             }
@@ -430,62 +456,70 @@ fn note_lacking<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L
     }
 }
 
-/// Solves one system: `joints` is told the corrections, and gives the velocities that joints lack. Kernel `solve_joint_systems`.
+/// Solves a system: `rows` gives the velocities that its joints lack, and is told the corrections. `system` is one of its form. Kernel
+/// `solve_joint_systems`.
 #[inline(always)]
-pub fn solve_system<S: Scalar>(
-    problem: &StepProblem,
+pub fn solve_system<L: Lane>(
+    systems: &JointSystems,
     system: usize,
-    joints: &mut impl JointChanges<S>,
-    mut factors: SystemFactors<S>,
+    rows: &mut impl SystemRows<L>,
+    mut factors: SystemFactors<L>,
 ) {
-    let systems = &problem.systems;
-    let [own, _] = places(systems, system);
     // Sweeps may have let go of limits since the system was factored.
-    factors.nodes.iter_mut().for_each(|node| node.right = Vec3::default());
-    let is_new = S::default() > factors.nodes[0].softness;
-    let mut changed = let_go(problem, system, is_new, joints, &mut factors) || is_new;
+    for node in &mut *factors.nodes {
+        node.right = Vec3::default();
+    }
+    // Systems side by side begin together. One that lets go of nothing is factored and solved to the same bits again while others do.
+    let is_new = L::any(L::default().gt(factors.nodes[0].softness));
+    let mut changed = let_go(systems, system, is_new, rows, &mut factors) || is_new;
     loop {
         if changed {
-            factor_blocks(systems, system, &mut factors);
+            factor_blocks(systems, system, rows.softness(), &mut factors);
         }
-        find_changes(problem, system, joints, &mut factors);
-        changed = let_go(problem, system, false, joints, &mut factors);
+        find_changes(systems, system, rows, &mut factors);
+        changed = let_go(systems, system, false, rows, &mut factors);
         if !changed {
             break;
         }
     }
-    for (node, row) in factors.nodes.iter().zip(&systems.nodes[own]) {
-        let Vec3 { x, y, z } = node.right;
-        for (number, change) in problem.numbers_of(row).into_iter().zip([x, y, z]) {
-            if let Some(at) = number {
-                joints.change(at, change);
+    for (i, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate() {
+        let Vec3 { x, y, z } = factors.nodes[i].right;
+        for (at, change) in [x, y, z].into_iter().enumerate() {
+            if row.has_row(at) {
+                rows.change(i, at, change);
             }
         }
     }
 }
 
-/// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any. In a
+/// Takes the limits out of a system that hold, and bear no impulse or would pull with the changes that were found; whether there were any. In a
 /// system that is new, all hold.
 #[inline(always)]
-fn let_go<S: Scalar>(
-    problem: &StepProblem,
+fn let_go<L: Lane>(
+    systems: &JointSystems,
     system: usize,
     is_new: bool,
-    joints: &mut impl JointChanges<S>,
-    factors: &mut SystemFactors<S>,
+    rows: &impl SystemRows<L>,
+    factors: &mut SystemFactors<L>,
 ) -> bool {
-    let systems = &problem.systems;
-    let [own, blocks] = places(systems, system);
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let first_block = systems.blocks_of_system(system).start;
     let mut any = false;
-    for (node, row) in factors.nodes.iter_mut().zip(&systems.nodes[own]) {
-        let pivot = factors.lower[row.first_block as usize - blocks.start].diagonal();
-        let [held, changes] = [pivot, node.right].map(|Vec3 { x, y, z }| [x, y, z]);
-        for (i, number) in problem.numbers_of(row).into_iter().enumerate() {
-            let Some(at) = number.filter(|_| row.is_limit(i) && (is_new || held[i] > S::default())) else { continue };
-            let before = joints.impulse(at);
-            let still_pushes = before * (before + changes[i]) > S::default();
-            if !still_pushes {
-                node.remove(i);
+    for (node, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate().filter(|(_, row)| row.has_limits()) {
+        let Vec3 { x, y, z } = factors.lower[row.first_block as usize - first_block].diagonal();
+        let held = [x, y, z];
+        let Vec3 { x, y, z } = factors.nodes[node].right;
+        let changes = [x, y, z];
+        for i in 0..3 {
+            if !row.is_limit(i) {
+                continue;
+            }
+            let before = rows.impulse(node, i);
+            let still_pushes = (before * (before + changes[i])).gt(zero);
+            let holds = if is_new { L::mask(true) } else { held[i].gt(zero) };
+            let lets_go = L::select(L::select(zero, one, holds), zero, still_pushes).gt(zero);
+            if L::any(lets_go) {
+                factors.nodes[node].remove(i, lets_go);
                 any = true;
             }
         }
@@ -493,24 +527,26 @@ fn let_go<S: Scalar>(
     any
 }
 
-/// Finds the changes of the impulses of one system, the right sides of its nodes.
+/// Finds the changes of the impulses of a system, the right sides of its nodes.
 #[inline(always)]
-fn find_changes<S: Scalar>(
-    problem: &StepProblem,
+fn find_changes<L: Lane>(
+    systems: &JointSystems,
     system: usize,
-    joints: &mut impl JointChanges<S>,
-    factors: &mut SystemFactors<S>,
+    rows: &impl SystemRows<L>,
+    factors: &mut SystemFactors<L>,
 ) {
-    let systems = &problem.systems;
     let SystemFactors { nodes, lower, .. } = factors;
-    let [own, blocks] = places(systems, system);
-    let (first_node, first_block) = (own.start, blocks.start);
-    for (node, row) in nodes.iter_mut().zip(&systems.nodes[own.clone()]) {
-        let right = problem.numbers_of(row).map(|number| match number {
-            Some(at) => joints.lacking(at) - joints.impulse(at) * node.softness,
-            None => S::default(),
-        });
-        node.right = vec3(right[0], right[1], right[2]);
+    let (own, first_block) = (systems.nodes_of(system), systems.blocks_of_system(system).start);
+    let first_node = own.start;
+    for node in own.clone() {
+        let (row, i) = (&systems.nodes[node], node - first_node);
+        let mut right = [L::default(); 3];
+        for (at, right) in right.iter_mut().enumerate() {
+            if row.has_row(at) {
+                *right = rows.lacking(i, at) - rows.impulse(i, at) * nodes[i].softness;
+            }
+        }
+        nodes[i].right = vec3(right[0], right[1], right[2]);
     }
     for node in own.clone() {
         let column = systems.blocks_of(node);
@@ -531,14 +567,4 @@ fn find_changes<S: Scalar>(
         }
         nodes[node - first_node].right = pivot.backward(change);
     }
-}
-
-/// Corrections and impulses of the joints of a system: numbers of rows of impulses.
-pub trait JointChanges<S> {
-    /// An impulse so far.
-    fn impulse(&mut self, at: ImpulseNumber) -> S;
-    /// The velocity that a row lacks.
-    fn lacking(&mut self, at: ImpulseNumber) -> S;
-    /// Keeps a correction, and adds it to the impulse.
-    fn change(&mut self, at: ImpulseNumber, change: S);
 }

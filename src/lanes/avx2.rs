@@ -30,6 +30,7 @@ lane! {
     gt = both!(_mm256_cmp_ps::<_CMP_GT_OQ>; a, b);
     and = both!(_mm256_and_ps; a, b);
     mask = [unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(if m { -1 } else { 0 })) }; 2];
+    any = unsafe { _mm256_movemask_ps(m[0]) | _mm256_movemask_ps(m[1]) } != 0;
     select = both!(_mm256_blendv_ps; a, b, m);
     inverse_sqrt_guess = [guess(a[0]), guess(a[1])];
     inverse_power = [inverse_power(a[0]), inverse_power(a[1])];

@@ -23,6 +23,7 @@ lane! {
     gt = unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b) };
     and = a & b;
     mask = if m { __mmask16::MAX } else { 0 };
+    any = m != 0;
     select = unsafe { _mm512_mask_blend_ps(m, a, b) };
     inverse_sqrt_guess = unsafe {
         _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(INVERSE_SQRT_GUESS as i32), _mm512_srli_epi32::<1>(_mm512_castps_si512(a))))

@@ -117,7 +117,7 @@ macro_rules! lane {
     (
         $Type:ident, $Mask:ty, |$a:ident, $b:ident, $m:ident|
         neg = $neg:expr; constant = $constant:expr; larger = $larger:expr; smaller = $smaller:expr;
-        gt = $gt:expr; and = $and:expr; mask = $mask:expr; select = $select:expr;
+        gt = $gt:expr; and = $and:expr; mask = $mask:expr; any = $any:expr; select = $select:expr;
         inverse_sqrt_guess = $guess:expr; inverse_power = $power:expr;
         $($Op:ident::$op:ident = $result:expr;)*
     ) => {
@@ -181,6 +181,10 @@ macro_rules! lane {
             #[inline(always)]
             fn mask($m: bool) -> $Mask {
                 $mask
+            }
+            #[inline(always)]
+            fn any($m: $Mask) -> bool {
+                $any
             }
             #[inline(always)]
             fn select(if_false: Self, if_true: Self, $m: $Mask) -> Self {

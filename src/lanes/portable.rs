@@ -17,6 +17,7 @@ lane! {
     gt = lanes!(i => a.0[i] > b.0[i]);
     and = lanes!(i => a[i] && b[i]);
     mask = [m; WIDTH];
+    any = m.contains(&true);
     select = Wide(lanes!(i => if m[i] { b.0[i] } else { a.0[i] }));
     inverse_sqrt_guess = Wide(a.0.map(|x| f32::from_bits(INVERSE_SQRT_GUESS.wrapping_sub(x.to_bits() >> 1))));
     inverse_power = Wide(a.0.map(Lane::inverse_power));

@@ -27,6 +27,7 @@ lane! {
     gt = each!(f32x4_gt; a, b);
     and = each!(v128_and; a, b);
     mask = [i32x4_splat(if m { -1 } else { 0 }); 4];
+    any = v128_any_true(v128_or(v128_or(m[0], m[1]), v128_or(m[2], m[3])));
     select = each!(v128_bitselect; b, a, m);
     inverse_sqrt_guess = each!(guess; a);
     inverse_power = each!(inverse_power; a);

@@ -66,6 +66,16 @@ impl NodeRow {
         !self.is_of_anchors() && self.rows >> (8 * i) & Self::LIMIT != 0
     }
 
+    /// Whether any row is a limit.
+    pub fn has_limits(&self) -> bool {
+        (0..3).any(|i| self.is_limit(i))
+    }
+
+    /// Whether row i is there.
+    pub fn has_row(&self, i: usize) -> bool {
+        self.rows >> (8 * i) & 0xff != 0
+    }
+
     /// Whether its rows are those of the anchors.
     pub fn is_of_anchors(&self) -> bool {
         self.rows == Self::ANCHORS
@@ -98,6 +108,35 @@ impl JointSystems {
     /// The nodes of a system.
     pub fn nodes_of(&self, system: usize) -> Range<usize> {
         self.begins[system] as usize..self.begins[system + 1] as usize
+    }
+
+    /// The blocks of a system.
+    pub fn blocks_of_system(&self, system: usize) -> Range<usize> {
+        let nodes = self.nodes_of(system);
+        self.blocks_of(nodes.start).start..self.blocks_of(nodes.end - 1).end
+    }
+
+    /// Whether two systems have nodes of the same kinds and factors of the same blocks and products, so that they can be solved side by side.
+    pub fn are_of_one_form(&self, [one, other]: [usize; 2]) -> bool {
+        let [nodes, other_nodes] = [one, other].map(|system| self.nodes_of(system));
+        let [blocks, other_blocks] = [one, other].map(|system| self.blocks_of_system(system));
+        if nodes.len() != other_nodes.len() || blocks.len() != other_blocks.len() {
+            return false;
+        }
+        let [node, block] = [(&nodes, &other_nodes), (&blocks, &other_blocks)]
+            .map(|(one, other)| (other.start as u32).wrapping_sub(one.start as u32));
+        nodes.zip(other_nodes).all(|(one, other)| {
+            let (one, other) = (&self.nodes[one], &self.nodes[other]);
+            one.rows == other.rows && one.first_block.wrapping_add(block) == other.first_block
+        }) && blocks.zip(other_blocks).all(|(one, other)| {
+            let (one, other) = (&self.blocks[one], &self.blocks[other]);
+            let [terms, other_terms] = [one, other].map(|row| self.terms_of(row));
+            let is_same = |(a, b): (&[u32; 2], &[u32; 2])| a.map(|a| a.wrapping_add(block)) == *b;
+            one.node.wrapping_add(node) == other.node
+                && one.shared == other.shared
+                && terms.len() == other_terms.len()
+                && terms.iter().zip(other_terms).all(is_same)
+        })
     }
 
     /// The blocks of the column of a node.

@@ -125,7 +125,9 @@ fn joints_have_the_same_bits() {
         for backend in each() {
             same_bits(&against_reference(&backend, "joint-grid", settings, 10, 2));
             same_bits(&against_reference(&backend, "chain", settings, 40, 1));
-            same_bits(&against_reference(backend, "ragdoll:n=9", settings, 10, 2));
+            // Limits of joints of one form side by side are reached, and let go, at different times.
+            same_bits(&against_reference(&backend, "ragdoll:n=9", settings, 10, 2));
+            same_bits(&against_reference(backend, "ragdolls:n=9", settings, 30, 2));
         }
     }
 }

@@ -1,47 +1,148 @@
-//! Joints that are solved at once, on the states of the lanes: each system by one thread, one joint after another.
+//! Joints that are solved at once, on the states of the lanes: sixteen systems of one form side by side, or one alone.
 
 #![allow(unsafe_code)]
 
 use std::ops::Range;
 
-use super::bodies::State;
+use super::bodies::{State, place, wide_body, wide_mass};
 use super::lane_layout::{ImpulsePlace, LaneLayout};
 use super::lane_rows::SharedImpulses;
 use super::partition::{ColorRanges, Partition, PartitionedRows};
 use crate::kernels::joint_system::{
-    Block, JointChanges, JointFactors, JointNode, SystemFactors, begin_system, places, solve_system,
+    Block, JointFactors, JointNode, SystemFactors, SystemRows, begin_system, solve_system,
 };
 use crate::kernels::{Axis, Joint, Mass, Pair, Sym3};
-use crate::lanes::{Lanes, Shared, Work};
+use crate::lanes::{Lanes, Portable, Shared, WIDTH, Wide, Work, lanes};
 use crate::math::{Vec3, vec3};
-use crate::problem::{ImpulseNumber, JointRow, JointSystems, StepProblem};
+use crate::problem::{AxisRow, JointRow, JointSystems, StepProblem};
+
+/// Fewer systems of one form are solved one after another: the numbers of a column of one system fill a quarter of the lanes.
+const LEAST_SIDE_BY_SIDE: usize = 4;
+
+/// One system, or several of one form.
+#[derive(Clone, Copy)]
+struct SystemGroup {
+    /// The systems, one a lane; lanes that are left have the first one again.
+    systems: [u32; WIDTH],
+    count: usize,
+    /// Where its nodes and blocks are among those of all groups that are solved side by side.
+    first_node: usize,
+    first_block: usize,
+}
+
+impl SystemGroup {
+    fn new(system: u32) -> Self {
+        Self { systems: [system; WIDTH], count: 1, first_node: 0, first_block: 0 }
+    }
+}
 
 /// The systems of a step, and the places of their joints.
 #[derive(Default)]
 pub(super) struct SystemLayout {
     rows: PartitionedRows,
+    groups: Vec<SystemGroup>,
+    /// The groups of each color of each part.
+    ranges: ColorRanges,
     /// In the order of impulses: joints, then axes.
     impulses: Vec<ImpulsePlace>,
+    /// Those of the rows of each node.
+    of_nodes: Vec<[ImpulsePlace; 3]>,
 }
 
 impl SystemLayout {
-    /// Takes over the systems of a problem.
-    pub fn load(&mut self, problem: &StepProblem, partition: &Partition, joints: &LaneLayout<JointRow>) {
+    /// Takes over the systems of a problem, and makes room for their factors.
+    pub fn load(
+        &mut self,
+        problem: &StepProblem,
+        partition: &Partition,
+        joints: &LaneLayout<JointRow>,
+        factors: &mut SystemsFactors,
+    ) {
+        let systems = &problem.systems;
         let part_of = |system: u32| {
-            let first = problem.systems.nodes_of(system as usize).start;
-            let JointRow { body_a, body_b, .. } = problem.joints[problem.systems.nodes[first].joint as usize];
+            let first = systems.nodes_of(system as usize).start;
+            let JointRow { body_a, body_b, .. } = problem.joints[systems.nodes[first].joint as usize];
             partition.of(body_a, body_b)
         };
         self.rows.update(problem, partition, |block| block.systems..block.systems + 1, part_of);
+        self.groups.clear();
+        self.ranges.reset(problem.system_colors());
+        for cell in 0..self.rows.ranges.len() {
+            self.ranges.push(self.groups.len());
+            self.make_groups(systems, cell);
+        }
+        self.ranges.push(self.groups.len());
+        let (mut nodes, mut blocks) = (0, 0);
+        for group in self.groups.iter_mut().filter(|group| group.count > 1) {
+            (group.first_node, group.first_block) = (nodes, blocks);
+            nodes += systems.nodes_of(group.systems[0] as usize).len();
+            blocks += systems.blocks_of_system(group.systems[0] as usize).len();
+        }
+        factors.reset(systems, nodes, blocks);
         if problem.has_systems() {
             joints.impulse_places(problem, &mut self.impulses);
+            self.of_nodes.clear();
+            self.of_nodes.extend(systems.nodes.iter().map(|node| {
+                problem.numbers_of(node).map(|at| at.map_or_else(ImpulsePlace::default, |at| self.impulses[at.row]))
+            }));
         }
     }
 
-    /// Where the systems of each color of each part stand: places for [`SystemWork`].
-    pub fn ranges(&self) -> &ColorRanges {
-        &self.rows.ranges
+    /// Groups the systems of one color of one part.
+    fn make_groups(&mut self, systems: &JointSystems, cell: usize) {
+        let first = self.groups.len();
+        for &system in self.rows.at(cell) {
+            let is_like = |group: &&mut SystemGroup| {
+                group.count < WIDTH && systems.are_of_one_form([group.systems[0], system].map(|system| system as usize))
+            };
+            // Neighbors are most alike.
+            match self.groups[first..].iter_mut().rev().find(is_like) {
+                Some(group) => {
+                    group.systems[group.count] = system;
+                    group.count += 1;
+                }
+                None => self.groups.push(SystemGroup::new(system)),
+            }
+        }
+        for i in first..self.groups.len() {
+            let SystemGroup { systems, count, .. } = self.groups[i];
+            if count < LEAST_SIDE_BY_SIDE {
+                self.groups[i] = SystemGroup::new(systems[0]);
+                self.groups.extend(systems[1..count].iter().map(|&system| SystemGroup::new(system)));
+            }
+        }
     }
+
+    /// Where the groups of each color of each part stand: places for [`SystemWork`].
+    pub fn ranges(&self) -> &ColorRanges {
+        &self.ranges
+    }
+}
+
+/// The factors of all systems.
+#[derive(Default)]
+pub(super) struct SystemsFactors {
+    alone: JointFactors<f32>,
+    /// Of systems that are solved side by side, number by number.
+    nodes: Vec<Wide>,
+    lower: Vec<Wide>,
+    upper: Vec<Wide>,
+}
+
+impl SystemsFactors {
+    /// Makes room for all systems alone, and for so many nodes and blocks of systems side by side.
+    fn reset(&mut self, systems: &JointSystems, nodes: usize, blocks: usize) {
+        self.alone.reset(systems);
+        self.nodes.resize(nodes * numbers_in::<JointNode<Portable>>(), Wide::default());
+        self.lower.resize(blocks * numbers_in::<Block<Portable>>(), Wide::default());
+        self.upper.resize(blocks * numbers_in::<Block<Portable>>(), Wide::default());
+    }
+}
+
+/// How many numbers of sixteen lanes a value has that consists of nothing else.
+const fn numbers_in<T>() -> usize {
+    assert!(size_of::<T>().is_multiple_of(size_of::<Wide>()) && align_of::<T>() <= align_of::<Wide>());
+    size_of::<T>() / size_of::<Wide>()
 }
 
 /// The factors of all systems, shared by threads that have different systems.
@@ -50,12 +151,22 @@ pub(super) struct SharedFactors<'a> {
     nodes: Shared<'a, JointNode<f32>>,
     lower: Shared<'a, Block<f32>>,
     upper: Shared<'a, Block<f32>>,
+    wide_nodes: Shared<'a, Wide>,
+    wide_lower: Shared<'a, Wide>,
+    wide_upper: Shared<'a, Wide>,
 }
 
 impl<'a> SharedFactors<'a> {
-    pub fn new(factors: &'a mut JointFactors<f32>) -> Self {
-        let (nodes, lower, upper) = factors.all();
-        Self { nodes: Shared::new(nodes), lower: Shared::new(lower), upper: Shared::new(upper) }
+    pub fn new(factors: &'a mut SystemsFactors) -> Self {
+        let (nodes, lower, upper) = factors.alone.all();
+        Self {
+            nodes: Shared::new(nodes),
+            lower: Shared::new(lower),
+            upper: Shared::new(upper),
+            wide_nodes: Shared::new(&mut factors.nodes),
+            wide_lower: Shared::new(&mut factors.lower),
+            wide_upper: Shared::new(&mut factors.upper),
+        }
     }
 
     /// Those of one system.
@@ -63,17 +174,51 @@ impl<'a> SharedFactors<'a> {
     /// # Safety
     /// No other thread has the same system.
     #[inline(always)]
-    unsafe fn of(&self, systems: &JointSystems, system: usize) -> SystemFactors<'a, f32> {
-        let [nodes, blocks] = places(systems, system);
+    unsafe fn alone(&self, systems: &JointSystems, system: usize) -> SystemFactors<'a, f32> {
+        let (nodes, blocks) = (systems.nodes_of(system), systems.blocks_of_system(system));
         // SAFETY: the caller's promise; systems have nodes and blocks of their own.
         unsafe {
             let (lower, upper) = (self.lower.slice(blocks.clone()), self.upper.slice(blocks));
             SystemFactors { nodes: self.nodes.slice(nodes), lower, upper }
         }
     }
+
+    /// Those of the systems of a group.
+    ///
+    /// # Safety
+    /// No other thread has the same group.
+    #[inline(always)]
+    unsafe fn side_by_side<L: Lanes>(&self, systems: &JointSystems, group: &SystemGroup) -> SystemFactors<'a, L> {
+        let system = group.systems[0] as usize;
+        let (nodes, blocks) = (systems.nodes_of(system).len(), systems.blocks_of_system(system).len());
+        let nodes = group.first_node..group.first_node + nodes;
+        let blocks = group.first_block..group.first_block + blocks;
+        // SAFETY: the caller's promise; groups have nodes and blocks of their own. Nodes and blocks of lanes consist of nothing but lanes.
+        unsafe {
+            SystemFactors {
+                nodes: as_lanes(&self.wide_nodes, nodes),
+                lower: as_lanes(&self.wide_lower, blocks.clone()),
+                upper: as_lanes(&self.wide_upper, blocks),
+            }
+        }
+    }
 }
 
-/// A pass over systems.
+/// Some values among numbers of sixteen lanes.
+///
+/// # Safety
+/// The value consists of lanes and nothing else, and no other thread reads or writes these values.
+#[inline(always)]
+unsafe fn as_lanes<'a, T>(numbers: &Shared<'a, Wide>, range: Range<usize>) -> &'a mut [T] {
+    let each = const { numbers_in::<T>() };
+    // SAFETY: the caller's promise. Every number is one of a lane.
+    unsafe {
+        let own = numbers.slice(range.start * each..range.end * each);
+        std::slice::from_raw_parts_mut(own.as_mut_ptr().cast(), range.len())
+    }
+}
+
+/// A pass over groups of systems.
 pub(super) struct SystemWork<'a> {
     /// Whether systems begin, and are not solved.
     pub begins: bool,
@@ -91,67 +236,193 @@ impl Work for SystemWork<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, range: Range<usize>) {
         let systems = &self.problem.systems;
-        for system in self.layout.rows.rows[range].iter().map(|&system| system as usize) {
-            // SAFETY: tasks have different systems: `Threads::spread_each` cuts their range.
-            let factors = unsafe { self.factors.of(systems, system) };
-            if self.begins {
-                begin_system(systems, system, |joint| self.load(joint), |joint, k| self.axis(joint, k), factors);
+        for group in &self.layout.groups[range] {
+            let system = group.systems[0] as usize;
+            if group.count == 1 {
+                let mut rows = Alone { work: self, system };
+                // SAFETY: tasks have different groups: `Threads::spread_each` cuts their range.
+                let factors = unsafe { self.factors.alone(systems, system) };
+                if self.begins {
+                    begin_system(systems, system, &rows, factors);
+                } else {
+                    solve_system(systems, system, &mut rows, factors);
+                }
             } else {
-                solve_system(self.problem, system, &mut Changes(self), factors);
+                let mut rows = SideBySide::new(self, group);
+                // SAFETY: as above.
+                let factors = unsafe { self.factors.side_by_side::<L>(systems, group) };
+                if self.begins {
+                    begin_system(systems, system, &rows, factors);
+                } else {
+                    solve_system(systems, system, &mut rows, factors);
+                }
             }
         }
     }
 }
 
 impl SystemWork<'_> {
+    /// The number of the row of a node of the problem, among corrections or impulses.
+    ///
+    /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
     #[inline(always)]
-    fn load(&self, joint: usize) -> (Joint<f32>, Pair<f32>) {
-        let row = &self.problem.joints[joint];
+    fn number<'c>(&self, rows: &SharedImpulses<'c>, node: usize, row: usize) -> &'c mut f32 {
+        let ImpulsePlace { row: at, lane } = self.layout.of_nodes[node][row];
+        let component = if self.problem.systems.nodes[node].is_of_anchors() { row } else { 0 };
+        // SAFETY: this reaches one lane of the row, and no other task the same lane.
+        unsafe { rows.number(at as usize, component, lane as usize) }
+    }
+
+    #[inline(always)]
+    fn axis_row(&self, node: usize, k: usize) -> &AxisRow {
+        let joint = self.problem.systems.nodes[node].joint as usize;
+        &self.problem.axes[self.problem.joints[joint].first_axis as usize + k]
+    }
+}
+
+/// The joints of one system.
+struct Alone<'a, 'b> {
+    work: &'a SystemWork<'b>,
+    system: usize,
+}
+
+impl Alone<'_, '_> {
+    #[inline(always)]
+    fn node(&self, node: usize) -> usize {
+        self.work.problem.systems.nodes_of(self.system).start + node
+    }
+}
+
+impl SystemRows<f32> for Alone<'_, '_> {
+    #[inline(always)]
+    fn joint(&self, node: usize) -> (Joint<f32>, Pair<f32>) {
+        let problem = self.work.problem;
+        let row = &problem.joints[problem.systems.nodes[self.node(node)].joint as usize];
         let [(a, mass_a), (b, mass_b)] = [row.body_a, row.body_b].map(|body| {
-            let slot = self.slots[body as usize] as usize;
-            // SAFETY: a factorization writes no body, and no other pass runs beside it.
-            let state = unsafe { &*self.bodies.slice(slot..slot + 1).as_ptr() };
+            let slot = self.work.slots[body as usize] as usize;
+            // SAFETY: a system that begins writes no body, and no other pass runs beside it.
+            let state = unsafe { &*self.work.bodies.slice(slot..slot + 1).as_ptr() };
             let [xx, xy, xz, inv_mass, yy, yz, zz, _] = state.mass.0;
             let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
             (state.load(), Mass { inv_inertia, inv_mass, acceleration: Vec3::default() })
         });
-        // A factorization reads no velocity.
+        // No velocity is read.
         (Joint::load(row), Pair { a, b, mass_a, mass_b, ..Pair::default() })
     }
 
     #[inline(always)]
-    fn axis(&self, joint: usize, k: usize) -> Axis<f32> {
-        Axis::load(&self.problem.axes[self.problem.joints[joint].first_axis as usize + k])
+    fn axis(&self, node: usize, k: usize) -> Axis<f32> {
+        Axis::load(self.work.axis_row(self.node(node), k))
+    }
+
+    #[inline(always)]
+    fn softness(&self) -> f32 {
+        self.work.problem.systems.softness[self.system]
+    }
+
+    #[inline(always)]
+    fn impulse(&self, node: usize, row: usize) -> f32 {
+        *self.work.number(&self.work.impulses, self.node(node), row)
+    }
+
+    #[inline(always)]
+    fn lacking(&self, node: usize, row: usize) -> f32 {
+        *self.work.number(&self.work.changes, self.node(node), row)
+    }
+
+    #[inline(always)]
+    fn change(&mut self, node: usize, row: usize, change: f32) {
+        *self.work.number(&self.work.changes, self.node(node), row) = change;
+        *self.work.number(&self.work.impulses, self.node(node), row) += change;
     }
 }
 
-/// Corrections and impulses of joints among the lanes.
-struct Changes<'a, 'b>(&'a SystemWork<'b>);
+/// The joints of the systems of a group.
+struct SideBySide<'a, 'b> {
+    work: &'a SystemWork<'b>,
+    group: &'a SystemGroup,
+    /// The first node of each.
+    first_nodes: [usize; WIDTH],
+}
 
-impl Changes<'_, '_> {
-    /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
+impl<'a, 'b> SideBySide<'a, 'b> {
     #[inline(always)]
-    fn number<'c>(&mut self, rows: &SharedImpulses<'c>, at: ImpulseNumber) -> &'c mut f32 {
-        let ImpulsePlace { row, lane } = self.0.layout.impulses[at.row];
-        // SAFETY: this reaches one lane of the row, and no other task the same lane.
-        unsafe { rows.number(row as usize, at.component, lane as usize) }
+    fn new(work: &'a SystemWork<'b>, group: &'a SystemGroup) -> Self {
+        let systems = &work.problem.systems;
+        let first_nodes = lanes!(lane => systems.nodes_of(group.systems[lane] as usize).start);
+        Self { work, group, first_nodes }
+    }
+
+    /// A number of each.
+    #[inline(always)]
+    fn numbers<L: Lanes>(&self, rows: &SharedImpulses, node: usize, row: usize) -> L {
+        L::load(&Wide(lanes!(lane => *self.work.number(rows, self.first_nodes[lane] + node, row))))
     }
 }
 
-impl JointChanges<f32> for Changes<'_, '_> {
+impl<L: Lanes> SystemRows<L> for SideBySide<'_, '_> {
     #[inline(always)]
-    fn impulse(&mut self, at: ImpulseNumber) -> f32 {
-        *self.number(&self.0.impulses, at)
+    fn joint(&self, node: usize) -> (Joint<L>, Pair<L>) {
+        let SystemWork { problem, slots, bodies, .. } = self.work;
+        let rows: [&JointRow; WIDTH] =
+            lanes!(lane => &problem.joints[problem.systems.nodes[self.first_nodes[lane] + node].joint as usize]);
+        let numbers: [&[f32; 16]; WIDTH] = lanes!(lane => bytemuck::cast_ref(rows[lane]));
+        // SAFETY: a row has sixteen numbers.
+        let ([ax, ay, az, _, bx, by, bz, _], [gx, gy, gz, is_loose, ..]) = unsafe {
+            (
+                L::columns(&lanes!(lane => numbers[lane].as_ptr())),
+                L::columns(&lanes!(lane => numbers[lane].as_ptr().add(8))),
+            )
+        };
+        let joint = Joint { r_a: vec3(ax, ay, az), r_b: vec3(bx, by, bz), gap: vec3(gx, gy, gz), is_loose };
+        let a = lanes!(lane => place(slots[rows[lane].body_a as usize] as usize));
+        let b = lanes!(lane => place(slots[rows[lane].body_b as usize] as usize));
+        let states = bodies.as_ptr();
+        // SAFETY: the places are those of states. A system that begins writes no body, and no other pass runs beside it.
+        let (a, b, mass_a, mass_b) =
+            unsafe { (wide_body(states, &a), wide_body(states, &b), wide_mass(states, &a), wide_mass(states, &b)) };
+        // No velocity is read.
+        (joint, Pair { a, b, mass_a, mass_b, ..Pair::default() })
     }
 
     #[inline(always)]
-    fn lacking(&mut self, at: ImpulseNumber) -> f32 {
-        *self.number(&self.0.changes, at)
+    fn axis(&self, node: usize, k: usize) -> Axis<L> {
+        let numbers: [&[f32; 12]; WIDTH] =
+            lanes!(lane => bytemuck::cast_ref(self.work.axis_row(self.first_nodes[lane] + node, k)));
+        // SAFETY: a row has twelve numbers.
+        let ([x, y, z, is_linear, gap, left, speed, max_impulse], [.., rate, mass_scale, impulse_scale, length]) = unsafe {
+            (
+                L::columns(&lanes!(lane => numbers[lane].as_ptr())),
+                L::columns(&lanes!(lane => numbers[lane].as_ptr().add(4))),
+            )
+        };
+        let direction = vec3(x, y, z);
+        Axis { direction, is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length }
     }
 
     #[inline(always)]
-    fn change(&mut self, at: ImpulseNumber, change: f32) {
-        *self.number(&self.0.changes, at) = change;
-        *self.number(&self.0.impulses, at) += change;
+    fn softness(&self) -> L {
+        let softness = &self.work.problem.systems.softness;
+        L::load(&Wide(lanes!(lane => softness[self.group.systems[lane] as usize])))
+    }
+
+    #[inline(always)]
+    fn impulse(&self, node: usize, row: usize) -> L {
+        self.numbers(&self.work.impulses, node, row)
+    }
+
+    #[inline(always)]
+    fn lacking(&self, node: usize, row: usize) -> L {
+        self.numbers(&self.work.changes, node, row)
+    }
+
+    #[inline(always)]
+    fn change(&mut self, node: usize, row: usize, change: L) {
+        let changes = change.store();
+        for lane in 0..self.group.count {
+            let node = self.first_nodes[lane] + node;
+            *self.work.number(&self.work.changes, node, row) = changes.0[lane];
+            *self.work.number(&self.work.impulses, node, row) += changes.0[lane];
+        }
     }
 }

@@ -29,14 +29,13 @@ use std::sync::atomic::AtomicBool;
 use super::{Backend, CheckedStep};
 use crate::error::Result;
 use crate::kernels::convergence::begin_sweep;
-use crate::kernels::joint_system::JointFactors;
 use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
 use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
-use joint_systems::{SharedFactors, SystemLayout};
+use joint_systems::{SharedFactors, SystemLayout, SystemsFactors};
 use lane_layout::{LaneLayout, Uses};
 use lane_rows::{LaneImpulses, LanePoints};
 use partition::Partition;
@@ -73,7 +72,7 @@ pub struct Cpu {
     joint_totals: LaneImpulses,
     /// Joints that are solved at once: their places, factors and corrections.
     systems: SystemLayout,
-    factors: JointFactors<f32>,
+    factors: SystemsFactors,
     /// Inertia of their bodies when the step begins, in the order of slots.
     turning: Vec<(u32, Row8)>,
     joint_changes: LaneImpulses,
@@ -139,7 +138,7 @@ impl Cpu {
             let totals = bytemuck::cast_slice(&problem.joint_totals);
             self.joints.load_sums(problem, totals, &mut self.joint_totals, threads);
         }
-        self.systems.load(problem, &self.partition, &self.joints);
+        self.systems.load(problem, &self.partition, &self.joints, &mut self.factors);
         self.turning.clear();
         self.turning.extend(problem.turning.iter().map(|row| {
             let mass: &[f32; 12] = bytemuck::cast_ref(&problem.masses[row.body as usize]);
@@ -149,7 +148,6 @@ impl Cpu {
             (slots[row.body as usize], begin)
         }));
         self.turning.sort_unstable_by_key(|row| row.0);
-        self.factors.reset(&problem.systems);
         self.joint_changes.resize(self.joint_impulses.normals.len(), false);
         self.convergence = problem.convergence;
         self.momentum = Momentum::load(&problem.momentum);

@@ -9,12 +9,12 @@ use crate::kernels::integrate::{
     begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
     start_of,
 };
-use crate::kernels::joint_system::{JointChanges, JointFactors, begin_system, solve_system, turned_inertia};
+use crate::kernels::joint_system::{JointFactors, SystemRows, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Free, Impulse, ImpulseStep, KernelRows, Pair, Sym3};
+use crate::kernels::{Axis, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, StepProblem};
+use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, NodeRow, StepProblem};
 
 /// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
 ///
@@ -227,14 +227,11 @@ impl<S: Scalar> Reference<S> {
         self.joint_changes.resize(self.rows.joint_impulses.len(), Vec3::default());
         for system in places(problem, pass) {
             let own = factors.of(systems, system);
+            let mut rows = OneSystem { reference: self, problem, system };
             if pass.kernel == Kernel::BeginSystems {
-                let load = |joint: usize| (self.rows.joints[joint], self.load_pair(problem.joints[joint].bodies()));
-                let axis = |joint: usize, k: usize| self.rows.axes[problem.joints[joint].first_axis as usize + k];
-                begin_system(systems, system, load, axis, own);
+                begin_system(systems, system, &rows, own);
             } else {
-                let impulses = &mut self.rows.joint_impulses;
-                let mut changes = Changes { changes: &mut self.joint_changes, impulses };
-                solve_system(problem, system, &mut changes, own);
+                solve_system(systems, system, &mut rows, own);
             }
         }
         self.factors = factors;
@@ -269,10 +266,22 @@ fn places(problem: &StepProblem, pass: &Pass) -> impl Iterator<Item = usize> {
     problem.rows_of(&pass.colors).iter().map(|&row| row as usize)
 }
 
-/// Corrections and impulses of joints.
-struct Changes<'a, S> {
-    changes: &'a mut [Vec3<S>],
-    impulses: &'a mut [Vec3<S>],
+/// The joints of one system.
+struct OneSystem<'a, S> {
+    reference: &'a mut Reference<S>,
+    problem: &'a StepProblem,
+    system: usize,
+}
+
+impl<S> OneSystem<'_, S> {
+    fn node(&self, node: usize) -> &NodeRow {
+        let systems = &self.problem.systems;
+        &systems.nodes[systems.nodes_of(self.system).start + node]
+    }
+
+    fn number(&self, node: usize, row: usize) -> ImpulseNumber {
+        self.problem.numbers_of(self.node(node))[row].expect("a row that is there")
+    }
 }
 
 /// A component of one of some rows.
@@ -281,18 +290,39 @@ fn component<S>(rows: &mut [Vec3<S>], at: ImpulseNumber) -> &mut S {
     [x, y, z].into_iter().nth(at.component).expect("one of three")
 }
 
-impl<S: Scalar> JointChanges<S> for Changes<'_, S> {
-    fn impulse(&mut self, at: ImpulseNumber) -> S {
-        *component(self.impulses, at)
+/// A component of one of some rows.
+fn component_of<S: Copy>(rows: &[Vec3<S>], at: ImpulseNumber) -> S {
+    let Vec3 { x, y, z } = rows[at.row];
+    [x, y, z][at.component]
+}
+
+impl<S: Scalar> SystemRows<S> for OneSystem<'_, S> {
+    fn joint(&self, node: usize) -> (Joint<S>, Pair<S>) {
+        let joint = self.node(node).joint as usize;
+        (self.reference.rows.joints[joint], self.reference.load_pair(self.problem.joints[joint].bodies()))
     }
 
-    fn lacking(&mut self, at: ImpulseNumber) -> S {
-        *component(self.changes, at)
+    fn axis(&self, node: usize, k: usize) -> Axis<S> {
+        let joint = self.node(node).joint as usize;
+        self.reference.rows.axes[self.problem.joints[joint].first_axis as usize + k]
     }
 
-    fn change(&mut self, at: ImpulseNumber, change: S) {
-        *component(self.changes, at) = change;
-        let impulse = component(self.impulses, at);
+    fn softness(&self) -> S {
+        S::from(self.problem.systems.softness[self.system])
+    }
+
+    fn impulse(&self, node: usize, row: usize) -> S {
+        component_of(&self.reference.rows.joint_impulses, self.number(node, row))
+    }
+
+    fn lacking(&self, node: usize, row: usize) -> S {
+        component_of(&self.reference.joint_changes, self.number(node, row))
+    }
+
+    fn change(&mut self, node: usize, row: usize, change: S) {
+        let at = self.number(node, row);
+        *component(&mut self.reference.joint_changes, at) = change;
+        let impulse = component(&mut self.reference.rows.joint_impulses, at);
         *impulse = *impulse + change;
     }
 }

@@ -230,6 +230,9 @@ mod tests {
             fn mask(value: bool) -> bool {
                 value
             }
+            fn any(mask: bool) -> bool {
+                mask
+            }
             fn select(if_false: Self, if_true: Self, mask: bool) -> Self {
                 counted(if mask { if_true.0 } else { if_false.0 })
             }
