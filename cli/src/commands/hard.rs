@@ -9,7 +9,7 @@ use serde_json::json;
 use super::output::{print, print_json};
 use super::progress::Progress;
 use super::words;
-use crate::hard::families::{self, Judged};
+use crate::hard::families::{self, FamilyShare, Judged};
 use crate::hard::{Case, Check, Limit, Setup, passes};
 use crate::report::hard_rows::HardRows;
 use crate::report::{Shard, hard_cases, hard_families};
@@ -148,15 +148,14 @@ impl HardArgs {
         let setup = Setup { config: self.config()?, open: &|| self.backend.open(false) };
         let shares = judge(&setup, self.preset.name())?;
         if self.json {
-            let failure = |family: Family, world: &Judged| {
-                let failed: Vec<_> = world.checks.iter().filter(|check| !check.passed).collect();
-                json!({"seed": world.seed, "scene": family.spec(world.seed), "checks": failed})
+            let world = |family: Family, world: &Judged| {
+                json!({"seed": world.seed, "scene": family.spec(world.seed), "passed": passes(&world.checks), "ms": world.ms, "checks": world.checks})
             };
             let families = shares.iter().map(|share| {
-                let family = share.family;
-                let failures: Vec<_> = share.failures().map(|world| failure(family, world)).collect();
-                json!({"family": family.name(), "summary": family.summary(), "worlds": share.worlds.len(), "passed": share.passed(),
-                    "share": share.share(), "interval": share.interval(), "ms": share.ms(), "failures": failures})
+                let FamilyShare { family, worlds } = share;
+                let worlds: Vec<_> = worlds.iter().map(|one| world(*family, one)).collect();
+                json!({"family": family.name(), "summary": family.summary(), "count": worlds.len(), "passed": share.passed(),
+                    "share": share.share(), "interval": share.interval(), "ms": share.ms(), "worlds": worlds})
             });
             let families: Vec<_> = families.collect();
             return print_json(&json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "seed": self.seed, "families": families}));

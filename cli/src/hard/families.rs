@@ -115,11 +115,15 @@ const AT_REST: f64 = 0.01;
 const CREEP: f64 = 1e-3;
 /// Relative error of an acceleration.
 const ACCELERATION: f64 = 0.02;
-/// Relative error of the speed of a wave of dominoes.
+/// Relative error of the speed of a wave of dominoes. The law leaves out the friction that is there, and a step is up to a quarter of the time
+/// from one to the next: over 40 worlds the error was 1.4 % in the median and 5.5 % at most.
 const WAVE: f64 = 0.1;
 /// Gap of a joint over the length of a link, and energy gained over what a swing sets free, as in case H6.
 const GAP: f64 = 0.01;
 const GAIN: f64 = 1e-3;
+
+/// Kinetic energy of a pile over what its fall set free: bodies that roll go on, because nothing resists rolling.
+const SETTLED: f64 = 1e-3;
 
 /// Runs a scene and holds it against a law.
 ///
@@ -163,7 +167,9 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
         }
         Law::Settles => {
             checks.at_most("bodies outside", scene.escaped(end) as f64, 0.0);
-            checks.at_most("root mean square speed at the end, over a fall by the size of one", rms(end), AT_REST);
+            // Nothing falls up: without a fall there is nothing to hold it against, and the check fails.
+            let freed = (energy(start) - end.potential_energy()).max(0.0);
+            checks.at_most("kinetic energy at the end over what the fall set free", end.kinetic_energy() / freed, SETTLED);
         }
         _ => return Err(Error::input(format!("{law:?}: no judge knows this law"))),
     }
@@ -233,8 +239,97 @@ fn speed(world: &World) -> f64 {
     largest(0.0, world.dynamic().map(|body| body.linear_velocity.as_dvec3().length() / fall(world, body)))
 }
 
-/// The root mean square speed over that of a fall by the mean size.
-fn rms(world: &World) -> f64 {
-    let falls: f64 = world.dynamic().map(|body| fall(world, body)).sum();
-    metrics::rms_speed(world) * world.dynamic_count() as f64 / falls
+#[cfg(test)]
+mod tests {
+    use drystone::{Backend, Cpu, SolverConfig};
+
+    use super::*;
+
+    fn judged(scene: &Scene, law: &Law) -> Vec<Check> {
+        let open = || Ok(Box::new(Cpu::new()) as Box<dyn Backend>);
+        judge(scene, law, &Setup { config: SolverConfig::default().without_sleep(), open: &open }).expect("a run").checks
+    }
+
+    /// The first member of a family whose law fits.
+    fn first(family: Family, fits: impl Fn(&Member) -> bool) -> Member {
+        (1..100).map(|seed| family.member(seed).expect("a member")).find(fits).expect("one of a hundred")
+    }
+
+    #[test]
+    fn a_tower_stands_within_its_limit_and_is_found_out_beyond() {
+        let Member { mut scene, law } = first(Family::LeanedTowers, |m| m.scene.world.dynamic_count() < 10);
+        assert!(passes(&judged(&scene, &law)));
+        // From 80 to 120 % of the limit.
+        for body in scene.world.bodies.iter_mut().skip(1) {
+            body.position *= Vec3::new(1.5, 1.0, 1.5);
+        }
+        assert!(!passes(&judged(&scene, &law)));
+    }
+
+    #[test]
+    fn an_arch_that_is_too_thin_is_found_out() {
+        let arch = |spec: &str| judged(&Scene::find_spec(spec).expect("an arch"), &Law::Stands);
+        assert!(!passes(&arch("arch:voussoirs=31,thickness=0.09")));
+        assert!(passes(&arch("arch:voussoirs=15,thickness=0.2")));
+    }
+
+    #[test]
+    fn a_block_that_slides_does_not_stick_and_one_that_sticks_does_not_slide() {
+        for family in [Family::Slopes, Family::PushedBlocks] {
+            let sticks = first(family, |m| m.law == Law::Sticks);
+            let slides = first(family, |m| m.law != Law::Sticks);
+            assert!(passes(&judged(&sticks.scene, &sticks.law)) && passes(&judged(&slides.scene, &slides.law)), "{family}");
+            assert!(!passes(&judged(&slides.scene, &sticks.law)), "{family}");
+            assert!(!passes(&judged(&sticks.scene, &slides.law)), "{family}");
+            // Off by twice what is allowed, and a share of that for the error of the run itself.
+            let Law::Slides(acceleration) = slides.law else { panic!("{:?}", slides.law) };
+            assert!(!passes(&judged(&slides.scene, &Law::Slides(1.05 * acceleration))), "{family}");
+        }
+    }
+
+    #[test]
+    fn dominoes_that_stay_or_fall_at_another_speed_are_found_out() {
+        let Member { mut scene, law } = Family::Dominoes.member(1).expect("a member");
+        assert!(passes(&judged(&scene, &law)));
+        let Law::Topples { speed, angle } = law else { panic!("{law:?}") };
+        assert!(!passes(&judged(&scene, &Law::Topples { speed: 1.25 * speed, angle })));
+        // The first one is not pushed.
+        scene.world.bodies[1] = scene.world.bodies[1].clone().velocity(Vec3::ZERO, Vec3::ZERO);
+        assert!(!passes(&judged(&scene, &law)));
+    }
+
+    #[test]
+    fn a_joint_that_opens_and_energy_that_grows_are_found_out() {
+        let Member { mut scene, law } = first(Family::Chains, |m| m.scene.world.dynamic_count() < 20);
+        assert!(passes(&judged(&scene, &law)));
+        let Law::Swings { link, energy } = law else { panic!("{law:?}") };
+        assert!(!passes(&judged(&scene, &Law::Swings { link: 1e-6 * link, energy })));
+        // Something pulls the last one up all the time.
+        let last = scene.world.bodies.len() - 1;
+        let weight = scene.world.bodies[last].mass.mass * scene.world.gravity;
+        scene.world.bodies[last].force = -5.0 * weight;
+        assert!(!passes(&judged(&scene, &law)));
+    }
+
+    #[test]
+    fn a_pile_that_leaks_or_moves_is_found_out() {
+        let Member { mut scene, law } = first(Family::Piles, |m| m.scene.world.dynamic_count() < 30);
+        assert!(passes(&judged(&scene, &law)));
+        let early = Scene { steps: scene.steps / 20, ..scene.clone() };
+        assert!(!passes(&judged(&early, &law)), "it still falls");
+        scene.world.remove(scene.world.bodies.handle(0).expect("the floor"));
+        assert!(!passes(&judged(&scene, &law)), "the floor is gone");
+    }
+
+    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+    #[test]
+    fn intervals_are_those_of_the_literature() {
+        for (passed, count, [least, most]) in
+            [(81, 263, [0.2553, 0.3662]), (15, 148, [0.0624, 0.1605]), (0, 20, [0.0, 0.1611]), (1, 29, [0.0061, 0.1718])]
+        {
+            let [a, b] = wilson(passed, count);
+            assert!((a - least).abs() < 1e-4 && (b - most).abs() < 1e-4, "{passed} of {count}: {a} to {b}");
+        }
+        assert_eq!(wilson(20, 20)[1], 1.0);
+    }
 }
