@@ -126,7 +126,9 @@ impl HardArgs {
     fn run_families(&self, count: u32) -> Result<()> {
         let families = if self.family.is_empty() { Family::ALL.to_vec() } else { self.family.clone() };
         if self.list {
-            return families.iter().try_for_each(|family| print(format_args!("{:<14}  {}", family.name(), family.summary())));
+            return families
+                .iter()
+                .try_for_each(|family| print(format_args!("{:<14}  {}", family.name(), family.summary())));
         }
         let seeds = families::seeds(self.seed, count)?;
         let judge = |setup: &Setup, what: &str| {
@@ -148,9 +150,7 @@ impl HardArgs {
         let setup = Setup { config: self.config()?, open: &|| self.backend.open(false) };
         let shares = judge(&setup, self.preset.name())?;
         if self.json {
-            let world = |family: Family, world: &Judged| {
-                json!({"seed": world.seed, "scene": family.spec(world.seed), "passed": passes(&world.checks), "ms": world.ms, "checks": world.checks})
-            };
+            let world = |family: Family, world: &Judged| json!({"seed": world.seed, "scene": family.spec(world.seed), "passed": passes(&world.checks), "ms": world.ms, "checks": world.checks});
             let families = shares.iter().map(|share| {
                 let FamilyShare { family, worlds } = share;
                 let worlds: Vec<_> = worlds.iter().map(|one| world(*family, one)).collect();
@@ -158,17 +158,25 @@ impl HardArgs {
                     "share": share.share(), "interval": share.interval(), "ms": share.ms(), "worlds": worlds})
             });
             let families: Vec<_> = families.collect();
-            return print_json(&json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "seed": self.seed, "families": families}));
+            return print_json(
+                &json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "seed": self.seed, "families": families}),
+            );
         }
         for share in &shares {
             print(format_args!("{}  {}", share.family, share.family.summary()))?;
             let [least, most] = share.interval().map(|x| 100.0 * x);
             let (passed, count, percent) = (share.passed(), share.worlds.len(), 100.0 * share.share());
             let us = 1e3 * share.ms();
-            print(format_args!("  {passed} of {count} pass: {percent:.1} %, {least:.1} to {most:.1} % with 95 % confidence; {us:.2} us a step and body"))?;
+            print(format_args!(
+                "  {passed} of {count} pass: {percent:.1} %, {least:.1} to {most:.1} % with 95 % confidence; {us:.2} us a step and body"
+            ))?;
             for world in share.failures() {
                 print(format_args!("  drystone run {} --no-sleep", share.family.spec(world.seed)))?;
-                world.checks.iter().filter(|check| !check.passed).try_for_each(|check| print(format_args!("  {}", line(check))))?;
+                world
+                    .checks
+                    .iter()
+                    .filter(|check| !check.passed)
+                    .try_for_each(|check| print(format_args!("  {}", line(check))))?;
             }
         }
         Ok(())

@@ -140,6 +140,7 @@ mod tests {
             assert_eq!(T::WORDS.iter().map(|word| word.0).collect::<Vec<_>>(), names);
         }
         same(&Preset::ALL);
+        same(&Family::ALL);
         same(&Method::ALL);
         same(&Order::ALL);
         same(&BackendChoice::ALL);

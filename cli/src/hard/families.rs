@@ -81,12 +81,21 @@ pub fn seeds(first: u64, count: u32) -> Result<Vec<u64>> {
 ///
 /// # Errors
 /// A world cannot be run.
-pub fn judge_all(families: &[Family], seeds: &[u64], setup: &Setup, done: impl Fn() + Sync) -> Result<Vec<FamilyShare>> {
-    let tasks: Vec<(Family, u64)> = families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed))).collect();
+pub fn judge_all(
+    families: &[Family],
+    seeds: &[u64],
+    setup: &Setup,
+    done: impl Fn() + Sync,
+) -> Result<Vec<FamilyShare>> {
+    let tasks: Vec<(Family, u64)> =
+        families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed))).collect();
     let (next, judged) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || -> Result<()> {
         // Steps of a world take the threads of the pool that they run in.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::input(format!("a thread: {e}")))?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .map_err(|e| Error::input(format!("a thread: {e}")))?;
         while let Some(&(family, seed)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
             let Member { scene, law } = family.member(seed)?;
             let world = pool.install(|| judge(&scene, &law, setup)).map_err(|e| e.within(family.spec(seed)))?;
@@ -101,12 +110,15 @@ pub fn judge_all(families: &[Family], seeds: &[u64], setup: &Setup, done: impl F
         workers.into_iter().try_for_each(|worker| worker.join().expect("no panic"))
     })?;
     let judged = judged.into_inner().expect("no panic");
-    Ok(families.iter().map(|&family| {
-        let own = judged.iter().filter(|(of, _)| *of == family);
-        let mut worlds: Vec<_> = own.map(|(_, world)| world.clone()).collect();
-        worlds.sort_by_key(|world| world.seed);
-        FamilyShare { family, worlds }
-    }).collect())
+    Ok(families
+        .iter()
+        .map(|&family| {
+            let own = judged.iter().filter(|(of, _)| *of == family);
+            let mut worlds: Vec<_> = own.map(|(_, world)| world.clone()).collect();
+            worlds.sort_by_key(|world| world.seed);
+            FamilyShare { family, worlds }
+        })
+        .collect())
 }
 
 /// A speed at which a body is at rest, over that of a fall by its size: its kinetic energy lifts it by 1e-4 of the size.
@@ -169,7 +181,11 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
             checks.at_most("bodies outside", scene.escaped(end) as f64, 0.0);
             // Nothing falls up: without a fall there is nothing to hold it against, and the check fails.
             let freed = (energy(start) - end.potential_energy()).max(0.0);
-            checks.at_most("kinetic energy at the end over what the fall set free", end.kinetic_energy() / freed, SETTLED);
+            checks.at_most(
+                "kinetic energy at the end over what the fall set free",
+                end.kinetic_energy() / freed,
+                SETTLED,
+            );
         }
         _ => return Err(Error::input(format!("{law:?}: no judge knows this law"))),
     }
@@ -247,7 +263,9 @@ mod tests {
 
     fn judged(scene: &Scene, law: &Law) -> Vec<Check> {
         let open = || Ok(Box::new(Cpu::new()) as Box<dyn Backend>);
-        judge(scene, law, &Setup { config: SolverConfig::default().without_sleep(), open: &open }).expect("a run").checks
+        judge(scene, law, &Setup { config: SolverConfig::default().without_sleep(), open: &open })
+            .expect("a run")
+            .checks
     }
 
     /// The first member of a family whose law fits.
@@ -278,7 +296,10 @@ mod tests {
         for family in [Family::Slopes, Family::PushedBlocks] {
             let sticks = first(family, |m| m.law == Law::Sticks);
             let slides = first(family, |m| m.law != Law::Sticks);
-            assert!(passes(&judged(&sticks.scene, &sticks.law)) && passes(&judged(&slides.scene, &slides.law)), "{family}");
+            assert!(
+                passes(&judged(&sticks.scene, &sticks.law)) && passes(&judged(&slides.scene, &slides.law)),
+                "{family}"
+            );
             assert!(!passes(&judged(&slides.scene, &sticks.law)), "{family}");
             assert!(!passes(&judged(&sticks.scene, &slides.law)), "{family}");
             // Off by twice what is allowed, and a share of that for the error of the run itself.
@@ -324,9 +345,12 @@ mod tests {
     /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
     #[test]
     fn intervals_are_those_of_the_literature() {
-        for (passed, count, [least, most]) in
-            [(81, 263, [0.2553, 0.3662]), (15, 148, [0.0624, 0.1605]), (0, 20, [0.0, 0.1611]), (1, 29, [0.0061, 0.1718])]
-        {
+        for (passed, count, [least, most]) in [
+            (81, 263, [0.2553, 0.3662]),
+            (15, 148, [0.0624, 0.1605]),
+            (0, 20, [0.0, 0.1611]),
+            (1, 29, [0.0061, 0.1718]),
+        ] {
             let [a, b] = wilson(passed, count);
             assert!((a - least).abs() < 1e-4 && (b - most).abs() < 1e-4, "{passed} of {count}: {a} to {b}");
         }

@@ -21,10 +21,13 @@ pub fn page(seeds: &[u64], mut judge: impl FnMut(Preset) -> Result<Vec<FamilySha
     let (first, last, count) = (seeds[0], seeds[seeds.len() - 1], seeds.len());
     let mut page = format!(
         "# Families of hard cases\n\n{}\n",
-        include_str!("hard_families_head.md").replace("SEEDS", &format!("{first} to {last}")).replace("COUNT", &count.to_string())
+        include_str!("hard_families_head.md")
+            .replace("SEEDS", &format!("{first} to {last}"))
+            .replace("COUNT", &count.to_string())
     );
     let heads: Vec<_> = PRESETS.iter().map(|preset| format!("{preset} ({})", preset.config().substeps)).collect();
-    writeln!(page, "| family | {} |\n|---|{}", heads.join(" | "), "---|".repeat(PRESETS.len())).expect("text takes all");
+    writeln!(page, "| family | {} |\n|---|{}", heads.join(" | "), "---|".repeat(PRESETS.len()))
+        .expect("text takes all");
     for (k, family) in families().enumerate() {
         let cells: Vec<_> = all.iter().map(|shares| cell(&shares[k])).collect();
         writeln!(page, "| `{family}` | {} |", cells.join(" | ")).expect("text takes all");
@@ -92,8 +95,16 @@ mod tests {
     use crate::hard::{Check, Limit};
 
     fn share(family: Family, seeds: &[u64]) -> FamilyShare {
-        let check = |seed: u64| Check { what: "a check".into(), value: 1.0, limit: Limit::AtMost(0.5), passed: !seed.is_multiple_of(3) };
-        FamilyShare { family, worlds: seeds.iter().map(|&seed| Judged { seed, checks: vec![check(seed)], ms: 1e-3 }).collect() }
+        let check = |seed: u64| Check {
+            what: "a check".into(),
+            value: 1.0,
+            limit: Limit::AtMost(0.5),
+            passed: !seed.is_multiple_of(3),
+        };
+        FamilyShare {
+            family,
+            worlds: seeds.iter().map(|&seed| Judged { seed, checks: vec![check(seed)], ms: 1e-3 }).collect(),
+        }
     }
 
     #[test]
@@ -105,7 +116,10 @@ mod tests {
         assert!(long.is_empty(), "{long:#?}");
         for family in Family::ALL {
             assert!(text(family).contains("pass"), "{family}");
-            assert!(page.contains(&format!("| `{family}` | 67 % (60.")) && page.contains(&format!("`{family}`, fast: 3, 6, ")));
+            assert!(
+                page.contains(&format!("| `{family}` | 67 % (60."))
+                    && page.contains(&format!("`{family}`, fast: 3, 6, "))
+            );
         }
     }
 }

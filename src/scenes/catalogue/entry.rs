@@ -226,6 +226,12 @@ mod tests {
             refusal("tower", bad);
         }
         assert_eq!(refusal("wall", "rows"), "wall: \"rows\": write it as key=value");
+        let unknown = refusal("family", "kind=stcks");
+        assert!(
+            unknown.starts_with("family: kind = \"stcks\": unknown; did you mean \"stacks\"? known: stacks, "),
+            "{unknown}"
+        );
+        refusal("family", "kind=10");
         refusal("pyramid", "base=2801");
         refusal("wall", "columns=1901");
     }
@@ -262,6 +268,13 @@ mod tests {
     fn parameters_that_contradict_each_other_are_refused() {
         assert_eq!(refusal("tallest", "step=31"), "tallest: step = 31: must be at most n = 30");
         assert_eq!(refusal("bridge", "boxes=21"), "bridge: boxes = 21: must be at most planks = 20");
+    }
+
+    #[test]
+    fn a_word_and_the_number_that_it_stands_for_give_the_same_scene() {
+        let mu = |kind: &str| build("family", &[kind]).expect("a scene").world.bodies[0].material.friction;
+        assert_eq!(mu("kind=slopes"), mu("kind=7"));
+        assert_ne!(mu("kind=slopes"), mu("kind=arches"));
     }
 
     #[test]

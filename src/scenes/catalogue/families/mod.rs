@@ -132,15 +132,29 @@ impl Family {
     /// One line: the worlds, and what holds of them.
     pub const fn summary(self) -> &'static str {
         match self {
-            Self::Stacks => "4 to 40 boxes of random sizes, densities and turns, dropped by up to 0.2 % of their heights: they stand",
-            Self::LeanedTowers => "2 to 30 equal boxes, each shifted the same way, to 80 % of what statics allows: they stand",
+            Self::Stacks => {
+                "4 to 40 boxes of random sizes, densities and turns, dropped by up to 0.2 % of their heights: they stand"
+            }
+            Self::LeanedTowers => {
+                "2 to 30 equal boxes, each shifted the same way, to 80 % of what statics allows: they stand"
+            }
             Self::Arches => "semicircles of 7 to 31 wedges, 1.1 times as thick as they must be or thicker: they stand",
-            Self::CardHouses => "1 to 5 storeys of cards with 1.25 times the friction that they need or more: they stand",
+            Self::CardHouses => {
+                "1 to 5 storeys of cards with 1.25 times the friction that they need or more: they stand"
+            }
             Self::PlankTowers => "1 to 8 storeys of planks, all loads straight above each other: they stand",
-            Self::Dominoes => "30 to 60 dominoes without friction between them: all fall, at the speed of a train that leans and pushes",
-            Self::Chains => "chains of 3 to 60 links and nets of 4 to 12 balls a side, ends up to 1000 times heavier: joints stay closed",
-            Self::Slopes => "a block at 0.98 or 1.02 of the angle of friction: it stays, or slides with g (sin - mu cos)",
-            Self::PushedBlocks => "a block that 0.98 or 1.02 of the limit of friction pushes: it stays, or slides with 0.02 mu g",
+            Self::Dominoes => {
+                "30 to 60 dominoes without friction between them: all fall, at the speed of a train that leans and pushes"
+            }
+            Self::Chains => {
+                "chains of 3 to 60 links and nets of 4 to 12 balls a side, ends up to 1000 times heavier: joints stay closed"
+            }
+            Self::Slopes => {
+                "a block at 0.98 or 1.02 of the angle of friction: it stays, or slides with g (sin - mu cos)"
+            }
+            Self::PushedBlocks => {
+                "a block that 0.98 or 1.02 of the limit of friction pushes: it stays, or slides with 0.02 mu g"
+            }
             Self::Piles => "20 to 120 bodies of six shapes in a container: none leaves, and all come to rest",
         }
     }
@@ -173,7 +187,12 @@ impl Family {
             Law::Topples { speed, .. } => dominoes::time(&scene, speed, g),
             _ => TIME / factor.sqrt(),
         };
-        let mut scene = Scene { dt: dt as f32, steps: (time / dt).ceil() as u32, stands: matches!(law, Law::Stands | Law::Sticks), ..scene };
+        let mut scene = Scene {
+            dt: dt as f32,
+            steps: (time / dt).ceil() as u32,
+            stands: matches!(law, Law::Stands | Law::Sticks),
+            ..scene
+        };
         scene.name = "family".to_owned();
         scene.world.gravity = Vec3::new(0.0, -g as f32, 0.0);
         Ok(Member { scene, law })
@@ -198,7 +217,11 @@ mod tests {
 
     fn bits(world: &World) -> Vec<u32> {
         let numbers = world.bodies.iter().flat_map(|b| {
-            let places = [b.position.extend(b.mass.mass).to_array(), b.rotation.to_array(), b.force.extend(b.material.friction).to_array()];
+            let places = [
+                b.position.extend(b.mass.mass).to_array(),
+                b.rotation.to_array(),
+                b.force.extend(b.material.friction).to_array(),
+            ];
             places.into_iter().flatten()
         });
         numbers.chain([world.gravity.y]).map(f32::to_bits).collect()
@@ -243,11 +266,15 @@ mod tests {
     #[test]
     fn steps_and_gravity_fill_their_ranges() {
         let scenes: Vec<_> = (0..200).map(|seed| Family::Slopes.member(seed).expect("a member").scene).collect();
-        let ends = |of: &dyn Fn(&Scene) -> f32| scenes.iter().map(of).fold((f32::MAX, 0.0_f32), |(a, b), x| (a.min(x), b.max(x)));
+        let ends = |of: &dyn Fn(&Scene) -> f32| {
+            scenes.iter().map(of).fold((f32::MAX, 0.0_f32), |(a, b), x| (a.min(x), b.max(x)))
+        };
         let (shortest, longest) = ends(&|s| s.dt);
         let (least, most) = ends(&|s| -s.world.gravity.y);
         assert!((1.0 / 481.0..1.0 / 450.0).contains(&shortest) && (1.0 / 32.0..1.0 / 29.9).contains(&longest));
         assert!((0.98..1.1).contains(&least) && (90.0..98.2).contains(&most));
-        assert!(scenes.iter().all(|s| (f64::from(-s.world.gravity.y) * (f64::from(s.dt) * f64::from(s.steps)).powi(2) / 981.0 - 1.0).abs() < 0.1));
+        assert!(scenes.iter().all(|s| {
+            (f64::from(-s.world.gravity.y) * (f64::from(s.dt) * f64::from(s.steps)).powi(2) / 981.0 - 1.0).abs() < 0.1
+        }));
     }
 }
