@@ -8,7 +8,7 @@ mod scene;
 mod spawner;
 mod spawners;
 
-pub use catalogue::{CATALOGUE, Entry, Parameter};
+pub use catalogue::{CATALOGUE, Entry, Family, Law, Member, Parameter};
 #[cfg(feature = "serde")]
 pub use file::{
     AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,

@@ -1,6 +1,7 @@
 //! `drystone hard`.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 
 use clap::Args;
 use serde_json::json;
@@ -8,13 +9,15 @@ use serde_json::json;
 use super::output::{print, print_json};
 use super::progress::Progress;
 use super::words;
+use crate::hard::families::{self, FamilyShare, Judged};
 use crate::hard::{Case, Check, Limit, Setup, passes};
 use crate::report::hard_rows::HardRows;
-use crate::report::{Shard, hard_cases};
+use crate::report::{Shard, hard_cases, hard_families};
 use crate::settings;
-use drystone::Result;
 use drystone::backend::BackendKind;
 use drystone::preset::Preset;
+use drystone::scenes::Family;
+use drystone::{Result, SolverConfig};
 
 #[derive(Args)]
 pub struct HardArgs {
@@ -30,15 +33,25 @@ pub struct HardArgs {
     /// Backend that runs the sweeps.
     #[arg(long, value_parser = words::of::<BackendKind>(), default_value = "cpu")]
     backend: BackendKind,
+    /// Judge N random worlds of each family instead of the cases.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(conflicts_with_all = ["case", "short", "out", "shard", "merge"])]
+    families: Option<u32>,
+    /// Judge this family alone; may be given several times.
+    #[arg(long, value_name = "NAME", value_parser = words::of::<Family>(), requires = "families")]
+    family: Vec<Family>,
+    /// Seed of the first world of each family; the next ones follow.
+    #[arg(long, value_name = "S", default_value_t = 1, requires = "families")]
+    seed: u64,
     /// Leave out the cases that take minutes.
     #[arg(long)]
     short: bool,
     /// List the cases without running them.
     #[arg(long)]
     list: bool,
-    /// Write the page of all cases into this directory.
+    /// Write the page of all cases, or of all families, into this directory.
     ///
-    /// The page has every preset on the CPU, and `balanced` on every backend.
+    /// The page of cases has every preset on the CPU, and `balanced` on every backend; that of families the presets up to `accurate`.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json", "out", "shard", "merge"])]
     page: Option<PathBuf>,
     /// Write the checks as CSV, those of a case as soon as it ran. A stopped run goes on after the cases in FILE.
@@ -57,6 +70,9 @@ pub struct HardArgs {
 
 impl HardArgs {
     pub fn run(&self) -> Result<()> {
+        if let Some(count) = self.families {
+            return self.run_families(count);
+        }
         let cases: Vec<&Case> = match &self.case[..] {
             [] => Case::ALL.iter().filter(|c| !(self.short && c.long)).collect(),
             names => names.iter().map(|name| Case::find(name)).collect::<Result<_>>()?,
@@ -75,10 +91,7 @@ impl HardArgs {
             crate::files::write(&path, page.as_bytes())?;
             return print(path.display());
         }
-        let mut config = self.preset.config().without_sleep();
-        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
-        config.check()?;
-        let setup = Setup { config, open: &|| self.backend.open(false) };
+        let setup = Setup { config: self.config()?, open: &|| self.backend.open(false) };
         let mut rows = HardRows::open(self.out.as_deref(), &setup, &self.backend.to_string())?;
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         let merged = if self.merge.is_empty() { None } else { Some(rows.merge(&cases, &self.merge)?) };
@@ -101,6 +114,72 @@ impl HardArgs {
             );
         }
         print(format_args!("{} of {} cases pass", all.iter().filter(|(_, checks)| passes(checks)).count(), all.len()))
+    }
+
+    fn config(&self) -> Result<SolverConfig> {
+        let mut config = self.preset.config().without_sleep();
+        self.set.iter().try_for_each(|assignment| settings::set(&mut config, assignment))?;
+        config.check()?;
+        Ok(config)
+    }
+
+    fn run_families(&self, count: u32) -> Result<()> {
+        let families = if self.family.is_empty() { Family::ALL.to_vec() } else { self.family.clone() };
+        if self.list {
+            return families
+                .iter()
+                .try_for_each(|family| print(format_args!("{:<14}  {}", family.name(), family.summary())));
+        }
+        let seeds = families::seeds(self.seed, count)?;
+        let judge = |setup: &Setup, what: &str| {
+            let bar = Mutex::new(Progress::new("world", (families.len() * seeds.len()) as u64, false));
+            bar.lock().expect("no panic").set_message(what);
+            let shares = families::judge_all(&families, &seeds, setup, || bar.lock().expect("no panic").inc())?;
+            bar.into_inner().expect("no panic").finish();
+            Ok(shares)
+        };
+        if let Some(directory) = &self.page {
+            let page = hard_families::page(&seeds, |preset| {
+                let config = preset.config().without_sleep();
+                judge(&Setup { config, open: &|| self.backend.open(false) }, preset.name())
+            })?;
+            let path = directory.join("families.md");
+            crate::files::write(&path, page.as_bytes())?;
+            return print(path.display());
+        }
+        let setup = Setup { config: self.config()?, open: &|| self.backend.open(false) };
+        let shares = judge(&setup, self.preset.name())?;
+        if self.json {
+            let world = |family: Family, world: &Judged| json!({"seed": world.seed, "scene": family.spec(world.seed), "passed": passes(&world.checks), "ms": world.ms, "checks": world.checks});
+            let families = shares.iter().map(|share| {
+                let FamilyShare { family, worlds } = share;
+                let worlds: Vec<_> = worlds.iter().map(|one| world(*family, one)).collect();
+                json!({"family": family.name(), "summary": family.summary(), "count": worlds.len(), "passed": share.passed(),
+                    "share": share.share(), "interval": share.interval(), "ms": share.ms(), "worlds": worlds})
+            });
+            let families: Vec<_> = families.collect();
+            return print_json(
+                &json!({"preset": self.preset, "backend": self.backend, "config": setup.config, "seed": self.seed, "families": families}),
+            );
+        }
+        for share in &shares {
+            print(format_args!("{}  {}", share.family, share.family.summary()))?;
+            let [least, most] = share.interval().map(|x| 100.0 * x);
+            let (passed, count, percent) = (share.passed(), share.worlds.len(), 100.0 * share.share());
+            let us = 1e3 * share.ms();
+            print(format_args!(
+                "  {passed} of {count} pass: {percent:.1} %, {least:.1} to {most:.1} % with 95 % confidence; {us:.2} us a step and body"
+            ))?;
+            for world in share.failures() {
+                print(format_args!("  drystone run {} --no-sleep", share.family.spec(world.seed)))?;
+                world
+                    .checks
+                    .iter()
+                    .filter(|check| !check.passed)
+                    .try_for_each(|check| print(format_args!("  {}", line(check))))?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -25,14 +25,15 @@ impl ScenesArgs {
             return print(serde_json::to_string_pretty(&schema()).expect("a schema serializes"));
         }
         if self.json {
-            let parameter = |p: &Parameter| json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "summary": p.summary});
+            let parameter = |p: &Parameter| json!({"name": p.name, "default": p.default, "range": [p.range.0, p.range.1], "words": p.words, "summary": p.summary});
             let scene = |e: &Entry| json!({"name": e.name, "summary": e.summary, "parameters": e.parameters.iter().map(parameter).collect::<Vec<_>>()});
             return print_json(&json!({"scenes": CATALOGUE.iter().map(scene).collect::<Vec<_>>()}));
         }
         for entry in CATALOGUE {
             print(format_args!("{}\n    {}", entry.name, entry.summary))?;
             for p in entry.parameters {
-                print(format_args!("    -p {}={}  {}", p.name, p.default, p.summary))?;
+                let words = if p.words.is_empty() { String::new() } else { format!(": {}", p.words.join(", ")) };
+                print(format_args!("    -p {}={}  {}{words}", p.name, p.text(p.default), p.summary))?;
             }
         }
         Ok(())

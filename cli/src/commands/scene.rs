@@ -25,7 +25,7 @@ pub(super) const OUTPUT: &str = "Output";
 
 #[derive(Args)]
 pub(super) struct SceneArgs {
-    /// A scene of the catalogue, or a scene file.
+    /// A scene of the catalogue, also as NAME:KEY=VALUE,..., or a scene file.
     ///
     /// `drystone scenes` lists the catalogue.
     pub(super) scene: String,
@@ -132,6 +132,14 @@ impl SceneArgs {
         self.load_from(self.base()?, worlds)
     }
 
+    /// The name and the parameters: a scene of the catalogue may have parameters behind a colon, as other commands take and print it.
+    fn parts(&self) -> (&str, Vec<String>) {
+        let is_scene = |(name, _): &(&str, &str)| CATALOGUE.iter().any(|entry| entry.name == *name);
+        let (name, own) = self.scene.split_once(':').filter(is_scene).unwrap_or((&self.scene, ""));
+        let own = own.split(',').filter(|assignment| !assignment.is_empty()).map(str::to_owned);
+        (name, own.chain(self.parameter.iter().cloned()).collect())
+    }
+
     fn base(&self) -> Result<SolverConfig> {
         self.config.as_deref().map_or_else(|| Ok(self.preset.config()), settings::read)
     }
@@ -152,8 +160,9 @@ impl SceneArgs {
         if let Some(dt) = self.dt.filter(|dt| !(SHORTEST_STEP..=LONGEST_STEP).contains(dt)) {
             return Err(Error::input(format!("--dt {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds")));
         }
-        announce(&self.scene, &self.parameter, worlds);
-        let mut scene = Scene::find_worlds(&self.scene, &self.parameter, worlds, vary)?;
+        let (name, parameters) = self.parts();
+        announce(name, &parameters, worlds);
+        let mut scene = Scene::find_worlds(name, &parameters, worlds, vary)?;
         scene.dt = self.dt.unwrap_or(scene.dt);
         scene.steps = self.steps.unwrap_or(scene.steps);
         if let Some(most) = self.max_penetration {

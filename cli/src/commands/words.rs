@@ -8,6 +8,7 @@ use drystone::config::Method;
 #[cfg(feature = "gpu")]
 use drystone::conform::Group;
 use drystone::preset::Preset;
+use drystone::scenes::Family;
 use drystone::solver::Order;
 #[cfg(feature = "view")]
 use drystone_view::ColorBy;
@@ -30,6 +31,18 @@ impl Named for Preset {
         ("accurate", "32 substeps"),
         ("reference", "128 substeps: for comparison with the others"),
     ];
+}
+
+impl Named for Family {
+    const WORDS: &'static [(&'static str, &'static str)] = &{
+        let mut words = [("", ""); Family::ALL.len()];
+        let mut k = 0;
+        while k < words.len() {
+            words[k] = (Family::ALL[k].name(), Family::ALL[k].summary());
+            k += 1;
+        }
+        words
+    };
 }
 
 #[cfg(feature = "gpu")]
@@ -127,6 +140,7 @@ mod tests {
             assert_eq!(T::WORDS.iter().map(|word| word.0).collect::<Vec<_>>(), names);
         }
         same(&Preset::ALL);
+        same(&Family::ALL);
         same(&Method::ALL);
         same(&Order::ALL);
         same(&BackendChoice::ALL);

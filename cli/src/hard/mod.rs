@@ -1,6 +1,7 @@
 //! Hard cases for solvers: each measures quantities and compares them with limits.
 
 mod contacts;
+pub mod families;
 mod inputs;
 mod motions;
 mod stacks;

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod comparison;
 mod convergence;
 pub mod hard_cases;
+pub mod hard_families;
 pub mod hard_rows;
 #[cfg(feature = "gpu")]
 pub mod junit;

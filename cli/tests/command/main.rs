@@ -8,6 +8,7 @@ mod common {
 
 mod cli;
 mod ends;
+mod families;
 mod fclib;
 mod hard;
 mod memory;

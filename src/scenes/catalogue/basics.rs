@@ -50,7 +50,7 @@ pub(super) fn rolling(degrees: f32) -> Scene {
 }
 
 /// A body whose center is `height` above a slope that falls towards x.
-fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene {
+pub(super) fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene {
     let angle = degrees.to_radians();
     let mut world = World::new();
     world.add(slope(angle).friction(mu));

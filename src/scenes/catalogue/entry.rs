@@ -26,23 +26,48 @@ pub struct Parameter {
     pub range: (f64, f64),
     /// Whether it must be a whole number.
     pub whole: bool,
+    /// Words that stand for the whole numbers from 0 on; empty for a plain number.
+    pub words: &'static [&'static str],
     /// One line: meaning and unit.
     pub summary: &'static str,
 }
 
 impl Parameter {
     pub(super) const fn whole(name: &'static str, default: u32, range: (f64, f64), summary: &'static str) -> Self {
-        Self { name, default: default as f64, range, whole: true, summary }
+        Self { name, default: default as f64, range, whole: true, words: &[], summary }
+    }
+
+    /// One of some words, the first by default.
+    pub(super) const fn word(name: &'static str, words: &'static [&'static str], summary: &'static str) -> Self {
+        Self { name, default: 0.0, range: (0.0, (words.len() - 1) as f64), whole: true, words, summary }
     }
 
     pub(super) const fn real(name: &'static str, default: f64, range: (f64, f64), summary: &'static str) -> Self {
-        Self { name, default, range, whole: false, summary }
+        Self { name, default, range, whole: false, words: &[], summary }
+    }
+
+    /// A value as people write it: the word that stands for it, or the number.
+    ///
+    /// ```
+    /// let family = drystone::scenes::CATALOGUE.iter().find(|entry| entry.name == "family").expect("it is there");
+    /// let [kind, seed] = &family.parameters else { panic!("two parameters") };
+    /// assert_eq!((kind.text(kind.default), seed.text(7.0)), ("stacks".to_owned(), "7".to_owned()));
+    /// ```
+    pub fn text(&self, value: f64) -> String {
+        self.words.get(value as usize).map_or_else(|| value.to_string(), |&word| word.to_owned())
     }
 
     fn parse(&self, text: &str) -> Result<f64> {
+        if let Some(index) = self.words.iter().position(|&word| word == text) {
+            return Ok(index as f64);
+        }
         let (least, most) = self.range;
         let fits = |x: &f64| (least..=most).contains(x) && (!self.whole || x.fract() == 0.0);
         text.parse().ok().filter(fits).ok_or_else(|| {
+            if !self.words.is_empty() {
+                let hint = hint(text, self.words.iter().copied(), format_args!("known: {}", self.words.join(", ")));
+                return input!("{} = {text:?}: unknown{hint}", self.name);
+            }
             let kind = if self.whole { "whole number" } else { "number" };
             input!("{} = {text:?}: must be a {kind} from {least} to {most}", self.name)
         })
@@ -201,6 +226,12 @@ mod tests {
             refusal("tower", bad);
         }
         assert_eq!(refusal("wall", "rows"), "wall: \"rows\": write it as key=value");
+        let unknown = refusal("family", "kind=stcks");
+        assert!(
+            unknown.starts_with("family: kind = \"stcks\": unknown; did you mean \"stacks\"? known: stacks, "),
+            "{unknown}"
+        );
+        refusal("family", "kind=10");
         refusal("pyramid", "base=2801");
         refusal("wall", "columns=1901");
     }
@@ -237,6 +268,13 @@ mod tests {
     fn parameters_that_contradict_each_other_are_refused() {
         assert_eq!(refusal("tallest", "step=31"), "tallest: step = 31: must be at most n = 30");
         assert_eq!(refusal("bridge", "boxes=21"), "bridge: boxes = 21: must be at most planks = 20");
+    }
+
+    #[test]
+    fn a_word_and_the_number_that_it_stands_for_give_the_same_scene() {
+        let mu = |kind: &str| build("family", &[kind]).expect("a scene").world.bodies[0].material.friction;
+        assert_eq!(mu("kind=slopes"), mu("kind=7"));
+        assert_ne!(mu("kind=slopes"), mu("kind=arches"));
     }
 
     #[test]

@@ -24,6 +24,7 @@ struct Ring {
     /// Along z (m).
     depth: f32,
     voussoirs: usize,
+    friction: f32,
 }
 
 impl Ring {
@@ -52,7 +53,7 @@ impl Ring {
         let slit = |r: f64| self.half() - GAP / 2.0 / r;
         let sides = [(inner, -slit(inner)), (inner, slit(inner)), (outer, -slit(outer)), (outer, slit(outer))];
         let corners: Vec<Vec3> = sides.iter().flat_map(|&(r, a)| [-0.5, 0.5].map(|z| corner(r, a, z))).collect();
-        let wedge = Body::dynamic().shape(Shape::convex_hull(&corners)?).friction(STONE);
+        let wedge = Body::dynamic().shape(Shape::convex_hull(&corners)?).friction(self.friction);
         for k in 0..self.voussoirs {
             let angle = (2 * k + 1) as f64 * self.half();
             let (dx, dy) = (self.radius * libm::cos(angle), GAP / 2.0 + self.radius * libm::sin(angle));
@@ -66,11 +67,16 @@ impl Ring {
 /// A semicircular arch of mean radius 5 m: `voussoirs` wedges, `thickness` of the radius thick and 1 m deep, on two fixed
 /// springers, mu 0.6. Statics ask for a thickness of at least 0.1075 (Milankovitch, 1907) where nothing slides.
 pub(super) fn arch(voussoirs: usize, thickness: f64) -> Result<Scene> {
-    let ring = Ring { radius: 5.0, thickness, depth: 1.0, voussoirs };
+    arch_of(voussoirs, thickness, STONE)
+}
+
+/// The same with any friction of all stones.
+pub(super) fn arch_of(voussoirs: usize, thickness: f64, friction: f32) -> Result<Scene> {
+    let ring = Ring { radius: 5.0, thickness, depth: 1.0, voussoirs, friction };
     let mut world = floor(20.0, 10.0);
     let springer = Body::fixed().named("springer").shape(Shape::cuboid((thickness * ring.radius) as f32, 0.5, 1.0));
     for x in [5.0, -5.0] {
-        world.add(springer.clone().friction(STONE).position(x, 0.5, 0.0));
+        world.add(springer.clone().friction(friction).position(x, 0.5, 0.0));
     }
     ring.add_to(&mut world, 0.0, 1.0)?;
     Ok(Scene::new("arch", world, 600).standing())
@@ -81,7 +87,7 @@ pub(super) fn arch(voussoirs: usize, thickness: f64) -> Result<Scene> {
 pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
     const BLOCK: f64 = 1.0;
     const BLOCKS: usize = 3;
-    let ring = Ring { radius: 2.0, thickness: 0.25, depth: 1.0, voussoirs: 11 };
+    let ring = Ring { radius: 2.0, thickness: 0.25, depth: 1.0, voussoirs: 11, friction: STONE };
     // Between neighbors over a pier is half a gap to each side.
     let pitch = 2.0 * ring.outer() + GAP;
     let pier_half = ring.outer() - ring.radius + ring.thickness * ring.radius / 2.0;
@@ -122,32 +128,34 @@ pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
 /// A tower of planks of 0.08 x 0.24 x 1.2 m: in each of its `storeys` nine stand on end in a square, three lie across them
 /// one way and three the other.
 pub(super) fn kapla(storeys: usize) -> Scene {
-    const PLANK: Vec3 = Vec3::new(0.04, 0.12, 0.6);
-    /// Between the planks on end: one that lies reaches over three.
-    const PITCH: f64 = 0.55;
-    let storey_height = 2.0 * f64::from(PLANK.z) + 4.0 * f64::from(PLANK.x);
+    planks("kapla", storeys, Vec3::new(0.04, 0.12, 0.6), 0.55)
+}
+
+/// The same of planks with any half extents, the thinnest first, and any `pitch` of those on end (m): a plank that lies reaches over three.
+pub(super) fn planks(name: &str, storeys: usize, half: Vec3, pitch: f64) -> Scene {
+    let storey_height = 2.0 * f64::from(half.z) + 4.0 * f64::from(half.x);
     let mut world = floor(20.0, 20.0);
-    let plank = |half: Vec3| Body::dynamic().shape(Shape::cuboid(half.x, half.y, half.z)).density(600.0);
+    let plank = |own: Vec3| Body::dynamic().shape(Shape::cuboid(own.x, own.y, own.z)).density(600.0);
     for storey in 0..storeys {
         let base = storey as f64 * storey_height;
-        let at = |k: usize| (centered(k, 3) * PITCH) as f32;
-        let mut put = |half: Vec3, x: f32, y: f64, z: f32| world.add(plank(half).position(x, (base + y) as f32, z));
-        let lying = 2.0 * f64::from(PLANK.z) + f64::from(PLANK.x);
+        let at = |k: usize| (centered(k, 3) * pitch) as f32;
+        let mut put = |own: Vec3, x: f32, y: f64, z: f32| world.add(plank(own).position(x, (base + y) as f32, z));
+        let lying = 2.0 * f64::from(half.z) + f64::from(half.x);
         for i in 0..3 {
             for j in 0..3 {
                 // Every other one turned.
-                let (x, z) = if (i + j) % 2 == 0 { (PLANK.x, PLANK.y) } else { (PLANK.y, PLANK.x) };
-                put(Vec3::new(x, PLANK.z, z), at(i), f64::from(PLANK.z), at(j));
+                let (x, z) = if (i + j) % 2 == 0 { (half.x, half.y) } else { (half.y, half.x) };
+                put(Vec3::new(x, half.z, z), at(i), f64::from(half.z), at(j));
             }
         }
         for k in 0..3 {
-            put(Vec3::new(PLANK.z, PLANK.x, PLANK.y), 0.0, lying, at(k));
+            put(Vec3::new(half.z, half.x, half.y), 0.0, lying, at(k));
         }
         for k in 0..3 {
-            put(Vec3::new(PLANK.y, PLANK.x, PLANK.z), at(k), lying + 2.0 * f64::from(PLANK.x), 0.0);
+            put(Vec3::new(half.y, half.x, half.z), at(k), lying + 2.0 * f64::from(half.x), 0.0);
         }
     }
-    Scene::new("kapla", world, 3600).standing()
+    Scene::new(name, world, 3600).standing()
 }
 
 /// A house of `storeys` of cards, `length` (m) long, 0.8 of it wide and `thickness` (m) thick: pairs that lean at each other by
@@ -185,19 +193,21 @@ pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thi
 
 /// `n` dominoes of 0.15 x 1 x 0.5 m, 0.45 m apart; the first one tips over its far edge with 1.5 rad/s.
 pub(super) fn dominoes(n: usize) -> Scene {
-    const PITCH: f64 = 0.45;
-    const HALF: Vec3 = Vec3::new(0.075, 0.5, 0.25);
-    const PUSH: f32 = 1.5;
-    let mut world = floor((n as f64 * PITCH / 2.0) as f32 + 10.0, 10.0);
-    let domino = Body::dynamic().shape(Shape::cuboid(HALF.x, HALF.y, HALF.z));
+    domino_row("dominoes", n, Vec3::new(0.075, 0.5, 0.25), 0.45, 1.5)
+}
+
+/// The same of dominoes with any half extents and `pitch` (m), the first one tipping with `push` (rad/s).
+pub(super) fn domino_row(name: &str, n: usize, half: Vec3, pitch: f64, push: f32) -> Scene {
+    let mut world = floor((n as f64 * pitch / 2.0) as f32 + 10.0, 10.0);
+    let domino = Body::dynamic().shape(Shape::cuboid(half.x, half.y, half.z));
     for k in 0..n {
-        world.add(domino.clone().position((centered(k, n) * PITCH) as f32, HALF.y, 0.0));
+        world.add(domino.clone().position((centered(k, n) * pitch) as f32, half.y, 0.0));
     }
-    let spin = -PUSH * Vec3::Z;
+    let spin = -push * Vec3::Z;
     world.bodies[1].angular_velocity = spin;
-    world.bodies[1].linear_velocity = spin.cross(Vec3::new(-HALF.x, HALF.y, 0.0));
+    world.bodies[1].linear_velocity = spin.cross(Vec3::new(-half.x, half.y, 0.0));
     let steps = 240 + 12 * n.min(10_000) as u32;
-    Scene::new("dominoes", world, steps)
+    Scene::new(name, world, steps)
 }
 
 /// A plane pyramid of cubes with 0.1 m between neighbors, and on its tip one more, `ratio` times as dense.

@@ -6,6 +6,7 @@ mod common;
 mod drop;
 mod drum;
 mod entry;
+mod families;
 mod fast;
 mod flow;
 mod jointed;
@@ -14,6 +15,7 @@ mod masonry;
 mod stacks;
 
 pub use entry::{Entry, MOST_BODIES, Parameter};
+pub use families::{Family, Law, Member};
 
 use crate::error::{Result, ensure};
 
@@ -416,5 +418,16 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[0],
         build: |v| Ok(fast::bullets(v[0] as usize, v[1] as f32, v[2] as u64)),
+    },
+    Entry {
+        name: "family",
+        summary: "a random world of a kind of which statics or a closed form says what holds, as `drystone hard --families` judges",
+        parameters: &[
+            Parameter::word("kind", &Family::NAMES, "family of worlds"),
+            Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),
+        ],
+        // The draw alone says how many there are: at most a few hundred.
+        bodies: |v| families::drawn(v[0] as usize, v[1] as u64).map_or(0.0, |scene| scene.world.dynamic_count() as f64),
+        build: |v| families::drawn(v[0] as usize, v[1] as u64),
     },
 ];
