@@ -14,7 +14,7 @@ const ROUGH: f32 = 100.0;
 /// A row on a rough floor.
 pub(super) fn row(draw: &mut Draw, g: f64) -> (Scene, Law) {
     let n = draw.whole(30, 60);
-    let height = draw.log(0.1, 1.0);
+    let height = draw.log_uniform(0.1, 1.0);
     let [thickness, spacing] = [draw.between(0.1, 0.2) * height, draw.between(0.2, 0.6) * height];
     let half = Vec3::new(0.5 * thickness as f32, 0.5 * height as f32, 0.25 * height as f32);
     // Twice what lifts the first one over its edge, or more.

@@ -19,7 +19,7 @@ impl Draw {
     }
 
     /// As likely in each power of two.
-    pub fn log(&mut self, least: f64, most: f64) -> f64 {
+    pub fn log_uniform(&mut self, least: f64, most: f64) -> f64 {
         libm::exp(self.between(libm::log(least), libm::log(most)))
     }
 

@@ -166,8 +166,8 @@ impl Family {
     /// None is known: drawn worlds can be simulated.
     pub fn member(self, seed: u64) -> Result<Member> {
         let draw = &mut Draw::new(self as u64, seed);
-        let dt = 1.0 / draw.log(30.0, 480.0);
-        let factor = draw.log(0.1, 10.0);
+        let dt = 1.0 / draw.log_uniform(30.0, 480.0);
+        let factor = draw.log_uniform(0.1, 10.0);
         let g = EARTH * factor;
         let (scene, law) = match self {
             Self::Stacks => (standing::stack(draw), Law::Stands),
@@ -198,7 +198,14 @@ impl Family {
         Ok(Member { scene, law })
     }
 
-    /// The world of a seed as commands take it.
+    /// The world of a seed as commands and [`Scene::find_spec`] take it.
+    ///
+    /// ```
+    /// # use drystone::{Scene, scenes::Family};
+    /// assert_eq!(Family::Arches.spec(7), "family:kind=arches,seed=7");
+    /// assert_eq!(Scene::find_spec(&Family::Arches.spec(7))?.dt, Family::Arches.member(7)?.scene.dt);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
     pub fn spec(self, seed: u64) -> String {
         format!("family:kind={self},seed={seed}")
     }

@@ -18,7 +18,7 @@ const ABOVE: f64 = 1.02;
 pub(super) fn chain(draw: &mut Draw, g: f64) -> (Scene, Law) {
     /// Length of a link, and distance of the balls of a net (m).
     const LINK: f64 = 0.5;
-    let ratio = draw.log(1.0, 1000.0) as f32;
+    let ratio = draw.log_uniform(1.0, 1000.0) as f32;
     // How far below the joints that hold it a body may hang (m).
     let (scene, reach): (_, fn(&Body) -> f64) = if draw.is_heads() {
         let links = draw.whole(3, 60);
@@ -32,7 +32,7 @@ pub(super) fn chain(draw: &mut Draw, g: f64) -> (Scene, Law) {
 
 /// A box or a cylinder on its base, so flat that friction does not topple it, and the half of its height (m).
 fn block(draw: &mut Draw) -> (Body, f64) {
-    let half_width = draw.log(0.05, 0.5);
+    let half_width = draw.log_uniform(0.05, 0.5);
     let half_height = half_width * draw.between(0.1, 0.7);
     let shape = if draw.is_heads() {
         Shape::cylinder(half_height as f32, half_width as f32)
@@ -40,7 +40,7 @@ fn block(draw: &mut Draw) -> (Body, f64) {
         let half_depth = half_width * draw.between(1.0, 2.0);
         Shape::cuboid(half_width as f32, half_height as f32, half_depth as f32)
     };
-    (Body::dynamic().shape(shape).density(draw.log(100.0, 10_000.0) as f32), half_height)
+    (Body::dynamic().shape(shape).density(draw.log_uniform(100.0, 10_000.0) as f32), half_height)
 }
 
 /// A block on a slope: it stays where tan(angle) < mu, and slides with g (sin(angle) - mu cos(angle)) where not.

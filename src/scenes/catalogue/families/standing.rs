@@ -46,7 +46,7 @@ impl Block {
 /// statics asks of a stack at rest, and of a box that lands on those that lie already.
 pub(super) fn stack(draw: &mut Draw) -> Scene {
     let n = draw.whole(4, 40);
-    let size = draw.log(0.1, 1.0);
+    let size = draw.log_uniform(0.1, 1.0);
     let friction = draw.between(0.2, 1.0);
     let gap = draw.between(0.0, 0.002);
     let reach = draw.between(0.0, 0.5) * size;
@@ -76,12 +76,12 @@ pub(super) fn stack(draw: &mut Draw) -> Scene {
 /// Densities of `n` boxes, the lowest first (kg/m³): equal, heavy on light, light and heavy in turn, or random, up to 1000 times each other.
 fn densities(draw: &mut Draw, n: usize) -> Vec<f64> {
     const LIGHT: f64 = 100.0;
-    let ratio = draw.log(1.0, 1000.0);
+    let ratio = draw.log_uniform(1.0, 1000.0);
     match draw.whole(0, 3) {
         0 => vec![LIGHT; n],
         1 => (0..n).map(|k| if 2 * k < n { LIGHT } else { LIGHT * ratio }).collect(),
         2 => (0..n).map(|k| if k % 2 == 0 { LIGHT } else { LIGHT * ratio }).collect(),
-        _ => (0..n).map(|_| LIGHT * draw.log(1.0, ratio)).collect(),
+        _ => (0..n).map(|_| LIGHT * draw.log_uniform(1.0, ratio)).collect(),
     }
 }
 
@@ -90,7 +90,7 @@ fn densities(draw: &mut Draw, n: usize) -> Vec<f64> {
 pub(super) fn leaned(draw: &mut Draw) -> Scene {
     const SHARE: f64 = 0.8;
     let n = draw.whole(2, 30);
-    let width = draw.log(0.1, 1.0);
+    let width = draw.log_uniform(0.1, 1.0);
     let height = width * draw.between(0.2, 1.0);
     let depth = width * draw.between(0.5, 1.5);
     let friction = draw.between(0.2, 1.0);
@@ -120,14 +120,14 @@ pub(super) fn card_house(draw: &mut Draw) -> Scene {
     let storeys = draw.whole(1, 5);
     let degrees = draw.between(10.0, 30.0);
     let friction = libm::tan(degrees.to_radians()) * draw.between(1.25, 2.5);
-    let length = draw.log(0.1, 1.0);
-    masonry::card_house(storeys, degrees, friction as f32, length, length * draw.log(0.005, 0.04))
+    let length = draw.log_uniform(0.1, 1.0);
+    masonry::card_house(storeys, degrees, friction as f32, length, length * draw.log_uniform(0.005, 0.04))
 }
 
 /// Planks on end and planks across, all of whose crossings are straight above each other.
 pub(super) fn plank_tower(draw: &mut Draw) -> Scene {
     let storeys = draw.whole(1, 8);
-    let half_length = draw.log(0.05, 0.6);
+    let half_length = draw.log_uniform(0.05, 0.6);
     let [thin, wide] = [draw.between(0.05, 0.15), draw.between(0.15, 0.3)].map(|share| (half_length * share) as f32);
     // Those across end over the middle of those on end at most, and two beside each other do not touch.
     let pitch = half_length * draw.between(0.7, 0.92);
