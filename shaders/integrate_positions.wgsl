@@ -10,5 +10,5 @@ fn integrate_position(is_from_start: bool, i: u32) {
         w = free[i].w + w;
     }
     bodies[i].dp = body.dp + v * pass_row.substep;
-    bodies[i].dq = renormalized(quat_mul(exp_rotation(turn_of(w * pass_row.substep)), body.dq));
+    bodies[i].dq = renormalized(quat_mul(exp_rotation(w * pass_row.substep), body.dq));
 }

@@ -75,18 +75,6 @@ fn exp_rotation(r: vec3f) -> vec4f {
     return vec4f(u.x * sinc, u.y * sinc, u.z * sinc, cosine);
 }
 
-// The least turn in one substep [rad]: 2^-42.
-const LEAST_TURN: f32 = 2.2737367544323206e-13;
-
-fn turn_or_none(x: f32) -> f32 {
-    return select(x, 0.0, LEAST_TURN > larger(x, -x));
-}
-
-// A turn by the vector r [rad] without what is below LEAST_TURN.
-fn turn_of(r: vec3f) -> vec3f {
-    return vec3f(turn_or_none(r.x), turn_or_none(r.y), turn_or_none(r.z));
-}
-
 // A nearly unit quaternion, closer to unit length by one Newton step.
 fn renormalized(q: vec4f) -> vec4f {
     let s = 1.5 - 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);

@@ -7,7 +7,7 @@
 
 use super::rows::{Body, Free, Inertia, Mass, StepParams};
 use crate::math::{
-    Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, turn_of, turned, vec3,
+    Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, turned, vec3,
 };
 
 /// Adds gravity and force; with `warm_start` also the impulses that the substep before ended with.
@@ -60,7 +60,7 @@ pub fn integrate_positions<L: Lane>(from_start: bool, params: &StepParams<L>, bo
         (v, w) = (free.v + v, free.w + w);
     }
     body.dp += v * params.substep;
-    body.dq = renormalized(quat_mul(exp_rotation(turn_of(w * params.substep)), body.dq));
+    body.dq = renormalized(quat_mul(exp_rotation(w * params.substep), body.dq));
 }
 
 /// The velocities of a body become changes: none yet. A body that nothing pushes keeps its velocities: bodies that rest are in no block, and

@@ -13,6 +13,7 @@ use super::limits::{is_place, is_rotation};
 use super::shape::pose;
 use crate::error::{Result, ensure};
 use crate::math::rotation::product;
+use crate::stats::largest;
 
 /// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
 ///
@@ -87,9 +88,9 @@ impl MassProperties {
     /// Those of some colliders with volume. Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the
     /// last bit.
     ///
-    /// The principal axes are those of the body where its tensor is diagonal, in whatever order of the moments: a plane mechanism of such bodies
-    /// stays in its plane to the last bit. Parry sorts the moments and turns the frame, needs a sine, which platforms differ in, and finds wrong
-    /// axes where the smallest moment is a double one or where moments are below 1e-5 kg m².
+    /// Parry's principal axes are taken only where the solids have theirs along the axes of the body: others need a sine, and the platform's
+    /// differ. Parry also finds wrong axes where the smallest moment is a double one whose plane is not that of x, or where moments are below
+    /// 1e-5 kg m²: its tensor is compared with the sum of the tensors of the solids.
     pub(super) fn of_solids(solids: &[&Collider], density: f32) -> Self {
         let solids: Vec<_> = solids.iter().map(|c| (Solid::of(c), pose(c.position, c.rotation))).collect();
         let all: ParryMass = solids.iter().map(|(solid, at)| solid.mass.transform_by(at)).sum();
@@ -101,8 +102,17 @@ impl MassProperties {
                 DMat3::IDENTITY * out.length_squared() - DMat3::from_cols(out * out.x, out * out.y, out * out.z);
             axes * solid.tensor * axes.transpose() + across * f64::from(solid.mass.mass())
         };
-        let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
-        let (moments, frame) = diagonalized(exact);
+        let (mut exact, mut is_aligned) = (DMat3::ZERO, true);
+        for tensor in solids.iter().map(own) {
+            exact += tensor;
+            is_aligned &= tensor == DMat3::from_diagonal(diagonal(&tensor));
+        }
+        let (mut moments, mut frame) = (all.principal_inertia(), all.principal_inertia_local_frame);
+        let size = |m: DMat3| largest(0.0, m.abs().to_cols_array());
+        let is_right = size(tensor(moments, frame) - exact) <= 1e-4 * size(exact);
+        if !is_aligned || !is_right {
+            (moments, frame) = diagonalized(exact);
+        }
         Self {
             mass: all.mass() * density,
             center: all.local_com,
