@@ -344,22 +344,6 @@ pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {
     Quat { axis: vec3(u.x * sinc, u.y * sinc, u.z * sinc), w: cosine }
 }
 
-/// The least turn in one substep (rad): 2^-42, below which a product of three turns is no normal number. What joints leave of a motion at rest falls
-/// below that, and an Intel processor takes a hundred cycles for each product that is no normal number.
-const LEAST_TURN: f64 = 2.273_736_754_432_320_6e-13;
-
-/// The turn, or zero below [`LEAST_TURN`]; NaN stays.
-#[inline(always)]
-fn turn_or_none<L: Lane>(x: L) -> L {
-    L::select(x, L::constant(0.0), L::constant(LEAST_TURN).gt(larger(x, -x)))
-}
-
-/// A turn by the vector r (rad) without what is below [`LEAST_TURN`].
-#[inline(always)]
-pub fn turn_of<L: Lane>(r: Vec3<L>) -> Vec3<L> {
-    vec3(turn_or_none(r.x), turn_or_none(r.y), turn_or_none(r.z))
-}
-
 /// A nearly unit quaternion, closer to unit length by one Newton step.
 #[inline(always)]
 pub fn renormalized<L: Lane>(q: Quat<L>) -> Quat<L> {
