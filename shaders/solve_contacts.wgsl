@@ -4,7 +4,7 @@
 // Double: src/kernels/contact.rs.
 
 fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
-    let softness = pair_softness(pair);
+    let softness = pass_row.contact;
     let movement = normal_movement(rules, pair, contact);
     if rules.as_one { solve_as_one(rules, pair, contact, softness, movement); }
     for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {

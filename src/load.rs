@@ -32,9 +32,9 @@ const LEVEL: f64 = 0.1;
 ///     world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + k as f32, 0.0));
 /// }
 /// let config = SolverConfig::default();
-/// let interfaces = Load::all(&world, &config, |_, _| true);
+/// let interfaces = Load::all(&world, |_, _| true);
 /// assert_eq!(interfaces.len(), 3);
-/// let load = Load::heaviest(&world, &config).expect("bodies bear bodies");
+/// let load = Load::heaviest(&world).expect("bodies bear bodies");
 /// assert!(load.force >= 2.0 * 9810.0 * 0.999);
 /// // Substeps for an overlap of 0.1 mm at most.
 /// let substeps = load.substeps(1e-4, 1.0 / 60.0, &config)?;
@@ -61,13 +61,13 @@ impl Load {
     ///
     /// Every body hands on its weight, and what it bears itself, to the bodies below it in proportion to the area by which
     /// their bounding boxes overlap seen from above. A ball touches in one point, everything else in four corners.
-    pub fn heaviest(world: &World, config: &SolverConfig) -> Option<Self> {
+    pub fn heaviest(world: &World) -> Option<Self> {
         let deeper = |a: Self, b: Self| if b.stress > a.stress { b } else { a };
-        Self::all(world, config, |_, _| true).into_iter().reduce(deeper)
+        Self::all(world, |_, _| true).into_iter().reduce(deeper)
     }
 
     /// The interfaces of `world`, as those of [`Self::heaviest`], that are wanted by their upper bodies and their gaps (m).
-    pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
+    pub fn all(world: &World, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
         let ups: Vec<DMat3> = (0..world.world_count()).map(|part| up(world.gravity_of(part))).collect();
         let up_of = |i: usize| ups[world.bodies.worlds()[i] as usize];
         let boxes = upright_boxes(world, up_of);
@@ -90,7 +90,7 @@ impl Load {
                 borne[lower] += force;
                 let gap = boxes[upper].low.y - boxes[lower].high.y;
                 if is_wanted(upper, gap) {
-                    let stress = stress(world, (&boxes, up_of(upper)), upper, lower, force, config);
+                    let stress = stress(world, (&boxes, up_of(upper)), upper, lower, force);
                     all.push(Self { upper, lower, force, stress, gap });
                 }
             }
@@ -125,23 +125,15 @@ impl Load {
     }
 }
 
-/// Force on one point over the mass that it feels, and over the square of what its frequency is multiplied by.
-fn stress(
-    world: &World,
-    (boxes, up): (&[Box3], DMat3),
-    upper: usize,
-    lower: usize,
-    force: f64,
-    config: &SolverConfig,
-) -> f64 {
+/// Force on one point over the mass that it feels.
+fn stress(world: &World, (boxes, up): (&[Box3], DMat3), upper: usize, lower: usize, force: f64) -> f64 {
     let overlap = boxes[upper].overlap_from_above(&boxes[lower]);
     let one_point = [upper, lower].iter().any(|&i| world.bodies[i].solids().all(|c| c.shape.is_ball()));
     let at = if one_point { overlap.center() } else { overlap.high };
     let at = up.transpose() * DVec3::new(at.x, boxes[upper].low.y, at.z);
     let normal = up.transpose() * DVec3::Y;
     let inverse_mass: f64 = [upper, lower].iter().map(|&i| inverse_mass_at(&world.bodies[i], at, normal)).sum();
-    let ratio = if world.bodies[lower].kind == BodyKind::Dynamic { 1.0 } else { config.fixed_contact_frequency_ratio };
-    force / if one_point { 1.0 } else { 4.0 } * inverse_mass / f64::from(ratio * ratio)
+    force / if one_point { 1.0 } else { 4.0 } * inverse_mass
 }
 
 /// 1/m of a point of a body along `normal` (1/kg).
@@ -277,7 +269,7 @@ mod tests {
     fn heaviest(scene: &str, parameters: &[&str]) -> (Load, Scene) {
         let parameters: Vec<String> = parameters.iter().map(|p| p.to_string()).collect();
         let scene = Scene::find(scene, &parameters).unwrap();
-        (Load::heaviest(&scene.world, &SolverConfig::default()).expect("a load"), scene)
+        (Load::heaviest(&scene.world).expect("a load"), scene)
     }
 
     #[test]
@@ -288,9 +280,9 @@ mod tests {
                 world.insert(Body::fixed());
             }
             world.insert(Body::fixed().shape(crate::Shape::cuboid(5.0, 0.5, 5.0)));
-            assert!(Load::heaviest(&world, &SolverConfig::default()).is_none());
+            assert!(Load::heaviest(&world).is_none());
             world.insert(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
-            let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
+            let load = Load::heaviest(&world).expect("a load");
             assert_eq!((load.upper, load.lower), (gone + 1, gone));
         }
     }
@@ -346,9 +338,8 @@ mod tests {
     #[test]
     fn no_body_bears_one_of_another_world() {
         let scene = Scene::find_worlds("tower", &["n=10".into()], 3, None).unwrap();
-        let loads = Load::all(&scene.world, &SolverConfig::default(), |_, _| true);
-        let alone =
-            Load::all(&Scene::find("tower", &["n=10".into()]).unwrap().world, &SolverConfig::default(), |_, _| true);
+        let loads = Load::all(&scene.world, |_, _| true);
+        let alone = Load::all(&Scene::find("tower", &["n=10".into()]).unwrap().world, |_, _| true);
         let count = scene.world.bodies.len() / 3;
         assert_eq!(loads.len(), 3 * alone.len());
         assert!(loads.iter().all(|load| load.upper / count == load.lower / count));
@@ -377,7 +368,7 @@ mod tests {
         pair(&mut world);
         world.remove(gone);
         world.beside(&one);
-        let loads = Load::all(&world, &SolverConfig::default(), |_, _| true);
+        let loads = Load::all(&world, |_, _| true);
         assert_eq!(loads.iter().map(|load| (load.upper, load.lower)).collect::<Vec<_>>(), [(2, 1), (4, 3)]);
     }
 
@@ -389,11 +380,11 @@ mod tests {
         for x in [-0.5, -1.5] {
             world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 3.0, 0.0));
         }
-        let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
+        let load = Load::heaviest(&world).expect("a load");
         assert_eq!((load.upper, load.lower), (2, 1));
         assert!((load.force - 9810.0).abs() < 0.1);
         let lowest = |world: &World| {
-            let loads = Load::all(world, &SolverConfig::default(), |_, _| true);
+            let loads = Load::all(world, |_, _| true);
             *loads.iter().find(|load| (load.upper, load.lower) == (1, 0)).expect("the floor bears")
         };
         world.bodies[2].gravity_scale = 3.0;
@@ -406,11 +397,11 @@ mod tests {
         let mut sideways = world.clone();
         sideways.gravity = glam::Vec3::new(0.0, 0.0, 1.0);
         sideways.beside(&world);
-        let loads = Load::all(&sideways, &SolverConfig::default(), |_, _| true);
+        let loads = Load::all(&sideways, |_, _| true);
         let in_second: Vec<_> = loads.iter().filter(|load| load.upper > 2).collect();
         assert_eq!(in_second.len(), 2);
         assert!(in_second.iter().any(|of| of.force == load.force && of.stress == load.stress), "{loads:?}");
         world.gravity = glam::Vec3::ZERO;
-        assert_eq!(Load::heaviest(&world, &SolverConfig::default()).map(|l| l.force), Some(0.0));
+        assert_eq!(Load::heaviest(&world).map(|l| l.force), Some(0.0));
     }
 }

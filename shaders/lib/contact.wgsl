@@ -19,11 +19,6 @@ fn current_separation(movement: NormalMovement, contact: Contact, point: Point) 
     return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }
 
-fn pair_softness(pair: ptr<function, Pair>) -> Softness {
-    if (*pair).mass_a.inv_mass > 0.0 && (*pair).mass_b.inv_mass > 0.0 { return pass_row.movable; }
-    return pass_row.fixed;
-}
-
 // The impulse pushes, never pulls: the sum of the corrections, or each by itself.
 fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
     if rules.accumulated { return larger(sum + correction, 0.0); }

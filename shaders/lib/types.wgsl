@@ -6,7 +6,7 @@ struct Free { v: vec3f, w: vec3f }
 
 struct Mass {
     inv_inertia_x: vec3f, inv_mass: f32,
-    inv_inertia_yz: vec3f, heap: f32,
+    inv_inertia_yz: vec3f, pad_inertia: f32,
     acceleration: vec3f,
 }
 
@@ -75,12 +75,11 @@ struct Params {
 struct PassRow {
     first: u32, end: u32,
     substep: f32, inverse_substep: f32,
-    movable: Softness,
-    fixed: Softness,
+    contact: Softness,
     joint: Softness,
 }
 
-struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, warm_start: u32 }
+struct Preload { compliance: f32, share: f32, warm_start: u32, pad: u32 }
 
 // What the programs that begin a step on the device are told. Layout: src/backend/gpu/resident.rs.
 struct ResidentParams {

@@ -101,7 +101,7 @@ pub(super) fn pile(side: u32) -> StepProblem {
     }
     problem.order = (0..problem.contacts.len() as u32).collect();
     problem.colors = colors;
-    let substep = Substep { length, inverse_length: 1.0 / length, movable: soft, fixed: soft, joint: soft };
+    let substep = Substep { length, inverse_length: 1.0 / length, contact: soft, joint: soft };
     problem.in_one_block(problem.colors.len() as u32 - 1, substep);
     problem.params.point_count = problem.points.len() as u32;
     problem.impulses = vec![ImpulseRow::default(); problem.points.len()];

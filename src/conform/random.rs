@@ -218,8 +218,7 @@ fn substep() -> Substep {
     let mut substep = Substep::default();
     substep.length = 0.1;
     substep.inverse_length = 1.0 / substep.length;
-    substep.movable = softness(1.5, 2.0, substep.length, 0.5);
-    substep.fixed = softness(3.0, 2.0, substep.length, 0.5);
+    substep.contact = softness(1.5, 2.0, substep.length, 0.5);
     substep.joint = softness(2.0, 1.0, substep.length, 0.5);
     substep
 }

@@ -187,8 +187,7 @@ fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &St
 
 /// What the springs of a contact held when the step began, and hold now (J): m (w s)²/2 at the overlap s, as far as `push_limit` lets them push.
 pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, substep: &Substep) -> [f64; 2] {
-    let both = can_move(problem, contact.body_a) && can_move(problem, contact.body_b);
-    let softness = if both { substep.movable } else { substep.fixed };
+    let softness = substep.contact;
     let compliance = f64::from(softness.compliance() * substep.length);
     let frequency = if compliance > 0.0 { compliance.sqrt().recip() } else { softness.bias_rate.into() };
     let most = f64::from(softness.push_limit);

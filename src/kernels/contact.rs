@@ -62,19 +62,6 @@ pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, contact: &Conta
     (point.separation - contact.preload) + movement.between(point.r_a, point.r_b)
 }
 
-#[inline(always)]
-fn pair_softness<L: Lane>(params: &StepParams<L>, pair: &Pair<L>) -> SoftnessOf<L> {
-    let zero = L::constant(0.0);
-    let both = L::and(pair.mass_a.inv_mass.gt(zero), pair.mass_b.inv_mass.gt(zero));
-    let (f, m) = (&params.fixed, &params.movable);
-    SoftnessOf {
-        bias_rate: L::select(f.bias_rate, m.bias_rate, both),
-        mass_scale: L::select(f.mass_scale, m.mass_scale, both),
-        impulse_scale: L::select(f.impulse_scale, m.impulse_scale, both),
-        push_limit: L::select(f.push_limit, m.push_limit, both),
-    }
-}
-
 /// The impulse pushes, never pulls: the sum of the corrections, or each by itself.
 #[inline(always)]
 fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
@@ -278,7 +265,7 @@ pub fn solve_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let has_friction = rules.friction != FrictionRule::None;
-    let common = Common { softness: pair_softness(params, pair), movement: normal_movement(rules, pair, contact) };
+    let common = Common { softness: params.contact, movement: normal_movement(rules, pair, contact) };
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {
             sweep_friction(rules, params, pair, contact, rows);

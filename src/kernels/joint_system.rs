@@ -149,8 +149,8 @@ impl<L: Lane> Block<L> {
     pub fn scaled(&self, factor: L) -> Self {
         let mut scaled = *self;
         for column in &mut scaled.0 {
-            for i in 0..L::COLUMN {
-                column[i] = column[i] * factor;
+            for x in &mut column[..L::COLUMN] {
+                *x = *x * factor;
             }
         }
         scaled

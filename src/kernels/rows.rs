@@ -181,10 +181,8 @@ pub struct StepParams<L> {
     pub inverse_substep: L,
     /// Approach slower than this does not bounce.
     pub restitution_threshold: L,
-    /// Contacts of two bodies that can move.
-    pub movable: SoftnessOf<L>,
-    /// Contacts with a body that cannot.
-    pub fixed: SoftnessOf<L>,
+    /// Contacts.
+    pub contact: SoftnessOf<L>,
     /// Joints.
     pub joint: SoftnessOf<L>,
     /// Overlap that is left alone.
@@ -302,8 +300,7 @@ impl<L: Lane> StepParams<L> {
             substep: L::constant(s.length.into()),
             inverse_substep: L::constant(s.inverse_length.into()),
             restitution_threshold: L::constant(p.restitution_threshold.into()),
-            movable: SoftnessOf::load(&s.movable),
-            fixed: SoftnessOf::load(&s.fixed),
+            contact: SoftnessOf::load(&s.contact),
             joint: SoftnessOf::load(&s.joint),
             slop: L::constant(p.slop.into()),
             relaxation: L::constant(p.relaxation.into()),

@@ -215,8 +215,7 @@ impl ContactRows {
         let substep = Substep::new(config, dt / config.substeps as f32);
         let inverse_mass = |body: u32| (body != IMMOVABLE).then(|| world.bodies[body as usize].mass.mass.recip());
         let force = move |slot: &Slot, a: Option<f32>, b: Option<f32>| {
-            let springs = if a.is_some() && b.is_some() { substep.movable } else { substep.fixed };
-            let sag = substep.length * springs.compliance() * (a.unwrap_or(0.0) + b.unwrap_or(0.0));
+            let sag = substep.length * substep.contact.compliance() * (a.unwrap_or(0.0) + b.unwrap_or(0.0));
             config.promised_sag(slot.size) / sag
         };
         let any_driven = world.bodies.iter().any(Body::is_driven);
@@ -353,10 +352,10 @@ impl ContactRows {
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
-            movable_compliance: substep.movable.compliance(),
-            fixed_compliance: substep.fixed.compliance(),
+            compliance: substep.contact.compliance(),
             share: 1.0 - 1.0 / (1.0 + config.preload_rate * dt),
             warm_start: config.warm_start.into(),
+            pad: 0,
         };
         self.note_written(detector);
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
@@ -367,7 +366,7 @@ impl ContactRows {
             rotation: body.rotation.to_array(),
         };
         world.bodies.par_iter().with_min_len(LEAST_BODIES).map(pose).collect_into_vec(poses);
-        let effort_changes = effort.heaps_change() || *classes != effort.classes();
+        let effort_changes = *classes != effort.classes();
         if effort_changes {
             classes.clear();
             classes.extend_from_slice(effort.classes());

@@ -3,22 +3,18 @@
 use super::StepProblem;
 use super::carry::LARGEST_PRELOAD;
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
-use super::softness::HEAP_STIFFNESS;
 use crate::config::SolverConfig;
-use crate::world::{BodyKind, World};
 
 /// The quantities that the impulses and preloads of a step are proportional to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepScale {
     /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.
     substep: f32,
-    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move (s).
-    movable_compliance: f32,
-    /// The same of contacts with bodies that cannot (s).
-    fixed_compliance: f32,
+    /// Overlap at rest per impulse, times the effective mass (s).
+    compliance: f32,
 }
 
-crate::saved::fields!(StepScale { substep, movable_compliance, fixed_compliance });
+crate::saved::fields!(StepScale { substep, compliance });
 
 impl StepScale {
     /// The length of steps of so many substeps (s).
@@ -27,22 +23,14 @@ impl StepScale {
     }
 
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m).
-    pub(super) fn yielding(&self, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
-        let of_heap = self.movable_compliance / HEAP_STIFFNESS;
-        pressed
-            * if in_heap {
-                of_heap
-            } else if both_movable {
-                self.movable_compliance
-            } else {
-                self.fixed_compliance
-            }
+    pub(super) fn yielding(&self, pressed: f32) -> f32 {
+        pressed * self.compliance
     }
 
     /// That of steps of `dt` seconds.
     pub fn new(config: &SolverConfig, dt: f32) -> Self {
-        let Substep { length, movable, fixed, .. } = Substep::new(config, dt / config.substeps as f32);
-        Self { substep: length, movable_compliance: movable.compliance(), fixed_compliance: fixed.compliance() }
+        let Substep { length, contact, .. } = Substep::new(config, dt / config.substeps as f32);
+        Self { substep: length, compliance: contact.compliance() }
     }
 }
 
@@ -87,14 +75,10 @@ fn ratio(now: f32, before: f32) -> f32 {
 impl StepScale {
     /// Rescales the impulses and preloads of a step of the scale `before`, so that all contacts and joints bear the same forces in a
     /// step of this one. A pile that came to rest with 32 substeps rattled at 0.8 m/s without this when it went on with 8.
-    pub fn rescale(&self, before: &Self, world: &World, problem: &mut StepProblem) {
+    pub fn rescale(&self, before: &Self, problem: &mut StepProblem) {
         let forces = ratio(self.substep, before.substep);
-        let movable = forces * ratio(self.movable_compliance, before.movable_compliance);
-        let fixed = forces * ratio(self.fixed_compliance, before.fixed_compliance);
-        let is_dynamic = |body: u32| world.bodies[body as usize].kind == BodyKind::Dynamic;
-        for contact in &mut problem.contacts {
-            contact.preload *= if is_dynamic(contact.body_a) && is_dynamic(contact.body_b) { movable } else { fixed };
-        }
+        let sags = forces * ratio(self.compliance, before.compliance);
+        problem.contacts.iter_mut().for_each(|contact| contact.preload *= sags);
         problem.impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, forces));
         for impulse in &mut problem.joint_impulses {
             impulse.linear = impulse.linear.map(|x| x * forces);

@@ -61,8 +61,8 @@ pub struct MassRow {
     pub inv_mass: f32,
     /// Inverse inertia; yy yz zz.
     pub inv_inertia_yz: [f32; 3],
-    /// 1 for a body of a heap, whose contacts have other springs and no preload.
-    pub heap: f32,
+    #[doc(hidden)]
+    pub pad_inertia: f32,
     /// Gravity plus force over mass (m/s²).
     pub acceleration: [f32; 3],
     #[doc(hidden)]
@@ -387,7 +387,7 @@ pub struct Params {
     pub pad: [u32; 2],
 }
 
-/// The length of the substeps of a block, and the coefficients that follow from it, 56 B.
+/// The length of the substeps of a block, and the coefficients that follow from it, 40 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Substep {
@@ -395,10 +395,8 @@ pub struct Substep {
     pub length: f32,
     /// One over the length (1/s).
     pub inverse_length: f32,
-    /// Contacts of two bodies that can move.
-    pub movable: Softness,
-    /// Contacts with a body that cannot.
-    pub fixed: Softness,
+    /// Contacts.
+    pub contact: Softness,
     /// Joints.
     pub joint: Softness,
 }
@@ -408,7 +406,7 @@ pub(crate) fn points_a_slot(patches: bool) -> usize {
     MAX_POINTS + usize::from(patches)
 }
 
-/// One pass for a dispatch: its colors, one after another, and the substep of its block, 64 B.
+/// One pass for a dispatch: its colors, one after another, and the substep of its block, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PassRow {

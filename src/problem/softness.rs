@@ -24,40 +24,22 @@ pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> 
     Softness { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3, push_limit }
 }
 
-/// Stiffness of the springs of heaps over that of springs between bodies that can move elsewhere.
-pub const HEAP_STIFFNESS: f32 = 2.0;
-/// Damping of the contacts of heaps over that of other contacts. Dampers hold forces as they are: with 1 the forces of 64 points under a cube
-/// are uneven by 0.25 after 300 steps, with 0.5 by 0.04, with 0.3 by 0.006. With 0.3 or 1 mixed piles come to rest later than with 0.5.
-const HEAP_DAMPING: f32 = 0.5;
-
 impl Substep {
     /// A substep of `length` seconds.
     pub fn new(config: &SolverConfig, length: f32) -> Self {
         Self {
             length,
             inverse_length: 1.0 / length,
-            movable: contact_softness(config, length, 1.0),
-            fixed: contact_softness(config, length, config.fixed_contact_frequency_ratio),
+            contact: contact_softness(config, length),
             joint: joint_softness(config, length),
         }
     }
-
-    /// A substep of `length` seconds of a heap: springs twice as stiff between bodies that can move, and equally stiff where bodies that cannot
-    /// are touched.
-    pub fn of_heap(config: &SolverConfig, length: f32) -> Self {
-        let frequency = HEAP_STIFFNESS.sqrt() * config.contact_frequency / length;
-        let damping = HEAP_DAMPING * config.contact_damping;
-        let springs = softness(frequency, damping, length, config.push_limit);
-        Self { movable: springs, fixed: springs, ..Self::new(config, length) }
-    }
 }
 
-/// How overlap is removed, for contacts of `ratio` times the frequency.
-fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
+/// How overlap is removed.
+fn contact_softness(config: &SolverConfig, h: f32) -> Softness {
     match config.stabilization {
-        Stabilization::Soft => {
-            softness(config.contact_frequency / h * ratio, config.contact_damping, h, config.push_limit)
-        }
+        Stabilization::Soft => softness(config.contact_frequency / h, config.contact_damping, h, config.push_limit),
         Stabilization::Baumgarte => Softness::rigid(config.baumgarte / h, config.push_limit),
         Stabilization::None => Softness::rigid(0.0, config.push_limit),
     }
@@ -66,6 +48,6 @@ fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
 fn joint_softness(config: &SolverConfig, h: f32) -> Softness {
     match config.stabilization {
         Stabilization::Soft => softness(config.joint_frequency / h, config.joint_damping, h, config.push_limit),
-        _ => contact_softness(config, h, 1.0),
+        _ => contact_softness(config, h),
     }
 }

@@ -226,8 +226,6 @@ impl Structure {
             if forces.iter().all(|force| force[0] == 0.0) {
                 continue;
             }
-            let are_movable =
-                [bearing.upper, bearing.lower].map(|body| problem.masses[body as usize].inv_mass > 0.0) == [true; 2];
             let contact = &mut problem.contacts[bearing.row as usize];
             let length = f64::from(substep * contact.substep_share);
             let rows = points_of_row(contact, &problem.points);
@@ -247,9 +245,7 @@ impl Structure {
             if has_preloads {
                 // The surfaces stay as far apart as they are.
                 let apart = if contacts.new_bodies()[bearing.upper as usize] { apart } else { 0.0 };
-                let in_heap =
-                    [bearing.upper, bearing.lower].iter().any(|&body| problem.masses[body as usize].heap > 0.0);
-                let yielding = contacts.carry.preload.yielding(contact.substep_share, are_movable, in_heap, pressed);
+                let yielding = contacts.carry.preload.yielding(contact.substep_share, pressed);
                 contact.preload += (yielding + apart) / mass;
             }
         }

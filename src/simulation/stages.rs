@@ -246,7 +246,7 @@ impl Stages {
         }
         let scale = StepScale::new(config, dt);
         if let Some(before) = self.key.scale.replace(scale).filter(|_| changes.step) {
-            scale.rescale(&before, world, &mut self.problem);
+            scale.rescale(&before, &mut self.problem);
         }
         if changes.settings || changes.surfaces {
             self.joints.forget_systems();
@@ -324,7 +324,7 @@ impl Stages {
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
-            problem::begin(world, sleep.asleep(), config, effort, problem);
+            problem::begin(world, sleep.asleep(), config, problem);
             contacts.carry.on_device = on_device;
             // The work of a body that moves by itself follows from the impulses of the whole step.
             let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();

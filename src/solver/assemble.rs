@@ -35,7 +35,7 @@ impl Assembled {
         let sequence = Sequence::new(order, contacts);
         let hands = contacts.contacts.iter().enumerate().map(|(i, c)| hand(i, c)).collect::<Result<Vec<_>>>()?;
         let (mut problem, mut rows) = (StepProblem::default(), KernelRows::default());
-        let substep = Substep { length: 1.0, inverse_length: 1.0, movable: HARD, fixed: HARD, ..Substep::default() };
+        let substep = Substep { length: 1.0, inverse_length: 1.0, contact: HARD, ..Substep::default() };
         problem.params = Params {
             relaxation: 1.0,
             body_count: contacts.bodies.len() as u32 + 1,

@@ -388,7 +388,7 @@ fn a_sweep_leaves_the_normal_velocity_that_closes_a_gap_or_pushes_out_overlap() 
         inverse_substep: 100.0,
         relaxation: 1.0,
         slop: 0.004,
-        movable: hard(50.0, 0.4),
+        contact: hard(50.0, 0.4),
         ..StepParams::default()
     };
     let (biased, relax) = (Rules { biased: true, ..Rules::default() }, Rules::default());
@@ -415,7 +415,7 @@ fn a_sweep_leaves_the_normal_velocity_that_closes_a_gap_or_pushes_out_overlap() 
 #[test]
 fn a_contact_at_its_limit_of_speed_bears_its_whole_load() {
     let softness = SoftnessOf { bias_rate: 50.0, mass_scale: 0.75, impulse_scale: 0.25, push_limit: 2.0 };
-    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, movable: softness, ..StepParams::default() };
+    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, contact: softness, ..StepParams::default() };
     let case = case();
     let mass = 1.0 / case.dense(case.normal, case.normal);
     for load in [0.0, 0.2, 7.0] {
@@ -429,7 +429,7 @@ fn a_contact_at_its_limit_of_speed_bears_its_whole_load() {
 #[test]
 fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
     let softness = SoftnessOf { bias_rate: 50.0, mass_scale: 0.75, impulse_scale: 0.25, push_limit: 10.0 };
-    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, movable: softness, ..StepParams::default() };
+    let params = StepParams { inverse_substep: 100.0, relaxation: 1.0, contact: softness, ..StepParams::default() };
     let case = case();
     let mass = 1.0 / case.dense(case.normal, case.normal);
     let (u, impulse) = pressed(Rules { biased: true, ..Rules::default() }, &params, -0.01, 0.2);
@@ -439,7 +439,7 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
     let pushed = |accumulated| {
         let mut rules = Rules { accumulated, ..Rules::default() };
         rules.biased = false;
-        let parting = StepParams { movable: hard(0.0, 0.0), ..params };
+        let parting = StepParams { contact: hard(0.0, 0.0), ..params };
         let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
         pair.b.v = lane(case.normal);
         let contact = Contact { normal: lane(case.normal), ..Contact::default() };

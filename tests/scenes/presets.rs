@@ -73,7 +73,7 @@ fn reference_holds_what_it_promises() {
 fn with_at_most(most: f64, parameters: &[String]) -> (u32, f64, f64) {
     let scene = falling(parameters);
     let mut config = Preset::default().config().without_sleep();
-    let load = Load::heaviest(&scene.world, &config).expect("a load");
+    let load = Load::heaviest(&scene.world).expect("a load");
     config.substeps = load.substeps(most, scene.dt, &config).expect("substeps");
     let substeps = config.substeps;
     let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new())).expect("a simulation");

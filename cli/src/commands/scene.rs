@@ -219,7 +219,7 @@ fn announce(scene: &str, parameters: &[String], worlds: usize) {
 
 /// Chooses the substeps for which the heaviest contact overlaps by at most `most`, and prints them.
 fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
-    let Some(load) = Load::heaviest(&scene.world, config) else {
+    let Some(load) = Load::heaviest(&scene.world) else {
         say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));
         return Ok(());
     };

@@ -16,7 +16,7 @@ const TEN: u32 = 600;
 pub(super) fn light_under_heavy(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for ratio in [10.0, 100.0, 1e3, 1e4, 1e5, 1e6_f64] {
         let world = Scene::find_spec(&format!("tower:n=2,top_ratio={ratio}"))?.world;
-        let load = Load::heaviest(&world, &setup.config).expect("a load");
+        let load = Load::heaviest(&world).expect("a load");
         let law = load.overlap(setup.config.substeps, DT, &setup.config);
         let outcome = setup.outcome(world, TEN)?;
         checks.stands(&outcome, format!("1 under {ratio}"));

@@ -22,7 +22,6 @@ fn settings_out_of_their_range_are_refused_by_name() {
         ("joint_damping", "0", "-1"),
         ("contact_frequency", "0.5", "0.6"),
         ("contact_damping", "1e6", "2e6"),
-        ("fixed_contact_frequency_ratio", "1e3", "2e3"),
         ("preload_rate", "1e3", "2e3"),
         ("push_limit", "1e9", "2e9"),
         ("restitution_threshold", "0", "-1"),

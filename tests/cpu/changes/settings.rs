@@ -36,7 +36,6 @@ fn other_settings() -> Vec<(&'static str, SolverConfig)> {
         ("tolerance", of(&|c| (c.tolerance, c.iterations, c.relax) = (1e-3, 4, 4))),
         ("contact_frequency", of(&|c| c.contact_frequency = 0.1)),
         ("contact_damping", of(&|c| c.contact_damping = 5.0)),
-        ("fixed_contact_frequency_ratio", of(&|c| c.fixed_contact_frequency_ratio = 1.0)),
         ("preload_rate", of(&|c| c.preload_rate = 0.0)),
         ("push_limit", of(&|c| c.push_limit = 1.0)),
         ("friction none", of(&|c| c.friction = Friction::None)),

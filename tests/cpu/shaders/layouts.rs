@@ -67,7 +67,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
     layouts! {
         Body = BodyRow { v w dp dq }
         Free = FreeRow { v w }
-        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz heap acceleration }
+        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz pad_inertia acceleration }
         Torque = TorqueRow { angular_acceleration }
         Inertia = InertiaRow { principal body inv_principal frame }
         Contact = ContactRow {
@@ -94,9 +94,9 @@ fn in_rust() -> BTreeMap<String, Layout> {
         }
         PassRow = PassRow {
             first end substep: substep.length inverse_substep: substep.inverse_length
-            movable: substep.movable fixed: substep.fixed joint: substep.joint
+            contact: substep.contact joint: substep.joint
         }
-        Preload = Preload { movable_compliance fixed_compliance share warm_start }
+        Preload = Preload { compliance share warm_start pad }
         ResidentParams = ResidentParams {
             preload body_count contact_count order written_count has_points tangents zero
         }
