@@ -13,7 +13,7 @@ use crate::kernels::joint_system::{
 };
 use crate::kernels::{Axis, Joint, Mass, Pair, Sym3};
 use crate::lanes::{Lanes, Portable, Shared, WIDTH, Wide, Work, lanes};
-use crate::math::{Vec3, vec3};
+use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{AxisRow, JointRow, JointSystems, StepProblem};
 
 /// Fewer systems of one form are solved one after another: the numbers of a column of one system fill a quarter of the lanes.
@@ -239,29 +239,29 @@ impl Work for SystemWork<'_> {
         for group in &self.layout.groups[range] {
             let system = group.systems[0] as usize;
             if group.count == 1 {
-                let mut rows = Alone { work: self, system };
                 // SAFETY: tasks have different groups: `Threads::spread_each` cuts their range.
                 let factors = unsafe { self.factors.alone(systems, system) };
-                if self.begins {
-                    begin_system(systems, system, &rows, factors);
-                } else {
-                    solve_system(systems, system, &mut rows, factors);
-                }
+                self.begin_or_solve(system, &mut Alone { work: self, system }, factors);
             } else {
-                let mut rows = SideBySide::new(self, group);
                 // SAFETY: as above.
                 let factors = unsafe { self.factors.side_by_side::<L>(systems, group) };
-                if self.begins {
-                    begin_system(systems, system, &rows, factors);
-                } else {
-                    solve_system(systems, system, &mut rows, factors);
-                }
+                self.begin_or_solve(system, &mut SideBySide::new(self, group), factors);
             }
         }
     }
 }
 
 impl SystemWork<'_> {
+    #[inline(always)]
+    fn begin_or_solve<L: Lane>(&self, system: usize, rows: &mut impl SystemRows<L>, factors: SystemFactors<L>) {
+        let systems = &self.problem.systems;
+        if self.begins {
+            begin_system(systems, system, rows, factors);
+        } else {
+            solve_system(systems, system, rows, factors);
+        }
+    }
+
     /// The number of the row of a node of the problem, among corrections or impulses.
     ///
     /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
