@@ -9,6 +9,9 @@ macro_rules! named {
             /// All, in their order.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$value),+];
 
+            /// Their names.
+            pub(crate) const NAMES: [&'static str; Self::ALL.len()] = [$($name),+];
+
             /// Its name in files, on command lines and in messages.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -27,7 +30,7 @@ macro_rules! named {
             type Err = $crate::Error;
 
             fn from_str(name: &str) -> $crate::Result<Self> {
-                let unknown = || $crate::Error::input(format!("{name:?} is none of {}", [$($name),+].join(", ")));
+                let unknown = || $crate::Error::input(format!("{name:?} is none of {}", Self::NAMES.join(", ")));
                 Self::ALL.into_iter().find(|value| value.name() == name).ok_or_else(unknown)
             }
         }

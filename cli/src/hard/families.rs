@@ -193,7 +193,7 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
     Ok(Judged { seed: 0, checks: checks.0, ms: median(&times) / start.dynamic_count() as f64 })
 }
 
-/// What is looked at after every step.
+/// Quantities of all steps that a law is about.
 struct Watch {
     /// Energy of the start (J), and the most that was there more (J).
     energy: f64,

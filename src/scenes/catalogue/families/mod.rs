@@ -59,7 +59,7 @@ named!(Family {
     Piles = "piles",
 });
 
-/// What holds of a member of a family.
+/// The law of a member of a family.
 ///
 /// ```
 /// use drystone::scenes::{Family, Law};
@@ -108,7 +108,7 @@ pub enum Law {
 pub struct Member {
     /// The scene `family:kind=KIND,seed=SEED`.
     pub scene: Scene,
-    /// What holds of it.
+    /// Its law.
     pub law: Law,
 }
 
@@ -118,17 +118,6 @@ const EARTH: f64 = 9.81;
 const TIME: f64 = 10.0;
 
 impl Family {
-    /// The names, in the order of [`Family::ALL`].
-    pub(super) const NAMES: [&str; Self::ALL.len()] = {
-        let mut names = [""; Self::ALL.len()];
-        let mut k = 0;
-        while k < names.len() {
-            names[k] = Self::ALL[k].name();
-            k += 1;
-        }
-        names
-    };
-
     /// One line: the worlds, and what holds of them.
     pub const fn summary(self) -> &'static str {
         match self {
