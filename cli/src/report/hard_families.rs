@@ -2,14 +2,13 @@
 
 use std::fmt::Write;
 
+use super::prose::wrapped;
 use crate::hard::families::FamilyShare;
 use drystone::Result;
 use drystone::preset::Preset;
 use drystone::scenes::Family;
 
 const PRESETS: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Accurate];
-/// Longest line of prose (characters).
-const WIDTH: usize = 120;
 
 /// The page as Markdown. `judge` gives the shares of the families at a preset.
 ///
@@ -55,21 +54,6 @@ fn cell(share: &FamilyShare) -> String {
     format!("{:.0} % ({least:.1} to {most:.1}), {:.2} µs", 100.0 * share.share(), 1e3 * share.ms())
 }
 
-/// A text in lines of at most [`WIDTH`], `indent` before each but the first.
-fn wrapped(text: &str, indent: &str) -> String {
-    let mut words = text.split(' ');
-    let (mut lines, mut line) = (String::new(), words.next().unwrap_or_default().to_owned());
-    for word in words {
-        if line.chars().count() + 1 + word.chars().count() > WIDTH {
-            lines += &(std::mem::replace(&mut line, indent.to_owned() + word) + "\n");
-        } else {
-            line += " ";
-            line += word;
-        }
-    }
-    lines + &line + "\n"
-}
-
 /// The statics or the closed form of a family, and the criterion.
 const fn text(family: Family) -> &'static str {
     match family {
@@ -90,6 +74,7 @@ const fn text(family: Family) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use super::super::prose::WIDTH;
     use super::*;
     use crate::hard::families::Judged;
     use crate::hard::{Check, Limit};

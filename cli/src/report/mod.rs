@@ -11,6 +11,7 @@ pub mod junit;
 pub mod number;
 mod performance;
 mod plot;
+mod prose;
 pub mod rounds;
 mod rules;
 mod run;

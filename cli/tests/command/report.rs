@@ -277,6 +277,7 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
         std::fs::read_to_string(folder.path().join("performance.md")).unwrap()
     };
     let text = page();
+    let in_one_line = text.replace("\n  ", " ").replace('\n', " ");
     for figure in [
         "| pile:n=9, 300 | drystone cpu 8x1 | 7.77, 15.5, 23.3 | 0.411, 0.421, 0.431 | 1.70, 2.90 | 4.44, 8.88, 13.3 |",
         "|  | other cpu 8x1 | 7.77, 15.5, 23.3 |  | 1.70, 2.90 |",
@@ -291,9 +292,9 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
         "190123",
         "| pile:n=9 | 2 | 2.00 | 0 | 0 | 1.65 | 0 | 282 |",
         "Machine: a machine. Commit c0ffee",
-        "Tried and left out",
+        "## Huge pages",
     ] {
-        assert!(text.contains(figure), "{figure} is missing:\n{text}");
+        assert!(in_one_line.contains(figure), "{figure} is missing:\n{text}");
     }
     assert!(!text.contains("short run"));
     let picture = std::fs::read_to_string(rows.join("engines.svg")).unwrap();

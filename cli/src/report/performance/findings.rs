@@ -7,6 +7,7 @@ use super::engines::{OWN, distinct};
 use crate::report::bench::{FallingRow, GrowthRow, LimitRow, OPERATIONS, StatesRow, WorldsRow};
 use crate::report::comparison::WindowRow;
 use crate::report::number::number;
+use crate::report::prose::wrapped_page;
 
 pub(super) fn findings(rows: &Rows) -> String {
     [
@@ -16,9 +17,9 @@ pub(super) fn findings(rows: &Rows) -> String {
         ("One island of any size", "growth.csv", growth(&rows.growth)),
         ("Sweeps and the limits of the machine", "limits.csv", limits(&rows.limits)),
         ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
-        ("States that are kept", "states.csv", states(&rows.states)),
+        ("Saved states", "states.csv", states(&rows.states)),
     ]
-    .map(|(title, files, text)| format!("\n## {title}\n\n{text}\n\nRows: {}.\n", links(files)))
+    .map(|(title, files, text)| format!("\n## {title}\n\n{}\nRows: {}.\n", wrapped_page(&text), links(files)))
     .concat()
 }
 
@@ -54,8 +55,8 @@ fn beside(rows: &[WindowRow]) -> String {
     };
     let overlap = own().filter_map(to_least).fold(0.0, f64::max);
     format!(
-        "Over all thirds of all scenes, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is at most {} of the \
-         least mean overlap of another engine at the end of the same third.",
+        "In the thirds of all scenes, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is \
+         at most {} of the least mean overlap of the other engines in the same third.",
         times.collect::<Vec<_>>().join(" and "),
         number(overlap)
     )
@@ -69,8 +70,8 @@ fn stalls(rows: &[WindowRow]) -> String {
     };
     let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
     format!(
-        "The slowest step of a third takes at most {} times the median of the third. The first step of a run takes at most {} times \
-         the median of the first third: it computes all pairs, chooses all colors and takes all memory.",
+        "The slowest step of a third takes at most {} times the median of the third. The first step takes at most {} \
+         times the median of the first third, because it computes all pairs and colors and allocates all memory.",
         name(largest(|r| r.ms_worst / r.ms)),
         name(largest(first))
     )
@@ -81,13 +82,13 @@ fn stages(rows: &[FallingRow]) -> String {
     let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
     let Some(most) = rows.iter().map(key).max() else { return String::new() };
     let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
-    let mut text = format!("Medians of {}, {}, in ms:\n\n", shown[0].scene, on(shown[0].threads));
+    let mut text = format!("Medians of {}, {}, in ms. A manifold has the contact points of two shapes:\n\n", shown[0].scene, on(shown[0].threads));
     for r in shown {
         let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
         let _ = writeln!(
             text,
-            "* steps {} to {}: {ms}, of it detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} \
-             pairs computed anew, {} manifolds",
+            "* steps {} to {}: {ms}, with detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} \
+             pairs recomputed, {} manifolds",
             r.from, r.to, r.computed, r.pairs, r.manifolds
         );
     }
@@ -96,8 +97,8 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The least time of the stage `run` for a manifold and a pass over all contacts, relative to the \
-         smallest island in brackets, and bytes of the whole process at its peak:\n\n",
+        "A plane pyramid is one island. The times are the least of the stage `run`, the sweeps, per manifold and pass over all contacts, in parentheses relative to the smallest island. \
+         Bytes are the peak of the whole process:\n\n",
     );
     for scene in distinct(rows.iter().map(|r| &r.scene)) {
         let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
@@ -106,7 +107,7 @@ fn growth(rows: &[GrowthRow]) -> String {
         let [ms, detect, rows, run] = [own[0].ms, own[0].detect, own[0].prepare, own[0].run].map(number);
         let _ = writeln!(
             text,
-            "* {} boxes: {}{memory}; a step with {} takes {ms} ms, of it detection {detect}, rows {rows}, sweeps {run}",
+            "* {} boxes: {}{memory}; a step with {} takes {ms} ms, with detection {detect}, rows {rows}, sweeps {run}",
             own[0].boxes,
             times.collect::<Vec<_>>().join(", "),
             on(own[0].threads)
@@ -117,10 +118,11 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "A sweep over one point with friction of two cubes takes {OPERATIONS} operations on single numbers, counted by running the kernel \
-         over a number type that counts. Bytes are those that the lanes read and write, and in brackets those of the kernels over plain rows, each body as often \
-         as a contact names it; bodies that come from a cache take the rate beyond 100 % of the triad. The triad is a = b + s c over as \
-         many bytes as the lanes hold; the peak is that of multiplications and additions on registers alone:\n\n",
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} scalar operations, counted by a \
+         number type that counts. The lanes are the SIMD lanes of the processor. Bytes are read and written by the \
+         lanes, in parentheses by the kernels over plain rows, which load a body for each of its contacts. The triad \
+         is a = b + s c over as many bytes as the lanes hold. Bodies in a cache can exceed 100 % of it. The peak is \
+         that of multiplications and additions on registers:\n\n",
     );
     for r in rows {
         let _ = writeln!(
@@ -145,7 +147,7 @@ fn limits(rows: &[LimitRow]) -> String {
 
 fn worlds(rows: &[WorldsRow]) -> String {
     let mut text = String::from(
-        "Steps of one world in a second, all worlds at rest; in brackets the share of the best number of worlds:\n\n",
+        "Steps of single worlds per second, all worlds at rest, in parentheses relative to the best number of worlds:\n\n",
     );
     for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
         let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
@@ -157,9 +159,10 @@ fn worlds(rows: &[WorldsRow]) -> String {
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The time of a step of a pile at rest that is awake (ms), and in parts of that time: a state into memory that stands (`Rollback::push`), the \
-         way back (`Simulation::restore`), into bytes (`save`) and from them (`load`):\n\n\
-         | scene | threads | step | push | back | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
+        "The pile is awake and at rest. A step is in ms, the other times are relative to it. `Rollback::push` copies \
+         a state into allocated memory, `Simulation::restore` returns to it, `save` and `load` convert a state to and \
+         from bytes:\n\n\
+         | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {
         let [push, back, save, load] = [r.snapshot, r.restore, r.save, r.load].map(|time| number(time / r.ms));

@@ -1,0 +1,29 @@
+//! Prose of pages, in lines that fit.
+
+/// Longest line of prose (characters).
+pub const WIDTH: usize = 120;
+
+/// A text in lines of at most [`WIDTH`], `indent` before each but the first.
+pub fn wrapped(text: &str, indent: &str) -> String {
+    let mut words = text.split(' ');
+    let (mut lines, mut line) = (String::new(), words.next().unwrap_or_default().to_owned());
+    for word in words {
+        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines += &(std::mem::replace(&mut line, indent.to_owned() + word) + "\n");
+        } else {
+            line += " ";
+            line += word;
+        }
+    }
+    lines + &line + "\n"
+}
+
+/// Paragraphs and items of lists in lines that fit. Rows of tables stay whole.
+pub fn wrapped_page(text: &str) -> String {
+    let line = |line: &str| match line {
+        row if row.starts_with('|') => format!("{row}\n"),
+        item if item.starts_with("* ") => wrapped(item, "  "),
+        _ => wrapped(line, ""),
+    };
+    text.lines().map(line).collect()
+}
