@@ -51,7 +51,7 @@ pub fn solvers(path: &Path) -> Result<Solvers> {
     solved(&mut section, &rows, &targets);
     let mut pictures = Vec::new();
     section.push_str("\n## Performance profiles\n\n");
-    section.push_str("A line shows for how many of the problems a solver takes at most so many times the time of the fastest solver of the problem.\n\n");
+    section.push_str("A line shows the share of problems that a solver solves within a multiple of the time of the fastest solver.\n\n");
     for target in &targets {
         let name = format!("profile-{target}.svg");
         let _ = writeln!(
@@ -99,7 +99,7 @@ fn summary(section: &mut String, rows: &[Row], targets: &[&str]) {
 }
 
 fn times(section: &mut String, rows: &[Row], targets: &[&str]) {
-    section.push_str("\nMilliseconds, with iterations in parentheses (steps of Newton's method for drystone; 0 where its sweeps sufficed):\n\n| problem | form | contacts |");
+    section.push_str("\nMilliseconds, with iterations in parentheses (for drystone steps of Newton's method, 0 where sweeps sufficed):\n\n| problem | form | contacts |");
     for target in targets {
         let _ = write!(section, " drystone {target} | fastest of Siconos |");
     }
@@ -121,8 +121,7 @@ fn times(section: &mut String, rows: &[Row], targets: &[&str]) {
 
 /// How many problems each solver solves.
 fn solved(section: &mut String, rows: &[Row], targets: &[&str]) {
-    section
-        .push_str("\nProblems that each solver solves (global problems alone for the global solvers):\n\n| solver |");
+    section.push_str("\nProblems that each solver solves (for global solvers only global problems):\n\n| solver |");
     targets.iter().for_each(|target| section.push_str(&format!(" {target} |")));
     section.push_str(" of |\n|---|");
     targets.iter().for_each(|_| section.push_str("--:|"));

@@ -82,7 +82,11 @@ fn stages(rows: &[FallingRow]) -> String {
     let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
     let Some(most) = rows.iter().map(key).max() else { return String::new() };
     let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
-    let mut text = format!("Medians of {}, {}, in ms. A manifold has the contact points of two shapes:\n\n", shown[0].scene, on(shown[0].threads));
+    let mut text = format!(
+        "Medians of {}, {}, in ms. A manifold has the contact points of two shapes:\n\n",
+        shown[0].scene,
+        on(shown[0].threads)
+    );
     for r in shown {
         let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
         let _ = writeln!(
@@ -97,8 +101,9 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The times are the least of the stage `run`, the sweeps, per manifold and pass over all contacts, in parentheses relative to the smallest island. \
-         Bytes are the peak of the whole process:\n\n",
+        "A plane pyramid is one island. The times are the least of the stage `run`, the sweeps, per manifold and pass \
+         over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole \
+         process:\n\n",
     );
     for scene in distinct(rows.iter().map(|r| &r.scene)) {
         let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
