@@ -152,8 +152,8 @@ impl RenderArgs {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
         let (width, height) = self.size;
         let mut page = format!(
-            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page. Each picture shows a \
-             scene after a third of its steps.\n",
+            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page. Each \
+             picture shows a scene after a\nthird of its steps. `drystone render NAME --steps N --out FILE.png` draws one.\n",
             folder.display()
         );
         for entry in CATALOGUE {
@@ -169,11 +169,7 @@ impl RenderArgs {
             film.draw(&mut canvas, &self.look(), |picture| output.add(picture))?;
             output.finish()?;
             let picture = folder.file_name().map(Path::new).unwrap_or(folder).join(format!("{name}.png"));
-            page += &format!(
-                "\n## {name}\n\n{}\n\n`drystone render {name} --steps {steps} --out {name}.png`\n\n![{name}]({})\n",
-                entry.summary,
-                picture.display()
-            );
+            page += &format!("\n## {name}\n\n{}\n\n![{name}, {steps} steps]({})\n", entry.summary, picture.display());
         }
         let page_path = folder.with_extension("md");
         files::write(&page_path, page.as_bytes())?;

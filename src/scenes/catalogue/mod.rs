@@ -421,7 +421,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "family",
-        summary: "a random world of a kind of which statics or a closed form says what holds, as `drystone hard --families` judges",
+        summary: "a random world with an outcome known from statics or a closed form, as `drystone hard --families` judges",
         parameters: &[
             Parameter::word("kind", &Family::NAMES, "family of worlds"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),
