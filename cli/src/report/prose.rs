@@ -20,10 +20,12 @@ pub fn wrapped(text: &str, indent: &str) -> String {
 
 /// Paragraphs and items of lists in lines that fit. Rows of tables stay whole.
 pub fn wrapped_page(text: &str) -> String {
-    let line = |line: &str| match line {
-        row if row.starts_with('|') => format!("{row}\n"),
-        item if item.starts_with("* ") => wrapped(item, "  "),
-        _ => wrapped(line, ""),
+    let line = |line: &str| {
+        if line.starts_with('|') {
+            format!("{line}\n")
+        } else {
+            wrapped(line, if line.starts_with("* ") { "  " } else { "" })
+        }
     };
     text.lines().map(line).collect()
 }
