@@ -107,6 +107,11 @@ pub use world::{
 #[doc = include_str!("../README.md")]
 pub struct Readme;
 
+/// The example of the page about the library, likewise.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+pub struct Library;
+
 /// The example of the page for people who come from another engine, likewise.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/from-other-engines.md")]

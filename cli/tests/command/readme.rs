@@ -191,7 +191,7 @@ fn the_options_in_the_table_of_commands_are_those_of_the_commands() {
         text(&output.stdout)
     };
     let mut checked = 0;
-    for row in page("README.md").lines().filter(|row| row.starts_with("| `drystone ")) {
+    for row in page("docs/commands.md").lines().filter(|row| row.starts_with("| `drystone ")) {
         let spans: Vec<&str> = row.split('`').skip(1).step_by(2).collect();
         // `drystone report --shard I/N`, `hard --shard I/N`
         let is_command =
@@ -210,7 +210,7 @@ fn the_options_in_the_table_of_commands_are_those_of_the_commands() {
         let words = spans.iter().flat_map(|span| span.split(' '));
         for option in words.filter(|word| word.starts_with("--")) {
             let has = known.split(|c: char| !c.is_alphanumeric() && c != '-').any(|word| word == option);
-            assert!(has, "README.md: {option} is no option of {names:?}: {row}");
+            assert!(has, "commands.md: {option} is no option of {names:?}: {row}");
             checked += 1;
         }
     }

@@ -26,8 +26,9 @@ fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
 pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its distance until it rests; Coulomb's law gives v²/(2 mu g) = {:.3} m. The axes \
-         of the box rule are the tangents of the contact. *Creep* is the distance that a block at rest on a slope of 20° with mu 0.5 moves in 10 s.\n\n\
+        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its distance; Coulomb's law\n\
+         gives v²/(2 mu g) = {:.3} m. The axes of `box` are the tangents of the contact. *Creep* is the distance\n\
+         that a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
          | friction | 0° | 15° | 30° | 45° | largest spread | creep |\n|---|---|---|---|---|---|---|",
         16.0 / (2.0 * 0.4 * 9.81)
     );
@@ -73,7 +74,9 @@ fn creep(rule: &str) -> Result<f64> {
 fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe same block starts at 2 m/s and spins at 5 rad/s. Under Coulomb's law sliding and spinning end at the same time. Friction acts below the center of mass and shifts the load forward, so the path is not quite straight. Friction per manifold has neither this effect nor the effect that sliding weakens friction against the spin.\n\n\
+        "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together. Friction\n\
+         acts below the center of mass and shifts the load forward, so the path bends. Friction per manifold\n\
+         lacks this effect, and sliding does not weaken its friction against the spin.\n\n\
          | friction | slides for | spins for | distance from its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();
@@ -113,7 +116,7 @@ fn sliding_spin(rule: &str, more: &str) -> Result<([f64; 3], Line)> {
 fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nIn the scene `throw` a ball hits a standing stack. The table has the number of boxes in place just before the hit and at the end.\n\n\
+        "\nIn the scene `throw` a ball hits a stack. The table counts boxes in place before the hit and at the end.\n\n\
          | friction | before | at the end |\n|---|---|---|"
     );
     let scene = Scene::find("throw", &[])?;

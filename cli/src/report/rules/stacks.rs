@@ -16,7 +16,8 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     let page = &mut report.page;
     let _ = writeln!(
         page,
-        "\n## Clamping\n\nThe scene `misaligned` runs for at most 20 s with the settings {SHEET}. A stack stands until a box is half a box away from its first position.\n\n\
+        "\n## Clamping\n\nThe scene `misaligned` runs for 20 s with {SHEET}. A\n\
+         stack falls when a box is half a box away from its start.\n\n\
          | boxes | clamping | stands | drift | rms speed |\n|---|---|---|---|---|"
     );
     for n in [5, 10, 20] {
@@ -47,8 +48,9 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
     let mut lines = Vec::new();
     let _ = writeln!(
         report.page,
-        "\n## Stabilization\n\nThe scene `tower` with 10 boxes runs for 20 s with 16 sweeps a step: `none` and `baumgarte` in one substep, `soft` in 8 substeps of 1 + 1 sweeps. *Energy added* is the largest rise of \
-         kinetic and potential energy above an earlier minimum. *Exit speed* is the speed of a box that starts 5 cm deep in the floor.\n\n\
+        "\n## Stabilization\n\nA `tower` of 10 boxes runs for 20 s with 16 sweeps a step: one substep, or for `soft` 8 substeps of 1 +\n\
+         1 sweeps. *Energy added* is the largest rise of kinetic and potential energy above an earlier minimum.\n\
+         *Exit speed* is that of a box that starts 5 cm deep in the floor.\n\n\
          | stabilization | deepest after 1 s | after 20 s | energy added | rms speed at rest | exit speed |\n|---|---|---|---|---|---|"
     );
     for (rule, text) in STABILIZATIONS {
@@ -76,9 +78,9 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
         after_run();
     }
     report.page.push_str(
-        "\nWithout stabilization the overlap that the first sweeps leave stays forever. Baumgarte stabilization removes the overlap, and the energy that \
-         it adds shakes the tower. The soft contact first overlaps by the amount that its stiffness gives. The preload (`preload_rate`) then removes \
-         the overlap, and the tower comes to rest; the energy added is the energy that lifts the tower by the overlap.\n",
+        "\nWithout stabilization the first overlap stays. Baumgarte stabilization removes it and shakes the tower.\n\
+         The soft contact first overlaps by its stiffness. The preload, an offset of the spring (`preload_rate`),\n\
+         then lifts the tower, which adds the energy, and the tower rests.\n",
     );
     let title = "Deepest overlap in a tower of 10 boxes";
     report.picture("stabilization.svg", title, ("overlap mm", Scale::Decades), lines);
