@@ -1,5 +1,5 @@
-//! Contact between rigid bodies: graph-colored sequential impulses on wgpu compute shaders, with a CPU reference that
-//! follows the same plan.
+//! Contact, Coulomb friction and joints between rigid bodies. The solver runs projected sequential impulses over a
+//! colored graph of contacts: on the CPU with SIMD lanes and threads, or on wgpu compute shaders.
 //!
 //! One step is a straight line, [`Simulation::step`]:
 //!
@@ -12,9 +12,9 @@
 //! store    poses and velocities back                                          -> world              problem
 //! ```
 //!
-//! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
-//! function of a shader has a Rust double of the same name ([`stages::kernels`]), so that every number of the GPU has something
-//! to be compared with.
+//! One step is a value ([`StepProblem`], plain rows) and the order of work is data ([`StepPlan`], a list of passes).
+//! Every shader function has a Rust twin of the same name ([`stages::kernels`]), so a test can compare every number
+//! that the GPU computes.
 //!
 //! | To | call |
 //! |---|---|

@@ -82,7 +82,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": shapes[0]: cone of radius", |w| {
             w.add(Body::fixed().shape(Shape::cone(1.0, 2e9)));
         }),
-        ("body 2 \"\": shapes[0]: half-space of normal", |w| {
+        ("body 2 \"\": shapes[0]: half-space: normal", |w| {
             w.add(Body::fixed().shape(Shape::half_space(3.0 * Vec3::Y)));
         }),
         ("body 2 \"\": shapes[0]: position", |w| {
