@@ -285,7 +285,7 @@ impl Bodies {
         let body = &self.all[index];
         let is_empty = body.kind == BodyKind::Fixed && body.colliders.is_empty();
         ensure(is_empty || !self.is_vacant(index), || {
-            "is written to a vacant index: use World::insert to add a body".into()
+            "written to a vacant index: use World::insert to add a body".into()
         })
     }
 
