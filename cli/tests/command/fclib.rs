@@ -131,7 +131,7 @@ fn a_problem_without_bodies_is_solved_in_double_precision_and_refused_on_lanes_a
         ("solve ball.hdf5 --backend gpu", &["has no bodies", "gpu does not"]),
         ("solve ball.hdf5 --order manifolds", &["has no bodies", "by contacts"]),
         ("solve rolling.hdf5", &["rolling.hdf5: fclib_local_rolling: rolling friction cannot be read"]),
-        ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, and bodies are needed"]),
+        ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, but bodies are needed"]),
     ] {
         refused(folder.path(), arguments, named);
     }
