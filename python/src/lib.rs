@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A mistake of drystone.");
+pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A defect of drystone.");
 
 /// An error of the library as one of Python.
 pub fn raised(error: drystone::Error) -> PyErr {

@@ -35,7 +35,7 @@ pub struct GpuOptions {
     pub buffer_limit: u64,
     /// Largest total memory of all buffers (B).
     pub memory: u64,
-    /// Target for the longest time that one submission holds the device. A longer plan is divided into several
+    /// Target for the longest time that one submission holds the device (s). A longer plan is divided into several
     /// submissions. Watchdogs of drivers and desktops end work that holds a device for two seconds or more.
     pub submission: Duration,
     /// Whether another device, or the processor, continues after the device was lost. Otherwise the step fails, which
