@@ -88,7 +88,8 @@ impl Rollback {
     /// There are fewer states than `steps`. Nothing is changed then.
     pub fn back(&mut self, steps: usize, simulation: &mut Simulation) -> Result<()> {
         let all = self.states.len();
-        let kept = all.checked_sub(steps).ok_or_else(|| input!("cannot go back {steps} steps: only {all} states are kept"))?;
+        let kept =
+            all.checked_sub(steps).ok_or_else(|| input!("cannot go back {steps} steps: only {all} states are kept"))?;
         if let Some(state) = self.states.get(kept) {
             simulation.restore(state);
         }

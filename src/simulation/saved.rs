@@ -161,7 +161,8 @@ impl Simulation {
         let number =
             |from: usize, to: usize| header[from..to].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
         let version = number(8, 12);
-        let other = || refused(format_args!("it has version {version}, but this program reads version {VERSION}")).to_string();
+        let other =
+            || refused(format_args!("it has version {version}, but this program reads version {VERSION}")).to_string();
         ensure(version == u64::from(VERSION), other)?;
         let damaged = || refused("it is damaged or cut short: the hash of its content differs").to_string();
         ensure(number(12, HEADER) == hash_of(content), damaged)?;

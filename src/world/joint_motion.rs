@@ -172,8 +172,7 @@ impl Axis {
             let is_range = ascend && is_bound(min, f32::NEG_INFINITY) && is_bound(max, f32::INFINITY);
             ensure(is_range, || format!("{name}: limits {min} and {max}: must ascend, within {least} and {most}"))?;
         }
-        let message =
-            || format!("{name}: a motor or a spring cannot move a locked axis: free or limit the axis");
+        let message = || format!("{name}: a motor or a spring cannot move a locked axis: free or limit the axis");
         ensure(self.bounds != Bounds::Locked || self.drive == Drive::None, message)?;
         let max_load = match self.drive {
             Drive::None => return Ok(()),

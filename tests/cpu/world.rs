@@ -133,7 +133,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().motor(1.0, 1.0))),
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().spring(0.0, 1.0, 1.0))),
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().limited(-1.0, 1.0))),
-        ("joint 0: angular: a locked axis has a motor or a spring", |w| {
+        ("joint 0: angular: a motor or a spring cannot move a locked axis", |w| {
             w.join(ball().generic([Axis::FREE; 3], [Axis::LOCKED.motor(1.0, 1.0), Axis::FREE, Axis::FREE]));
         }),
         ("joint 0: linear: limits NaN and 1: must ascend", |w| {

@@ -38,7 +38,10 @@ impl ExportArgs {
             check_touching(&problem)?;
             problem
         } else if self.step.is_some() || !self.parameter.is_empty() {
-            return Err(Error::input(format!("{}: --step and --parameter need a scene, not a contact problem", self.source)));
+            return Err(Error::input(format!(
+                "{}: --step and --parameter need a scene, not a contact problem",
+                self.source
+            )));
         } else {
             ContactProblem::read(path)?
         };

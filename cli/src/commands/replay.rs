@@ -69,7 +69,7 @@ impl ReplayArgs {
         table.add_row(["hash", &hash]);
         print(table)?;
         match difference {
-            None => print("no hash differs from the recording"),
+            None => print("no difference from the recording: all hashes agree"),
             Some(d) => {
                 let body = d.body.map_or("a body".into(), |body| format!("body {body}"));
                 print(format_args!(

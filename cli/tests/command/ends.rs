@@ -258,7 +258,8 @@ fn a_report_that_is_stopped_says_so_and_goes_on() {
     let child = folder.drystone(all).spawn().expect("the command starts");
     let output = stopped(child, "TERM", || folder.path("report/scenes.csv").exists());
     let (line, code) = last(&output);
-    let kept = "drystone: stopped by SIGTERM; kept report/scenes.csv; the same command continues from report/scenes.csv";
+    let kept =
+        "drystone: stopped by SIGTERM; kept report/scenes.csv; the same command continues from report/scenes.csv";
     assert_eq!((line.as_str(), code), (kept, Some(143)));
     let first = folder.read("report/scenes.csv");
     assert!(

@@ -79,7 +79,7 @@ fn bad_input_ends_in_one_line_that_names_the_file_and_nothing_is_written() {
         ("export tower --fclib out.hdf5", &["tower", "--step N"]),
         ("export twoer --step 3 --fclib out.hdf5", &["twoer", "neither a scene"]),
         ("export chain --step 3 --fclib out.hdf5", &["chain, step 3", "joints"]),
-        ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: nothing touches"]),
+        ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: no awake body touches another"]),
         ("solve torn.hdf5", &["torn.hdf5: not a whole HDF5 file"]),
     ] {
         refused(folder.path(), arguments, named);
