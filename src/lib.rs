@@ -20,13 +20,13 @@
 //! |---|---|
 //! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a [`Scene`] of the catalogue or a file |
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
-//! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
+//! | choose a backend for the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
-//! | step many worlds, each by itself | [`batch::Batch`] |
+//! | step many independent worlds | [`batch::Batch`] |
 //! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
-//! | hear of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
+//! | get events of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
 //! | check an adapter and its driver | `conform` |
 //! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
@@ -107,7 +107,7 @@ pub use world::{
 #[doc = include_str!("../README.md")]
 pub struct Readme;
 
-/// The example of the page for people who come from another engine, likewise.
+/// The example of the page for users of other engines, likewise.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/from-other-engines.md")]
 pub struct FromOtherEngines;

@@ -17,7 +17,7 @@ use crate::world::{Body, BodyKind, World};
 /// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
 /// let Penetration { max, mean, .. } = Penetration::of_world(&world, &SolverConfig::default());
 /// assert!((max - 0.01).abs() < 1e-6 && max == mean);
-/// // Of two manifolds with separations of two points each (m).
+/// // Two manifolds with the separations of two points each (m).
 /// let both = Penetration::of([[-0.5_f32, 0.1].into_iter(), [0.0, 0.2].into_iter()]);
 /// assert_eq!((both.max, both.mean), (0.5, 0.25));
 /// ```

@@ -294,7 +294,7 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 6)?;
-/// // Someone meddles with the replay.
+/// // Disturb the replay.
 /// again.world.bodies[0].linear_velocity.x = 1.0;
 /// replay.step(&mut again)?;
 /// let difference: drystone::ReplayDifference = replay.first_difference().expect("the bodies differ");
@@ -345,7 +345,7 @@ struct KeptState {
 /// let mut again = replay.begin(Box::new(Cpu::new()))?;
 /// while replay.step(&mut again)?.is_some() {}
 /// assert!(again.hash() == hashes[9] && replay.first_difference().is_none());
-/// // Back to the fifth step, from the nearest state before it.
+/// // Go back to the fifth step, from the nearest earlier state.
 /// replay.seek(&mut again, 5)?;
 /// assert_eq!((again.hash(), replay.step_number()), (hashes[4], 5));
 /// assert!((replay.time() - 0.05).abs() < 1e-6);

@@ -21,7 +21,7 @@ use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 /// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
 /// use drystone::residuals::Residuals;
 ///
-/// // The ball stops to fall, and goes on sliding at 0.7 m/s against all friction there is.
+/// // The ball stops falling, and slides on at 0.7 m/s against full friction.
 /// let solved = Residuals::of(&problem, &[DVec3::new(6.0, 0.0, -0.6)]);
 /// assert!(solved.e_vel < 1e-12 && solved.cone < 1e-12);
 /// // Without impulses it approaches the ground.

@@ -76,7 +76,7 @@ struct Unfinished {
 /// for _ in 0..60 {
 ///     simulation.step(1.0 / 60.0)?;
 /// }
-/// // Contacts as the last step left them, and how deep bodies overlap: as the step began, and now.
+/// // Contacts of the last step, and the overlap of bodies: at its start, and now.
 /// let borne: f32 = simulation.manifolds().map(|manifold| manifold.normal_impulse()).sum();
 /// assert!((borne * 480.0 - 9810.0).abs() < 100.0, "{borne} N s in a substep of 1/480 s");
 /// assert!(simulation.solved_penetration().max < 1e-3 && simulation.penetration().max < 1e-3);
@@ -84,11 +84,11 @@ struct Unfinished {
 /// // Joints: the lamp hangs on its hinge.
 /// assert!((simulation.joint_impulses()[0].length() * 480.0 - 19.62).abs() < 0.1);
 /// assert!(simulation.joint_angular_impulses()[0].length() < 1e-3);
-/// // What rests sleeps, and takes the substeps of the settings.
+/// // Bodies at rest sleep, and take the substeps of the settings.
 /// assert!(simulation.is_asleep(brick) && simulation.substeps_of(brick) == simulation.config().substeps);
 /// simulation.wake(brick);
 /// assert!(!simulation.is_asleep(brick));
-/// // Settings and backend may change. The next step is a value.
+/// // Settings and backend can change. The next step is available as a value.
 /// simulation.set_config(SolverConfig::default().with(|c| c.substeps = 4))?;
 /// let before = simulation.set_backend(Box::new(drystone::Cpu::new()));
 /// assert_eq!((before.name(), simulation.backend().name()), ("reference", "cpu"));
@@ -215,7 +215,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What the simulation listens to.
+    /// The events and sums that the simulation reports.
     pub fn listening(&self) -> Listen {
         self.stages.events.listen
     }

@@ -86,7 +86,7 @@ pub const EFFORT_CLASSES: usize = 13;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
 /// # }
-/// // A tower whose top is a thousand times as heavy: the substeps of the settings would not do.
+/// // A tower with a top that is a thousand times as heavy: the substeps of the settings are not sufficient.
 /// let hardest: drystone::stats::HardestContact = stats.hardest.expect("a load");
 /// assert!(hardest.need > 1.0 && simulation.substeps_of(10) > simulation.config().substeps);
 /// # Ok::<(), drystone::Error>(())

@@ -38,7 +38,7 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// assert_eq!(problem.bodies, simulation.problem().bodies);
 /// assert_eq!((backend.traffic().up, backend.kernel_times().len()), (0, 0));
 ///
-/// // The same for a page, where other tasks go on meanwhile.
+/// // The same for a web page: other tasks continue meanwhile.
 /// use drystone::stages::{backend::CheckedStep, problem::carry::Carry};
 /// let mut repeated = problem.clone();
 /// pollster::block_on(backend.run_async(CheckedStep::new(&mut repeated, &plan.passes)?))?;

@@ -21,7 +21,7 @@ use crate::world::{Axis, Drive, Joint, Linear, World};
 /// // Forces last until they change.
 /// world.write(Column::Force, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])?;
 /// assert_eq!(world.simulation().world.bodies[2].force.x, 50.0);
-/// assert!(world.write(Column::JointSpeed, &[]).is_err(), "what follows from others cannot be written");
+/// assert!(world.write(Column::JointSpeed, &[]).is_err(), "a derived column cannot be written");
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

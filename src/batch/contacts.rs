@@ -18,7 +18,7 @@ use crate::simulation::{Contact, Event, Hit};
 /// batch.step(30, &[0, 1])?;
 /// let Contacts { world_start, bodies, impulse, point_start, .. } = batch.contacts(&[0, 1])?;
 /// assert_eq!((world_start, &bodies[..2], point_start.len()), (vec![0, 2, 4], &[[0, 1], [1, 2]][..], 5));
-/// assert!(impulse[0][1] > impulse[1][1], "the lower one bears more");
+/// assert!(impulse[0][1] > impulse[1][1], "the lower one carries more");
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]

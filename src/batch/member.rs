@@ -30,7 +30,7 @@ use crate::world::World;
 /// assert_eq!(member.hash(), member.simulation().hash());
 /// let state: State = member.state();
 /// assert_eq!((state.time(), state.to_simulation().hash()), (member.time(), member.hash()));
-/// // The other one stopped before its first step, and says why.
+/// // The other world stopped before its first step, with an error.
 /// let failed = batch.world(1);
 /// assert!(failed.steps() == 0 && failed.error().is_some_and(|line| line.contains("force")));
 /// assert_eq!(failed.start().hash(), failed.hash());

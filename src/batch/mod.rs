@@ -13,14 +13,14 @@
 //! let mut batch = Batch::of(&scene, &SolverConfig::default(), 4)?;
 //! assert!(batch.step(10, &[0, 2])?.is_empty(), "none fails");
 //! assert_eq!((batch.world(0).steps(), batch.world(1).steps()), (10, 0));
-//! // A state goes into other worlds, and a reset back to the start.
+//! // A state can be restored in other worlds, and a reset goes back to the start.
 //! let state = batch.world(2).state();
 //! batch.restore(1, &state)?;
 //! batch.reset(&[2])?;
 //! batch.step(5, &[0, 1])?;
 //! assert_eq!(batch.world(0).hash(), batch.world(1).hash());
 //! assert_eq!(batch.world(2).hash(), batch.world(3).hash());
-//! // Single worlds may be changed and listened to, and begin from states.
+//! // Single worlds can be changed, can listen to events, and can start from states.
 //! let mut again = Batch::of_states([state])?.on_threads(1)?;
 //! again.world_mut(0).simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
 //! again.worlds_mut()[0].simulation_mut().world.gravity.x = 0.1;
@@ -212,7 +212,7 @@ impl Batch {
     ///
     /// let scene = Scene::find("sphere-plane", &[])?;
     /// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?;
-    /// // Each ball is pushed by a force of its own, and the ways of both are kept.
+    /// // Each ball has its own force, and the run keeps the paths of both.
     /// let tasks = vec![(0, (0.0, Vec::new())), (1, (500.0, Vec::new()))];
     /// let mut ways = [0.0, 0.0];
     /// let failed = batch.run(

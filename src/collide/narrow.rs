@@ -1,5 +1,5 @@
 //! Updates the contacts of pairs to the present poses. Contacts are reused while the bodies have hardly moved, else
-//! they are computed. Sixteen pairs at a time are tested, and so many cuboid pairs are computed at a time. Each pair is
+//! they are computed. Pairs are tested sixteen at a time, and cuboid pairs are computed sixteen at a time. Each pair is
 //! updated by itself, so the other pairs in a group do not matter.
 
 use std::cell::RefCell;

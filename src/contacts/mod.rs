@@ -35,7 +35,7 @@ use glam::{DMat3, DVec3};
 /// let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
 /// let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
 /// let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
-/// // As text, and back.
+/// // Convert to text and back.
 /// assert_eq!(ContactProblem::parse(&problem.to_text())?, problem);
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -94,7 +94,7 @@ pub struct Velocity {
 /// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
 /// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
 /// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
-/// // The first coordinate is that of the normal.
+/// // The first coordinate is along the normal.
 /// let r = contact.coordinates(DVec3::Y * 6.0);
 /// assert_eq!((r, contact.impulse(r)), (DVec3::X * 6.0, DVec3::Y * 6.0));
 /// # let _ = problem;

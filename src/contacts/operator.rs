@@ -22,7 +22,7 @@ use super::{ContactProblem, Velocity};
 /// // 6 N s stop 2 kg at 3 m/s.
 /// let velocities = operator.velocities(&[DVec3::X * 6.0]);
 /// assert_eq!(operator.relative_velocity(0, &velocities), DVec3::Z);
-/// // How u answers to r: 1/m along the normal, and an arm of 0.5 m on 1 kg m² along the tangents.
+/// // The response of u to r: 1/m along the normal, and an arm of 0.5 m on 1 kg m² along the tangents.
 /// assert_eq!(operator.block(0), DMat3::from_diagonal(DVec3::new(0.5, 0.75, 0.75)));
 /// assert_eq!(operator.inverse_inertia(0), DMat3::IDENTITY);
 /// ```

@@ -29,7 +29,7 @@ use crate::saved::{Archive, Columns, Saved};
 /// let handle: BodyHandle = world.insert(Body::fixed());
 /// assert_eq!(handle.index(), 0);
 /// world.remove(handle);
-/// // Another body takes the index, and not the handle.
+/// // Another body gets the index, but not the handle.
 /// let other = world.insert(Body::fixed());
 /// assert!(other.index() == 0 && other != handle);
 /// ```

@@ -141,7 +141,7 @@ impl Collider {
 /// ball.apply_angular_impulse(Vec3::Z * -0.2);
 /// assert!(ball.angular_velocity.length() < 1e-5);
 ///
-/// // A kinematic body goes where it is told, and a sensor beside it sees what comes.
+/// // A kinematic body moves as the caller sets it, and a sensor next to it detects other bodies.
 /// let mut lift = Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0));
 /// lift = lift.sensor_at(Shape::cuboid(1.0, 0.5, 1.0), Vec3::Y * 0.6, Quat::IDENTITY);
 /// lift.move_to(Vec3::Y * 0.5, Quat::IDENTITY, 0.25);

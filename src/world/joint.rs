@@ -44,7 +44,7 @@ use crate::saved::{Archive, Saved};
 /// assert_eq!(rope.linear, Linear::Distance(Axis::limited(0.0, 2.0)));
 /// assert_eq!(rod, ball.at_distance(Axis::limited(2.0, 2.0)));
 /// assert_eq!(spring, ball.at_distance(Axis::FREE.spring(2.0, 1.5, 0.1, f32::MAX)));
-/// // A screw without thread: free to shift along its axis and to turn about it.
+/// // A screw without thread: free to translate along its axis and to rotate about it.
 /// let bolt = ball.along(Vec3::Z).generic([Axis::FREE, Axis::LOCKED, Axis::LOCKED], [Axis::FREE, Axis::LOCKED, Axis::LOCKED]);
 /// // Angles are zero with body 0 turned by a quarter.
 /// let bolt = bolt.zero_at(Quat::from_rotation_z(1.5), Quat::IDENTITY);

@@ -59,7 +59,7 @@ use tag::WorldTag;
 /// let mut world = World::new();
 /// let [a, b] = [0.0, 2.0].map(|x| world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).position(x, 1.0, 0.0)));
 /// world.bodies[a].linear_velocity = Vec3::X;
-/// // Joints have handles too, and an index until one before them goes.
+/// // Joints have handles too. Their index changes when an earlier joint is removed.
 /// let rod = world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.9));
 /// world.joint_mut(rod).expect("just put in").break_force = 100.0;
 /// assert_eq!(world.anchors(world.joint(rod).expect("still there")), [Vec3::Y, Vec3::new(2.0, 1.0, 0.0)]);
@@ -73,7 +73,7 @@ use tag::WorldTag;
 /// assert!((world.potential_energy() - 2.0 * 9.81).abs() < 1e-5);
 /// assert_eq!((world.angular_momentum().z, world.gravity_on(a).y), (-1.0, -9.81));
 ///
-/// // A second world beside the first, whose bodies never meet those of the first.
+/// // A second world beside the first. Its bodies never meet those of the first.
 /// world.beside(&World::new());
 /// let other = world.insert_in(1, Body::fixed())?;
 /// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other.index()]));

@@ -69,7 +69,7 @@ impl Picture {
         self.paint(show.number, &mut show.live, &camera, (width, height), [red, green, blue]);
     }
 
-    /// Draws a maze likewise.
+    /// Draws a maze in the same way.
     pub fn draw_maze(&mut self, maze: &mut Maze, width: u32, height: u32, red: f32, green: f32, blue: f32) {
         let camera = maze.camera;
         self.paint(maze.number, &mut maze.labyrinth, &camera, (width, height), [red, green, blue]);

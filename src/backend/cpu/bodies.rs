@@ -179,7 +179,7 @@ impl Work for TurningWork<'_> {
             for ((begin, place_of), (slot, row)) in begin.iter_mut().zip(&mut places).zip(rows) {
                 (*begin, *place_of) = (*row, place(*slot as usize));
             }
-            // SAFETY: the places are those of states, of which no other task has any; `NEIGHBORING_ROWS` are the places of the rows.
+            // SAFETY: the places are those of states that no other task has; `NEIGHBORING_ROWS` are the places of the rows.
             let (body, [xx, xy, xz, inv_mass, yy, yz, zz, zero]) = unsafe {
                 (wide_body::<L>(self.bodies.as_ptr(), &places), L::gathered(begin.as_ptr(), &NEIGHBORING_ROWS))
             };
@@ -255,7 +255,7 @@ pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WI
 /// The masses of sixteen bodies at the given places.
 ///
 /// # Safety
-/// As of [`wide_body`].
+/// Those of [`wide_body`].
 #[inline(always)]
 pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
     // SAFETY: the caller's promise.
@@ -266,7 +266,7 @@ pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WI
 /// The velocities of sixteen bodies at the start of the step, in rows at the places of their states.
 ///
 /// # Safety
-/// As of [`wide_body`], and `free` has a row for each state.
+/// Those of [`wide_body`], and `free` has a row for each state.
 #[inline(always)]
 pub(super) unsafe fn wide_start<L: Lanes>(free: *const Row8, places: &[u32; WIDTH], mass: &Mass<L>) -> Free<L> {
     const ROWS: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;

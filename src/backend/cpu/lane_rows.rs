@@ -135,7 +135,7 @@ impl<'a> SharedImpulses<'a> {
     /// Some impulses, to write in place.
     ///
     /// # Safety
-    /// As of points.
+    /// Those of [`SharedPoints::slice`].
     #[inline(always)]
     pub unsafe fn slice(&self, range: Range<usize>) -> OwnImpulses<'a> {
         // SAFETY: the caller's promise.

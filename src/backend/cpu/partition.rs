@@ -261,7 +261,7 @@ mod tests {
     use super::*;
     use crate::problem::ContactRow;
 
-    /// Movable bodies, touching as said.
+    /// Movable bodies with these contacts.
     fn problem(bodies: usize, touching: impl Iterator<Item = (u32, u32)>) -> StepProblem {
         let mut problem = StepProblem {
             bodies: vec![BodyRow::AT_REST; bodies],

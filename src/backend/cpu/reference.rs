@@ -22,7 +22,7 @@ use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, NodeRow, StepProbl
 /// use drystone::{Backend, Reference};
 ///
 /// assert_eq!(Reference::<f32>::new().name(), "reference");
-/// // The same kernels in double precision, to see what rounding does.
+/// // The same kernels in double precision, to measure the effect of rounding.
 /// assert!(Reference::<f64>::new().rows().bodies.is_empty());
 /// ```
 #[derive(Debug, Default)]

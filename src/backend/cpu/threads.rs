@@ -65,7 +65,7 @@ impl Threads {
         })
     }
 
-    /// Runs `lead` beside some helpers.
+    /// Runs `lead`, with helpers in parallel.
     fn beside_helpers<R: Send>(&self, helpers: usize, lead: impl FnOnce() -> R + Send) -> R {
         fn beside<R: Send>(threads: &Threads, helpers: usize, lead: &mut (dyn FnMut() -> R + Send)) -> R {
             if helpers == 0 {
